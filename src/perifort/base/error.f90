@@ -1,0 +1,32 @@
+!> One error type for the whole program. Procedures that can fail take
+!> `type(error_type), allocatable, intent(out) :: error` as their last argument, set it and return;
+!> callers return at once if it is allocated. Only the main program stops.
+module pd_base_error
+  implicit none (type, external)
+  private
+  public :: error_type, fail, status_input, status_usage, status_no_answer, status_interrupted
+
+  integer, parameter :: status_input = 1        !! the input or the environment is at fault
+  integer, parameter :: status_usage = 2        !! wrong command line
+  integer, parameter :: status_no_answer = 3    !! unstable or not converged; the history is kept
+  integer, parameter :: status_interrupted = 4  !! interrupted by the user, state kept
+
+  type :: error_type
+    character(:), allocatable :: message  !! what was wrong, what was expected, what is allowed
+    integer :: status = status_input      !! the program's exit status
+  end type error_type
+
+contains
+
+  !> Allocate `error` with a message and an exit status (default: `status_input`).
+  pure subroutine fail(error, message, status)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in) :: message
+    integer, intent(in), optional :: status
+
+    allocate (error)
+    error%message = message
+    if (present(status)) error%status = status
+  end subroutine fail
+
+end module pd_base_error
