@@ -135,7 +135,7 @@ contains
   pure integer function edit_distance(a, b) result(distance)
     character(*), intent(in) :: a, b
     integer :: d(0:len(a), 0:len(b))
-    integer :: i, j, cost
+    integer :: i, j, k, l, cost
 
     d(:, 0) = [(i, i=0, len(a))]
     d(0, :) = [(j, j=0, len(b))]
@@ -143,10 +143,11 @@ contains
       do i = 1, len(a)
         cost = merge(0, 1, a(i:i) == b(j:j))
         d(i, j) = min(d(i - 1, j) + 1, d(i, j - 1) + 1, d(i - 1, j - 1) + cost)
-        if (i > 1 .and. j > 1) then
-          if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) &
-            & d(i, j) = min(d(i, j), d(i - 2, j - 2) + 1)
-        end if
+        if (min(i, j) == 1) cycle
+        k = max(i - 2, 0)
+        l = max(j - 2, 0)
+        if (a(i:i) == b(l + 1:l + 1) .and. a(k + 1:k + 1) == b(j:j)) &
+          & d(i, j) = min(d(i, j), d(k, l) + 1)
       end do
     end do
     distance = d(len(a), len(b))
