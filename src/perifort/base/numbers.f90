@@ -1,0 +1,49 @@
+!> Sums that do not depend on the number of threads, and a few constants.
+module pd_base_numbers
+  use pd_base_kinds, only: wp
+  implicit none (type, external)
+  private
+  public :: pi, total, inner, block_length
+
+  real(wp), parameter :: pi = acos(-1.0_wp)
+  !> Terms in one partial sum: the blocks are fixed, so the sum's rounding is too.
+  integer, parameter :: block_length = 4096
+
+contains
+
+  !> Sum of `values` in blocks of fixed length, added in order.
+  function total(values) result(sum_of_all)
+    real(wp), intent(in), contiguous :: values(:)
+    real(wp) :: sum_of_all
+    real(wp), allocatable :: part(:)
+    integer :: block, blocks
+
+    blocks = (size(values) + block_length - 1)/block_length
+    allocate (part(blocks))
+    !$omp parallel do schedule(static) default(none) shared(blocks, part, values) private(block)
+    do block = 1, blocks
+      part(block) = sum(values((block - 1)*block_length + 1:min(block*block_length, size(values))))
+    end do
+    sum_of_all = sum(part)
+  end function total
+
+  !> Sum of `a*b` in blocks of fixed length, added in order.
+  function inner(a, b) result(sum_of_all)
+    real(wp), intent(in), contiguous :: a(:), b(:)
+    real(wp) :: sum_of_all
+    real(wp), allocatable :: part(:)
+    integer :: block, blocks, first, last
+
+    blocks = (size(a) + block_length - 1)/block_length
+    allocate (part(blocks))
+    !$omp parallel do schedule(static) default(none) shared(blocks, part, a, b) &
+    !$omp private(block, first, last)
+    do block = 1, blocks
+      first = (block - 1)*block_length + 1
+      last = min(block*block_length, size(a))
+      part(block) = dot_product(a(first:last), b(first:last))
+    end do
+    sum_of_all = sum(part)
+  end function inner
+
+end module pd_base_numbers

@@ -1,0 +1,182 @@
+!> Linked cells (7.11): the points within a distance of each point, in time linear in their number.
+module pd_family_cells
+  use pd_base_kinds, only: wp, i4, i8
+  implicit none (type, external)
+  private
+  public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, brute_force_neighbours
+
+  !> Points sorted by cells; cells are no smaller than the reach they were made for.
+  type :: cells_type
+    integer :: count(3) = 1                   !! cells along each direction
+    real(wp) :: lower(3) = 0.0_wp             !! corner of the first cell [m]
+    real(wp) :: size(3) = 1.0_wp              !! edges of a cell [m]
+    integer(i4), allocatable :: first(:)      !! place of each cell's first point in `order`
+    integer(i4), allocatable :: order(:)      !! points, cell by cell
+    integer(i4), allocatable :: cell(:)       !! each point's cell
+  end type cells_type
+
+contains
+
+  !> Sort the points `x` (n, dim) into cells at least `reach` [m] wide.
+  subroutine sort_into_cells(x, reach, cells)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: reach
+    type(cells_type), intent(out) :: cells
+    real(wp) :: extent
+    integer(i4), allocatable :: place(:)
+    integer :: c, k, n, n_cells, at, most
+
+    n = size(x, 1)
+    ! far-flung points must not ask for more cells than points are worth: wider cells are still right
+    most = max(1, int(real(4*n + 64, wp)**(1.0_wp/size(x, 2))))
+    do c = 1, size(x, 2)
+      cells%lower(c) = minval(x(:, c))
+      extent = maxval(x(:, c)) - cells%lower(c)
+      cells%count(c) = int(min(extent/reach, 1.0e9_wp))
+      cells%count(c) = max(1, cells%count(c))
+    end do
+    if (product(real(cells%count, wp)) > 4.0_wp*n + 64) cells%count = min(cells%count, most)
+    do c = 1, size(x, 2)
+      extent = maxval(x(:, c)) - cells%lower(c)
+      cells%size(c) = max(extent/cells%count(c)*(1 + 1.0e-12_wp), tiny(1.0_wp))
+    end do
+    n_cells = product(cells%count)
+    allocate (cells%cell(n), cells%order(n))
+    allocate (cells%first(n_cells + 1), source=0_i4)
+    do k = 1, n
+      at = cell_at(cells, x(k, :))
+      cells%cell(k) = int(at, i4)
+      cells%first(at + 1) = cells%first(at + 1) + 1_i4
+    end do
+    cells%first(1) = 1_i4
+    do k = 2, n_cells + 1
+      cells%first(k) = cells%first(k) + cells%first(k - 1)
+    end do
+    place = cells%first(:n_cells)
+    do k = 1, n
+      at = cells%cell(k)
+      cells%order(place(at)) = int(k, i4)
+      place(at) = place(at) + 1_i4
+    end do
+  end subroutine sort_into_cells
+
+  pure integer function cell_at(cells, x) result(at)
+    type(cells_type), intent(in) :: cells
+    real(wp), intent(in) :: x(:)
+    integer :: c, i(3)
+
+    i = 0
+    do c = 1, size(x)
+      i(c) = min(cells%count(c) - 1, int((x(c) - cells%lower(c))/cells%size(c)))
+    end do
+    at = 1 + i(1) + cells%count(1)*(i(2) + cells%count(2)*i(3))
+  end function cell_at
+
+  !> Number of points within `reach(spacing_k, spacing_j)` of each point (itself not counted).
+  !> `half_reach(k)` [m]: two points are neighbours if they are no further apart than the sum.
+  subroutine count_neighbours(x, half_reach, cells, number)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    type(cells_type), intent(in) :: cells
+    integer(i4), intent(out) :: number(:)
+    integer(i4) :: none(0)
+    integer :: k
+
+    !$omp parallel do schedule(dynamic, 512) default(none) shared(x, half_reach, cells, number) &
+    !$omp private(k, none)
+    do k = 1, size(x, 1)
+      call visit(x, half_reach, cells, k, number(k), none, .false.)
+    end do
+  end subroutine count_neighbours
+
+  !> The neighbours of each point in one array (7.11): those of point k stand from `start(k)` to
+  !> `start(k+1) - 1`, ascending.
+  subroutine collect_neighbours(x, half_reach, cells, start, neighbour)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    type(cells_type), intent(in) :: cells
+    integer(i8), intent(in) :: start(:)
+    integer(i4), intent(out) :: neighbour(:)
+    integer(i4) :: number
+    integer :: k
+
+    !$omp parallel do schedule(dynamic, 512) default(none) private(k, number) &
+    !$omp shared(x, half_reach, cells, start, neighbour)
+    do k = 1, size(x, 1)
+      call visit(x, half_reach, cells, k, number, neighbour(start(k):start(k + 1) - 1), .true.)
+      call sort(neighbour(start(k):start(k + 1) - 1))
+    end do
+  end subroutine collect_neighbours
+
+  !> Look through the cells around point `k`; count its neighbours and, if asked, collect them.
+  pure subroutine visit(x, half_reach, cells, k, number, found, collect)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    type(cells_type), intent(in) :: cells
+    integer, intent(in) :: k
+    integer(i4), intent(out) :: number
+    integer(i4), intent(inout) :: found(:)
+    logical, intent(in) :: collect
+    real(wp) :: here(3), d2
+    integer :: i(3), low(3), high(3), cx, cy, cz, at, c, m, j
+
+    i = [mod(cells%cell(k) - 1, cells%count(1)), mod((cells%cell(k) - 1)/cells%count(1), &
+      & cells%count(2)), (cells%cell(k) - 1)/(cells%count(1)*cells%count(2))]
+    low = max(i - 1, 0)
+    high = min(i + 1, cells%count - 1)
+    here = 0.0_wp
+    here(:size(x, 2)) = x(k, :)
+    number = 0_i4
+    do cz = low(3), high(3)
+      do cy = low(2), high(2)
+        ! the cells along x stand one after another
+        cx = 1 + cells%count(1)*(cy + cells%count(2)*cz)
+        at = cx + high(1)
+        do m = cells%first(cx + low(1)), cells%first(at + 1) - 1
+          j = cells%order(m)
+          if (j == k) cycle
+          d2 = 0.0_wp
+          do c = 1, size(x, 2)
+            d2 = d2 + (x(j, c) - here(c))**2
+          end do
+          if (d2 > (half_reach(k) + half_reach(j))**2) cycle
+          number = number + 1_i4
+          if (collect) found(number) = int(j, i4)
+        end do
+      end do
+    end do
+  end subroutine visit
+
+  !> Insertion sort: families come nearly sorted when the points do.
+  pure subroutine sort(list)
+    integer(i4), intent(inout) :: list(:)
+    integer(i4) :: value
+    integer :: i, j
+
+    do i = 2, size(list)
+      value = list(i)
+      do j = i - 1, 1, -1
+        if (list(j) <= value) exit
+        list(j + 1) = list(j)
+      end do
+      list(j + 1) = value
+    end do
+  end subroutine sort
+
+  !> The same by comparing every pair: the check of the search above.
+  pure subroutine brute_force_neighbours(x, half_reach, k, neighbour)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    integer, intent(in) :: k
+    integer(i4), allocatable, intent(out) :: neighbour(:)
+    integer :: j
+
+    allocate (neighbour(0))
+    do j = 1, size(x, 1)
+      if (j == k) cycle
+      if (sum((x(j, :) - x(k, :))**2) > (half_reach(k) + half_reach(j))**2) cycle
+      neighbour = [neighbour, int(j, i4)]
+    end do
+  end subroutine brute_force_neighbours
+
+end module pd_family_cells

@@ -1,0 +1,165 @@
+!> Pre-existing cracks (7.9): bonds that pass through a crack are broken before the run.
+!>
+!> The rule, which doesn't depend on rounding: a point on the crack's plane (within a millionth of
+!> its spacing) counts as lying on the side the normal points to; a bond is cut if its ends lie on
+!> different sides and it passes through the crack or its rim (again within a millionth).
+module pd_family_cracks
+  use pd_base_kinds, only: wp, i8
+  use pd_scene_types, only: crack_group, is_set
+  use pd_body_body, only: body_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  implicit none (type, external)
+  private
+  public :: cut_bonds, crosses, crack_type, new_crack
+
+  integer, parameter :: segment = 1, parallelogram = 2, disc = 3
+  real(wp), parameter :: on_plane = 1.0e-6_wp  !! [spacings]
+
+  !> A crack as a piece of a plane: centre or corner, normal, and what bounds it.
+  type :: crack_type
+    integer :: kind = segment
+    real(wp) :: origin(3) = 0.0_wp
+    real(wp) :: normal(3) = 0.0_wp    !! unit vector
+    real(wp) :: edge_1(3) = 0.0_wp
+    real(wp) :: edge_2(3) = 0.0_wp
+    real(wp) :: radius = 0.0_wp
+  end type crack_type
+
+contains
+
+  !> A crack as the scene describes it. In 2D the normal is `to - from` turned left.
+  pure type(crack_type) function new_crack(group, dim) result(crack)
+    type(crack_group), intent(in) :: group
+    integer, intent(in) :: dim
+
+    if (dim == 2) then
+      crack%kind = segment
+      crack%origin(:2) = group%from(:2)
+      crack%edge_1(:2) = group%to(:2) - group%from(:2)
+      crack%normal = [-crack%edge_1(2), crack%edge_1(1), 0.0_wp]
+    else if (is_set(group%radius)) then
+      crack%kind = disc
+      crack%origin = group%centre
+      crack%normal = group%normal
+      crack%radius = group%radius
+    else
+      crack%kind = parallelogram
+      crack%origin = group%corner
+      crack%edge_1 = group%edge_1
+      crack%edge_2 = group%edge_2
+      crack%normal = cross(group%edge_1, group%edge_2)
+    end if
+    crack%normal = crack%normal/norm2(crack%normal)
+  end function new_crack
+
+  !> Break every bond that a crack of the scene cuts; `cut` is their number (unordered).
+  subroutine cut_bonds(cracks, body, family, cut)
+    type(crack_group), intent(in) :: cracks(:)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(inout) :: family
+    integer(i8), intent(out) :: cut
+    type(bonds_type) :: bonds
+    type(crack_type) :: crack
+    integer :: c, k, i
+
+    cut = 0_i8
+    do c = 1, size(cracks)
+      crack = new_crack(cracks(c), body%dim)
+      !$omp parallel default(none) shared(crack, body, family) private(bonds, k, i) reduction(+:cut)
+      call allocate_bonds(family, bonds)
+      !$omp do schedule(dynamic, 256)
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        if (far(crack, body%x(k, :), family%rule%delta + 2*body%spacing(k))) cycle
+        call family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          if (.not. bonds%intact(i)) cycle
+          if (.not. crosses(crack, body%x(k, :), body%x(bonds%j(i), :), &
+            & on_plane*(body%spacing(k) + body%spacing(bonds%j(i)))/2)) cycle
+          call family%break_bond(k, i)
+          cut = cut + 1_i8
+        end do
+      end do
+      !$omp end parallel
+    end do
+    cut = cut/2_i8
+  end subroutine cut_bonds
+
+  !> Whether no bond from `x` shorter than `distance` can reach the crack's plane.
+  pure logical function far(crack, x, distance)
+    type(crack_type), intent(in) :: crack
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(in) :: distance
+    real(wp) :: r(3)
+
+    r = -crack%origin
+    r(:size(x)) = r(:size(x)) + x
+    far = abs(dot_product(r, crack%normal)) > distance
+  end function far
+
+  !> Whether the bond between `a` and `b` (positions, dim) is cut by the crack.
+  pure logical function crosses(crack, a, b, tolerance)
+    type(crack_type), intent(in) :: crack
+    real(wp), intent(in) :: a(:), b(:)
+    real(wp), intent(in) :: tolerance
+    real(wp) :: ra(3), rb(3), ha, hb, r(3)
+
+    ra = -crack%origin
+    rb = -crack%origin
+    ra(:size(a)) = ra(:size(a)) + a
+    rb(:size(b)) = rb(:size(b)) + b
+    ha = dot_product(ra, crack%normal)
+    hb = dot_product(rb, crack%normal)
+    crosses = .false.
+    if ((ha >= -tolerance) .eqv. (hb >= -tolerance)) return
+    r = ra + (rb - ra)*(ha/(ha - hb))
+    select case (crack%kind)
+    case (disc)
+      crosses = norm2(r - crack%normal*dot_product(r, crack%normal)) <= crack%radius + tolerance
+    case (segment)
+      crosses = within(dot_product(r, crack%edge_1), dot_product(crack%edge_1, crack%edge_1), tolerance)
+    case default
+      crosses = in_parallelogram(crack, r, tolerance)
+    end select
+  end function crosses
+
+  !> Whether `r`, on the plane of the crack and from its corner, lies between its edges.
+  pure logical function in_parallelogram(crack, r, tolerance)
+    type(crack_type), intent(in) :: crack
+    real(wp), intent(in) :: r(3)
+    real(wp), intent(in) :: tolerance
+    real(wp) :: across(3)
+
+    across = cross(crack%normal, crack%edge_2)
+    in_parallelogram = within_of(crack%edge_1, across)
+    across = cross(crack%normal, crack%edge_1)
+    in_parallelogram = in_parallelogram .and. within_of(crack%edge_2, across)
+
+  contains
+
+    !> Whether r's part along `edge`, measured across the other edge, is between 0 and the edge's end.
+    pure logical function within_of(edge, normal)
+      real(wp), intent(in) :: edge(3), normal(3)
+      real(wp) :: height, at
+      height = dot_product(edge, normal)/norm2(normal)
+      at = dot_product(r, normal)/norm2(normal)
+      within_of = at*sign(1.0_wp, height) >= -tolerance .and. &
+        & at*sign(1.0_wp, height) <= abs(height) + tolerance
+    end function within_of
+  end function in_parallelogram
+
+  !> Whether 0 <= t/L <= L for t = r.e and L2 = e.e, with a tolerance [m].
+  pure logical function within(t, L2, tolerance)
+    real(wp), intent(in) :: t, L2, tolerance
+    real(wp) :: length
+    length = sqrt(L2)
+    within = t/length >= -tolerance .and. t/length <= length + tolerance
+  end function within
+
+  pure function cross(a, b) result(c)
+    real(wp), intent(in) :: a(3), b(3)
+    real(wp) :: c(3)
+    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
+  end function cross
+
+end module pd_family_cracks

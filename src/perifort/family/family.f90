@@ -1,0 +1,70 @@
+!> Families: who interacts with whom. The abstract type that lattice and list families extend.
+!>
+!> Everything outside the hot loops works on `bonds_of`, which lists the bonds of one slot.
+module pd_family_family
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_family_volume, only: volume_rule_type
+  implicit none (type, external)
+  private
+  public :: family_type, bonds_type, allocate_bonds
+
+  !> The bonds of one point, as far as `n`.
+  type :: bonds_type
+    integer :: n = 0
+    integer(i4), allocatable :: j(:)       !! slots of the family members
+    real(wp), allocatable :: xi(:, :)      !! x_j - x_k (bond, dim) [m]
+    real(wp), allocatable :: length(:)     !! |xi| [m]
+    real(wp), allocatable :: weight(:)     !! v_c V_j [m3]
+    logical, allocatable :: intact(:)
+  end type bonds_type
+
+  type, abstract :: family_type
+    integer :: dim = 0
+    integer :: n_slots = 0
+    integer :: most_bonds = 0              !! largest number of bonds of one point
+    integer(i8) :: n_bonds = 0             !! ordered pairs at the start, pre-cracked ones included
+    type(volume_rule_type) :: rule         !! v_c and how far a family reaches
+  contains
+    procedure(bonds_of_interface), deferred :: bonds_of
+    procedure(break_interface), deferred :: break_bond
+    procedure(memory_interface), deferred :: bytes
+  end type family_type
+
+  abstract interface
+    !> All bonds of slot `k`, broken ones too, always in the same order.
+    pure subroutine bonds_of_interface(family, k, bonds)
+      import :: family_type, bonds_type
+      implicit none (type, external)
+      class(family_type), intent(in) :: family
+      integer, intent(in) :: k
+      type(bonds_type), intent(inout) :: bonds
+    end subroutine bonds_of_interface
+
+    !> Break the `i`-th bond of `bonds_of(k)`; the other direction is another call.
+    pure subroutine break_interface(family, k, i)
+      import :: family_type
+      implicit none (type, external)
+      class(family_type), intent(inout) :: family
+      integer, intent(in) :: k, i
+    end subroutine break_interface
+
+    !> Memory of the family [bytes].
+    pure integer(i8) function memory_interface(family)
+      import :: family_type, i8
+      implicit none (type, external)
+      class(family_type), intent(in) :: family
+    end function memory_interface
+  end interface
+
+contains
+
+  !> Room for the bonds of any one point.
+  pure subroutine allocate_bonds(family, bonds)
+    class(family_type), intent(in) :: family
+    type(bonds_type), intent(out) :: bonds
+    allocate (bonds%j(family%most_bonds), bonds%xi(family%most_bonds, family%dim), &
+      & bonds%length(family%most_bonds), bonds%weight(family%most_bonds), &
+      & bonds%intact(family%most_bonds))
+  end subroutine allocate_bonds
+
+end module pd_family_family

@@ -1,0 +1,126 @@
+!> List families for any cloud of points: the two arrays of 7.11, and a flag for each bond.
+!>
+!> Nothing else is stored per bond: xi, |xi| and v_c come from the points.
+module pd_family_list
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_body_body, only: body_type, arrange
+  use pd_family_cells, only: cells_type, sort_into_cells, count_neighbours, collect_neighbours
+  use pd_family_family, only: family_type, bonds_type
+  use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact
+  implicit none (type, external)
+  private
+  public :: list_family_type, new_list_family
+
+  type, extends(family_type) :: list_family_type
+    integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
+    integer(i4), allocatable :: neighbour(:)   !! slot at each bond's other end
+    integer(i1), allocatable :: intact(:)      !! 1 intact, 0 broken
+    real(wp), allocatable :: x(:, :)           !! positions (n_slots, dim) [m]
+    real(wp), allocatable :: volume(:)         !! [m3]
+    real(wp), allocatable :: spacing(:)        !! [m]
+    real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
+  contains
+    procedure :: bonds_of
+    procedure :: break_bond
+    procedure :: bytes
+  end type list_family_type
+
+contains
+
+  !> Families of all points of `body`, which is sorted cell by cell so that neighbours are near in
+  !> memory. Members are those within the rule's reach for the bond's mean spacing.
+  subroutine new_list_family(body, rule, family)
+    type(body_type), intent(inout) :: body
+    type(volume_rule_type), intent(in) :: rule
+    type(list_family_type), intent(out) :: family
+    type(cells_type) :: cells
+    real(wp), allocatable :: half_reach(:)
+    integer(i4), allocatable :: number(:)
+    integer :: k
+
+    ! fine cells first: they only order the points
+    call sort_into_cells(body%x, 2*maxval(body%spacing), cells)
+    call arrange(body, body%point(cells%order))
+    family%dim = body%dim
+    family%n_slots = body%n_slots
+    family%rule = rule
+    allocate (half_reach(body%n_slots), number(body%n_slots))
+    do k = 1, body%n_slots
+      half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
+    end do
+    call sort_into_cells(body%x, 2*maxval(half_reach), cells)
+    call count_neighbours(body%x, half_reach, cells, number)
+    allocate (family%start(body%n_slots + 1))
+    family%start(1) = 1_i8
+    do k = 1, body%n_slots
+      family%start(k + 1) = family%start(k) + number(k)
+    end do
+    family%most_bonds = maxval(number)
+    family%n_bonds = family%start(body%n_slots + 1) - 1_i8
+    allocate (family%neighbour(family%n_bonds))
+    call collect_neighbours(body%x, half_reach, cells, family%start, family%neighbour)
+    allocate (family%intact(family%n_bonds), source=1_i1)
+    family%x = body%x
+    family%volume = body%volume
+    family%spacing = body%spacing
+    if (rule%kind == volume_exact) call store_fractions(family)
+  end subroutine new_list_family
+
+  !> Keep the covered part of each cell: it is too dear to compute in every step.
+  subroutine store_fractions(family)
+    type(list_family_type), intent(inout) :: family
+    real(wp) :: xi(family%dim)
+    integer(i8) :: b
+    integer :: k, j
+
+    allocate (family%fraction(family%n_bonds))
+    !$omp parallel do schedule(dynamic, 256) default(none) shared(family) private(k, b, j, xi)
+    do k = 1, family%n_slots
+      do b = family%start(k), family%start(k + 1) - 1
+        j = family%neighbour(b)
+        xi = family%x(j, :) - family%x(k, :)
+        family%fraction(b) = volume_correction(family%rule, xi, norm2(xi), &
+          & (family%spacing(k) + family%spacing(j))/2)
+      end do
+    end do
+  end subroutine store_fractions
+
+  pure subroutine bonds_of(family, k, bonds)
+    class(list_family_type), intent(in) :: family
+    integer, intent(in) :: k
+    type(bonds_type), intent(inout) :: bonds
+    integer :: i, c, j
+
+    bonds%n = int(family%start(k + 1) - family%start(k))
+    do i = 1, bonds%n
+      j = family%neighbour(family%start(k) + i - 1)
+      bonds%j(i) = j
+      bonds%intact(i) = family%intact(family%start(k) + i - 1) == 1_i1
+      bonds%length(i) = 0.0_wp
+      do c = 1, family%dim
+        bonds%xi(i, c) = family%x(j, c) - family%x(k, c)
+        bonds%length(i) = bonds%length(i) + bonds%xi(i, c)**2
+      end do
+      bonds%length(i) = sqrt(bonds%length(i))
+      if (allocated(family%fraction)) then
+        bonds%weight(i) = family%volume(j)*family%fraction(family%start(k) + i - 1)
+      else
+        bonds%weight(i) = family%volume(j)*volume_correction(family%rule, bonds%xi(i, :), &
+          & bonds%length(i), (family%spacing(k) + family%spacing(j))/2)
+      end if
+    end do
+  end subroutine bonds_of
+
+  pure subroutine break_bond(family, k, i)
+    class(list_family_type), intent(inout) :: family
+    integer, intent(in) :: k, i
+    family%intact(family%start(k) + i - 1) = 0_i1
+  end subroutine break_bond
+
+  pure integer(i8) function bytes(family)
+    class(list_family_type), intent(in) :: family
+    bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*(3 + family%dim)
+    if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds
+  end function bytes
+
+end module pd_family_list

@@ -1,0 +1,61 @@
+!> Surface correction (7.7; theory page, 4): factors that give points near a surface the stiffness of
+!> the bulk.
+module pd_family_surface
+  use pd_base_kinds, only: wp
+  use pd_body_body, only: body_type
+  use pd_body_material, only: material_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  implicit none (type, external)
+  private
+  public :: surface_factors, bond_factor
+
+contains
+
+  !> D and S (n_slots, dim) of every slot: classical over peridynamic dilatation and energy under
+  !> unit uniaxial strain along each direction, with the linearised stretch. A point without bonds
+  !> along a direction gets 1. Families must be whole: cracks are cut afterwards.
+  subroutine surface_factors(body, family, materials, D, S)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)
+    real(wp), allocatable, intent(out) :: D(:, :), S(:, :)
+    type(bonds_type) :: bonds
+    real(wp) :: strain, dilatation, energy, scale
+    integer :: k, i, c
+
+    allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
+    !$omp parallel default(none) shared(body, family, materials, D, S) &
+    !$omp private(bonds, strain, dilatation, energy, scale, k, i, c)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      associate (m => materials(body%material(k)))
+        do c = 1, body%dim
+          dilatation = 0.0_wp
+          energy = 0.0_wp
+          scale = 0.0_wp
+          do i = 1, bonds%n
+            strain = (bonds%xi(i, c)/bonds%length(i))**2
+            dilatation = dilatation + strain*bonds%weight(i)
+            energy = energy + strain**2*bonds%length(i)*bonds%weight(i)
+            scale = scale + bonds%length(i)*bonds%weight(i)
+          end do
+          ! a chain inside a plane has no stretch across it, up to the rounding of its positions
+          if (energy <= 1.0e-20_wp*scale) cycle
+          D(k, c) = 1.0_wp/(m%t*dilatation)
+          S(k, c) = (m%uniaxial_energy - m%a)/(m%q/2*energy)
+        end do
+      end associate
+    end do
+    !$omp end parallel
+  end subroutine surface_factors
+
+  !> G of a bond along the unit vector `n` between points with factors `gk` and `gj`.
+  pure real(wp) function bond_factor(n, gk, gj) result(G)
+    real(wp), intent(in) :: n(:), gk(:), gj(:)
+    G = 1.0_wp/sqrt(sum((2*n/(gk + gj))**2))
+  end function bond_factor
+
+end module pd_family_surface

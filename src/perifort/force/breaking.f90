@@ -1,0 +1,119 @@
+!> Bond breaking. The fast loops only say which slots are strained to the limit; what breaks is
+!> decided here, by one formula that gives both ends of a bond the same bits.
+module pd_force_breaking
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_body_body, only: body_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_force_model, only: model_type, bond_limit
+  use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, point_damage
+  implicit none (type, external)
+  private
+  public :: strained_slots, break_bonds, damage_of
+
+contains
+
+  !> The slots marked by a pass over the body.
+  subroutine strained_slots(strained, slots)
+    integer(i1), intent(in) :: strained(:)
+    integer(i4), allocatable, intent(out) :: slots(:)
+    integer :: k, n
+
+    n = 0
+    !$omp parallel do schedule(static) default(none) shared(strained) private(k) reduction(+:n)
+    do k = 1, size(strained)
+      n = n + strained(k)
+    end do
+    allocate (slots(n))
+    if (n == 0) return
+    n = 0
+    do k = 1, size(strained)
+      if (strained(k) == 0_i1) cycle
+      n = n + 1
+      slots(n) = int(k, i4)
+    end do
+  end subroutine strained_slots
+
+  !> Break the bonds of `slots` that are beyond their limit at displacements `u`. On return `slots`
+  !> holds those that lost a bond, `broken` the number of bonds (each counted once) and `dissipated`
+  !> [J] the strain energy lost at fixed u; `damage` is brought up to date.
+  subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    integer(i4), allocatable, intent(inout) :: slots(:)
+    real(wp), intent(inout) :: damage(:)
+    integer(i8), intent(out) :: broken
+    real(wp), intent(out) :: dissipated
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: lost(:)
+    integer, allocatable :: number(:)
+    logical :: breaks
+    integer :: m, k, i
+
+    allocate (lost(size(slots)), source=0.0_wp)
+    allocate (number(size(slots)), source=0)
+    !$omp parallel default(none) shared(body, family, model, u, slots, damage, lost, number) &
+    !$omp private(bonds, m, k, i, breaks)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 16)
+    do m = 1, size(slots)
+      k = slots(m)
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        call decide(model, u, k, bonds, i, breaks)
+        if (.not. breaks) cycle
+        if (number(m) == 0) lost(m) = point_energy(model, u, k, bonds)
+        number(m) = number(m) + 1
+        call family%break_bond(k, i)
+      end do
+      if (number(m) == 0) cycle
+      call family%bonds_of(k, bonds)
+      lost(m) = (lost(m) - point_energy(model, u, k, bonds))*body%volume(k)
+      damage(k) = point_damage(bonds)
+    end do
+    !$omp end parallel
+    broken = sum(int(number, i8))/2_i8
+    dissipated = sum(lost)
+    slots = pack(slots, number > 0)
+  end subroutine break_bonds
+
+  !> Whether the `i`-th bond of slot `k` breaks now.
+  pure subroutine decide(model, u, k, bonds, i, breaks)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds
+    integer, intent(in) :: i
+    logical, intent(out) :: breaks
+    type(bond_state_type) :: state
+    real(wp) :: lower, upper
+
+    breaks = .false.
+    if (.not. bonds%intact(i)) return
+    call bond_limit(model, k, int(bonds%j(i)), lower, upper)
+    state = state_of_bond(model, u, k, bonds, i)
+    breaks = state%stretch > upper .or. state%stretch < lower
+  end subroutine decide
+
+  !> Local damage of every slot [-].
+  subroutine damage_of(body, family, damage)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    real(wp), intent(out) :: damage(:)
+    type(bonds_type) :: bonds
+    integer :: k
+
+    !$omp parallel default(none) shared(body, family, damage) private(bonds, k)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(static)
+    do k = 1, family%n_slots
+      damage(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      damage(k) = point_damage(bonds)
+    end do
+    !$omp end parallel
+  end subroutine damage_of
+
+end module pd_force_breaking

@@ -1,0 +1,61 @@
+!> One call for the whole body, whatever its family: the class is looked at once per pass.
+module pd_force_forces
+  use pd_base_kinds, only: wp, i1
+  use pd_family_family, only: family_type
+  use pd_family_list, only: list_family_type
+  use pd_force_list, only: list_dilatation, list_force, list_energy
+  use pd_force_model, only: model_type
+  use pd_force_reference, only: reference_energy
+  implicit none (type, external)
+  private
+  public :: dilatation_pass, force_pass, energy_pass
+
+contains
+
+  !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds can
+  !> break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.
+  subroutine dilatation_pass(family, model, u, p, strained)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(out) :: p(:)
+    integer(i1), intent(inout) :: strained(:)
+
+    select type (family)
+    type is (list_family_type)
+      call list_dilatation(family, model, u, p, strained)
+    end select
+  end subroutine dilatation_pass
+
+  !> Internal force density of all slots (n_slots, dim) [N/m3]; `strained` as above.
+  subroutine force_pass(family, model, u, p, force, strained)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in) :: p(:)
+    real(wp), intent(out) :: force(:, :)
+    integer(i1), intent(inout) :: strained(:)
+
+    select type (family)
+    type is (list_family_type)
+      call list_force(family, model, u, p, force, strained)
+    end select
+  end subroutine force_pass
+
+  !> Strain energy density of all slots [J/m3].
+  subroutine energy_pass(family, model, u, energy, strained)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(out) :: energy(:)
+    integer(i1), intent(inout) :: strained(:)
+
+    select type (family)
+    type is (list_family_type)
+      call list_energy(family, model, u, energy, strained)
+    class default
+      call reference_energy(family, model, u, energy)
+    end select
+  end subroutine energy_pass
+
+end module pd_force_forces

@@ -1,0 +1,82 @@
+!> What the force loops need to know beside the family: parameters of each slot, and which terms the
+!> scene has. Chosen once before the loop, so that a step costs only what the scene uses.
+module pd_force_model
+  use pd_base_kinds, only: wp, i1, i2
+  use pd_body_body, only: body_type
+  use pd_body_material, only: material_type, never
+  implicit none (type, external)
+  private
+  public :: model_type, new_model, no_fail, bond_limit
+
+  real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
+
+  type :: model_type
+    integer :: dim = 0
+    logical :: dilatation = .false.   !! some a /= 0: the force needs the dilatation of both ends
+    logical :: projected = .true.     !! Lambda = yhat . xi/|xi| as printed, else Lambda = 1
+    logical :: surface = .false.      !! factors Gd and Gb differ from 1
+    logical :: thermal = .false.      !! some temperature change
+    logical :: breaking = .false.     !! some bond can fail
+    logical :: compression = .false.  !! some bonds break in compression too
+    type(material_type), allocatable :: materials(:)
+    integer(i2), allocatable :: material(:)  !! of each slot
+    real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
+    real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
+    real(wp), allocatable :: expansion(:)    !! alpha dT of each slot [-], allocated if thermal
+    real(wp), allocatable :: critical(:)     !! s_c of each slot, `never` or `no_fail`
+    integer(i1), allocatable :: compressed(:) !! 1 where bonds break in compression too
+  end type model_type
+
+contains
+
+  !> The model of a body. `zone` marks slots in no-fail zones, `temperature_change` [K] is per slot.
+  !> Surface factors are set by whoever computes them.
+  pure subroutine new_model(body, materials, projected, zone, temperature_change, model)
+    type(body_type), intent(in) :: body
+    type(material_type), intent(in) :: materials(:)
+    logical, intent(in) :: projected
+    logical, intent(in) :: zone(:)
+    real(wp), intent(in) :: temperature_change(:)
+    type(model_type), intent(out) :: model
+    logical :: used(size(materials))
+    integer :: k
+
+    model%dim = body%dim
+    model%projected = projected
+    allocate (model%materials, source=materials)
+    allocate (model%material, source=body%material)
+    used = .false.
+    do k = 1, body%n_slots
+      if (body%point(k) > 0) used(body%material(k)) = .true.
+    end do
+    model%dilatation = any(used .and. abs(materials%a) > 0.0_wp)
+    model%thermal = any(abs(temperature_change) > 0.0_wp) .and. &
+      & any(used .and. abs(materials%expansion) > 0.0_wp)
+    if (model%thermal) model%expansion = materials(body%material)%expansion*temperature_change
+    model%breaking = any(used .and. materials%critical_stretch < never) .and. &
+      & any(.not. zone .and. body%point > 0)
+    if (.not. model%breaking) return
+    model%critical = materials(body%material)%critical_stretch
+    where (zone) model%critical = no_fail
+    model%compression = any(used .and. materials%break_in_compression)
+    if (model%compression) then
+      allocate (model%compressed(body%n_slots))
+      model%compressed = merge(1_i1, 0_i1, materials(body%material)%break_in_compression)
+    end if
+  end subroutine new_model
+
+  !> Limits of the mechanical stretch of the bond k-j: it breaks above `upper` or below `lower`.
+  pure subroutine bond_limit(model, k, j, lower, upper)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, j
+    real(wp), intent(out) :: lower, upper
+
+    upper = min(model%critical(k), model%critical(j))
+    if (upper < 0.0_wp) upper = never
+    lower = -never
+    if (model%compression) then
+      if (model%compressed(k) == 1_i1 .and. model%compressed(j) == 1_i1) lower = -upper
+    end if
+  end subroutine bond_limit
+
+end module pd_force_model

@@ -1,0 +1,195 @@
+!> The theory as it is written, point by point on `bonds_of`: the oracle of every fast loop, and the
+!> tool for single points (breaking, output), where speed doesn't matter.
+module pd_force_reference
+  use pd_base_kinds, only: wp
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_surface, only: bond_factor
+  use pd_force_model, only: model_type
+  implicit none (type, external)
+  private
+  public :: bond_state_type, state_of_bond, point_dilatation, point_force, point_energy, point_damage
+  public :: reference_dilatation, reference_force, reference_energy
+
+  !> How a bond is deformed.
+  type :: bond_state_type
+    real(wp) :: stretch = 0.0_wp       !! mechanical: without thermal expansion [-]
+    real(wp) :: direction(3) = 0.0_wp  !! unit vector of the deformed bond
+    real(wp) :: lambda = 1.0_wp        !! its cosine with the undeformed one, 1 if unprojected
+    real(wp) :: Gd = 1.0_wp            !! surface factors
+    real(wp) :: Gb = 1.0_wp
+  end type bond_state_type
+
+contains
+
+  !> State of the `i`-th bond of slot `k` under displacements `u` (n_slots, dim) [m].
+  !> The stretch is formed without cancellation (theory page, 2).
+  pure function state_of_bond(model, u, k, bonds, i) result(state)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds
+    integer, intent(in) :: i
+    type(bond_state_type) :: state
+    real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length, y
+    integer :: j
+
+    j = bonds%j(i)
+    length = bonds%length(i)
+    xi = bonds%xi(i, :)
+    eta = u(j, :) - u(k, :)
+    y = norm2(xi + eta)
+    state%stretch = (2*dot_product(xi, eta) + dot_product(eta, eta))/(length*(y + length))
+    ! a bond crushed to a point has no direction: no force rather than NaN
+    if (y > 0.0_wp) state%direction(:size(u, 2)) = (xi + eta)/y
+    if (model%projected) state%lambda = dot_product(state%direction(:size(u, 2)), xi)/length
+    if (model%thermal) state%stretch = state%stretch - (model%expansion(k) + model%expansion(j))/2
+    if (model%surface) then
+      state%Gd = bond_factor(xi/length, model%D(k, :), model%D(j, :))
+      state%Gb = bond_factor(xi/length, model%S(k, :), model%S(j, :))
+    end if
+  end function state_of_bond
+
+  !> theta of slot `k` (7.39).
+  pure real(wp) function point_dilatation(model, u, k, bonds) result(theta)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds
+    type(bond_state_type) :: state
+    integer :: i
+
+    theta = 0.0_wp
+    do i = 1, bonds%n
+      if (.not. bonds%intact(i)) cycle
+      state = state_of_bond(model, u, k, bonds, i)
+      theta = theta + state%Gd*state%stretch*state%lambda*bonds%weight(i)
+    end do
+    theta = theta*model%materials(model%material(k))%t
+  end function point_dilatation
+
+  !> Force density of slot `k` [N/m3] (7.37, 7.38) from the coefficients p_k = 2 a d delta theta_k.
+  pure function point_force(model, u, p, k, bonds) result(force)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in) :: p(:)
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds
+    real(wp) :: force(size(u, 2))
+    type(bond_state_type) :: state
+    real(wp) :: magnitude
+    integer :: i, j
+
+    force = 0.0_wp
+    do i = 1, bonds%n
+      if (.not. bonds%intact(i)) cycle
+      j = bonds%j(i)
+      state = state_of_bond(model, u, k, bonds, i)
+      magnitude = (model%materials(model%material(k))%q + model%materials(model%material(j))%q) &
+        & *state%Gb*state%stretch
+      if (model%dilatation) &
+        & magnitude = magnitude + (p(k) + p(j))*state%Gd*state%lambda/bonds%length(i)
+      force = force + magnitude*bonds%weight(i)*state%direction(:size(u, 2))
+    end do
+  end function point_force
+
+  !> Strain energy density W of slot `k` [J/m3] (theory page, 2).
+  pure real(wp) function point_energy(model, u, k, bonds) result(energy)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds
+    type(bond_state_type) :: state
+    integer :: i
+
+    energy = 0.0_wp
+    do i = 1, bonds%n
+      if (.not. bonds%intact(i)) cycle
+      state = state_of_bond(model, u, k, bonds, i)
+      energy = energy + state%Gb*state%stretch**2*bonds%length(i)*bonds%weight(i)
+    end do
+    associate (m => model%materials(model%material(k)))
+      energy = m%q/2*energy
+      if (abs(m%a) > 0.0_wp) energy = energy + m%a*point_dilatation(model, u, k, bonds)**2
+    end associate
+  end function point_energy
+
+  !> Local damage phi of a point: the part of its family's volume behind broken bonds.
+  pure real(wp) function point_damage(bonds) result(damage)
+    type(bonds_type), intent(in) :: bonds
+    real(wp) :: whole, lost
+    integer :: i
+
+    whole = 0.0_wp
+    lost = 0.0_wp
+    do i = 1, bonds%n
+      whole = whole + bonds%weight(i)
+      if (.not. bonds%intact(i)) lost = lost + bonds%weight(i)
+    end do
+    damage = 0.0_wp
+    if (whole > 0.0_wp) damage = lost/whole
+  end function point_damage
+
+  !> theta of all slots.
+  subroutine reference_dilatation(family, model, u, theta)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(out) :: theta(:)
+    type(bonds_type) :: bonds
+    integer :: k
+
+    !$omp parallel default(none) shared(family, model, u, theta) private(bonds, k)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(static)
+    do k = 1, family%n_slots
+      call family%bonds_of(k, bonds)
+      theta(k) = point_dilatation(model, u, k, bonds)
+    end do
+    !$omp end parallel
+  end subroutine reference_dilatation
+
+  !> Force density of all slots (n_slots, dim) [N/m3].
+  subroutine reference_force(family, model, u, force)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(out) :: force(:, :)
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: p(:)
+    integer :: k
+
+    allocate (p(family%n_slots), source=0.0_wp)
+    if (model%dilatation) then
+      call reference_dilatation(family, model, u, p)
+      p = p*model%materials(model%material)%p
+    end if
+    !$omp parallel default(none) shared(family, model, u, p, force) private(bonds, k)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(static)
+    do k = 1, family%n_slots
+      call family%bonds_of(k, bonds)
+      force(k, :) = point_force(model, u, p, k, bonds)
+    end do
+    !$omp end parallel
+  end subroutine reference_force
+
+  !> Strain energy density of all slots [J/m3].
+  subroutine reference_energy(family, model, u, energy)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(out) :: energy(:)
+    type(bonds_type) :: bonds
+    integer :: k
+
+    !$omp parallel default(none) shared(family, model, u, energy) private(bonds, k)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(static)
+    do k = 1, family%n_slots
+      call family%bonds_of(k, bonds)
+      energy(k) = point_energy(model, u, k, bonds)
+    end do
+    !$omp end parallel
+  end subroutine reference_energy
+
+end module pd_force_reference

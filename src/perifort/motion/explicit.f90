@@ -1,0 +1,236 @@
+!> Explicit integration in time (7.3): the chapter's forward and backward differences, velocity
+!> Verlet, Adams-Bashforth, Adams-Moulton and Runge-Kutta.
+!>
+!> Every integrator is the same loop: at t_n the forces are brought up to date (which imposes the
+!> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
+module pd_motion_explicit
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type
+  use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_system, only: system_type, evaluate, account, add_loads, inverse_density, check_motion
+  implicit none (type, external)
+  private
+  public :: run_explicit
+
+  !> Velocities and accelerations of earlier steps, as far as the integrator needs them.
+  type :: memory_type
+    integer :: filled = 0                          !! how many earlier steps are kept
+    real(wp), allocatable :: v(:, :, :)            !! of t_{n-1}, t_{n-2}
+    real(wp), allocatable :: a(:, :, :)
+    real(wp), allocatable :: u0(:, :), v0(:, :)    !! at the beginning of the step
+    real(wp), allocatable :: a0(:, :)
+  end type memory_type
+
+contains
+
+  !> Move `system` through `steps` steps of `dt` [s] from t = 0.
+  subroutine run_explicit(system, integrator, dt, steps, observer, error)
+    type(system_type), intent(inout) :: system
+    character(*), intent(in) :: integrator
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: steps
+    class(observer_type), intent(inout) :: observer
+    type(error_type), allocatable, intent(out) :: error
+    type(memory_type) :: memory
+    type(instant_type) :: instant
+    integer :: n
+
+    instant%dt = dt
+    call allocate_memory(system, integrator, memory)
+    do n = 0, steps
+      instant%step = n
+      instant%time = n*dt
+      instant%last = n == steps
+      call evaluate(system, instant%time, breaking=.true.)
+      ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
+      instant%kick = 0.0_wp
+      if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
+      call account(system, instant%time)
+      call observer%observe(system, instant, error)
+      if (allocated(error) .or. n == steps) return
+      call advance(system, integrator, instant%time, dt, n == 0, memory)
+      call check_motion(system, instant%time + dt, dt, error)
+      if (allocated(error)) return
+    end do
+  end subroutine run_explicit
+
+  !> Whether the integrator's velocities belong to the middle of the steps.
+  pure logical function at_half_steps(integrator)
+    character(*), intent(in) :: integrator
+    at_half_steps = integrator == 'forward_backward' .or. integrator == 'velocity_verlet'
+  end function at_half_steps
+
+  subroutine allocate_memory(system, integrator, memory)
+    type(system_type), intent(in) :: system
+    character(*), intent(in) :: integrator
+    type(memory_type), intent(out) :: memory
+    integer :: n, d
+
+    if (at_half_steps(integrator)) return
+    n = size(system%state%u, 1)
+    d = size(system%state%u, 2)
+    allocate (memory%v(n, d, 2), memory%a(n, d, 2), source=0.0_wp)
+    allocate (memory%u0(n, d), memory%v0(n, d), memory%a0(n, d), source=0.0_wp)
+  end subroutine allocate_memory
+
+  !> One step from t to t + dt; the forces are those at t.
+  subroutine advance(system, integrator, t, dt, first, memory)
+    type(system_type), intent(inout) :: system
+    character(*), intent(in) :: integrator
+    real(wp), intent(in) :: t, dt
+    logical, intent(in) :: first
+    type(memory_type), intent(inout) :: memory
+
+    select case (integrator)
+    case ('adams_bashforth')
+      call remember_instant(system, t, memory)
+      if (memory%filled < 2) then
+        call runge_kutta(system, t, dt, memory)
+      else
+        call adams(system, dt, memory, [23.0_wp, -16.0_wp, 5.0_wp]/12.0_wp)
+      end if
+      call shift(memory)
+    case ('adams_moulton')
+      call remember_instant(system, t, memory)
+      if (memory%filled < 1) then
+        call runge_kutta(system, t, dt, memory)
+      else
+        call adams(system, dt, memory, [1.5_wp, -0.5_wp, 0.0_wp])
+        call evaluate(system, t + dt, breaking=.false.)
+        call correct(system, t, dt, memory)
+      end if
+      call shift(memory)
+    case ('runge_kutta')
+      call remember_instant(system, t, memory)
+      call runge_kutta(system, t, dt, memory)
+    case default
+      ! the first velocity gets only half its kick: the scheme as printed is of first order
+      call kick(system, t, merge(dt/2, dt, first), system%state%v)
+      call drift(system, dt)
+    end select
+  end subroutine advance
+
+  !> v = v + dt (f + b)/rho (7.8).
+  subroutine kick(system, t, dt, v)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t, dt
+    real(wp), intent(inout) :: v(:, :)
+    real(wp) :: scale
+    integer :: k, c
+
+    if (size(system%model%materials) == 1) then
+      scale = dt/system%model%materials(1)%density
+      do c = 1, size(v, 2)
+        !$omp parallel do simd schedule(static) default(none) shared(system, v, scale, c) private(k)
+        do k = 1, size(v, 1)
+          v(k, c) = v(k, c) + scale*system%state%force(k, c)
+        end do
+      end do
+    else
+      do c = 1, size(v, 2)
+        !$omp parallel do schedule(static) default(none) shared(system, v, dt, c) private(k)
+        do k = 1, size(v, 1)
+          v(k, c) = v(k, c) + dt*inverse_density(system%model, k)*system%state%force(k, c)
+        end do
+      end do
+    end if
+    call add_loads(system, t, dt, .true., v)
+  end subroutine kick
+
+  !> u = u + dt v (7.9).
+  subroutine drift(system, dt)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: dt
+    integer :: k, c
+
+    do c = 1, size(system%state%u, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(system, dt, c) private(k)
+      do k = 1, size(system%state%u, 1)
+        system%state%u(k, c) = system%state%u(k, c) + dt*system%state%v(k, c)
+      end do
+    end do
+  end subroutine drift
+
+  !> Accelerations at `t` from the forces, 0 for constrained components.
+  subroutine accelerations(system, t, a)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t
+    real(wp), intent(inout) :: a(:, :)
+    a = 0.0_wp
+    call kick(system, t, 1.0_wp, a)
+    where (system%held == 1) a = 0.0_wp
+  end subroutine accelerations
+
+  !> Keep displacement, velocity and acceleration at the beginning of a step.
+  subroutine remember_instant(system, t, memory)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t
+    type(memory_type), intent(inout) :: memory
+    memory%u0 = system%state%u
+    memory%v0 = system%state%v
+    call accelerations(system, t, memory%a0)
+  end subroutine remember_instant
+
+  !> What was the present becomes the past.
+  pure subroutine shift(memory)
+    type(memory_type), intent(inout) :: memory
+    memory%v(:, :, 2) = memory%v(:, :, 1)
+    memory%a(:, :, 2) = memory%a(:, :, 1)
+    memory%v(:, :, 1) = memory%v0
+    memory%a(:, :, 1) = memory%a0
+    memory%filled = memory%filled + 1
+  end subroutine shift
+
+  !> Adams-Bashforth: weights of t_n, t_{n-1}, t_{n-2}.
+  pure subroutine adams(system, dt, memory, weight)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: dt
+    type(memory_type), intent(in) :: memory
+    real(wp), intent(in) :: weight(3)
+    system%state%u = memory%u0 + dt*(weight(1)*memory%v0 + weight(2)*memory%v(:, :, 1) &
+      & + weight(3)*memory%v(:, :, 2))
+    system%state%v = memory%v0 + dt*(weight(1)*memory%a0 + weight(2)*memory%a(:, :, 1) &
+      & + weight(3)*memory%a(:, :, 2))
+  end subroutine adams
+
+  !> Adams-Moulton of second order, from the forces at the predicted state.
+  subroutine correct(system, t, dt, memory)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t, dt
+    type(memory_type), intent(inout) :: memory
+    real(wp), allocatable :: a(:, :)
+
+    allocate (a, mold=memory%a0)
+    call accelerations(system, t + dt, a)
+    system%state%u = memory%u0 + dt/2*(memory%v0 + system%state%v)
+    system%state%v = memory%v0 + dt/2*(memory%a0 + a)
+  end subroutine correct
+
+  !> The classical scheme of fourth order; constraints are imposed at each stage's time.
+  subroutine runge_kutta(system, t, dt, memory)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t, dt
+    type(memory_type), intent(inout) :: memory
+    real(wp), parameter :: ahead(3) = [0.5_wp, 0.5_wp, 1.0_wp]
+    real(wp), parameter :: weight(4) = [1.0_wp, 2.0_wp, 2.0_wp, 1.0_wp]/6.0_wp
+    real(wp), allocatable :: du(:, :), dv(:, :), a(:, :), v(:, :)
+    integer :: stage
+
+    allocate (a, source=memory%a0)
+    allocate (v, source=memory%v0)
+    du = weight(1)*memory%v0
+    dv = weight(1)*memory%a0
+    do stage = 1, 3
+      system%state%u = memory%u0 + ahead(stage)*dt*v
+      system%state%v = memory%v0 + ahead(stage)*dt*a
+      call evaluate(system, t + ahead(stage)*dt, breaking=.false.)
+      v = system%state%v
+      call accelerations(system, t + ahead(stage)*dt, a)
+      du = du + weight(stage + 1)*v
+      dv = dv + weight(stage + 1)*a
+    end do
+    system%state%u = memory%u0 + dt*du
+    system%state%v = memory%v0 + dt*dv
+  end subroutine runge_kutta
+
+end module pd_motion_explicit

@@ -1,0 +1,40 @@
+!> Who looks at a motion while it runs: integrators and relaxation call an observer once per step,
+!> and know nothing of files and terminals.
+module pd_motion_observer
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type
+  use pd_motion_system, only: system_type
+  implicit none (type, external)
+  private
+  public :: observer_type, instant_type
+
+  !> One instant of a motion.
+  type :: instant_type
+    integer :: step = 0               !! complete steps (iterations in relaxation)
+    integer :: load_step = 0          !! relaxation
+    real(wp) :: time = 0.0_wp         !! [s]; relaxation: 0 to 1 over the load steps
+    real(wp) :: dt = 0.0_wp           !! step size [s]
+    real(wp) :: kick = 0.0_wp         !! velocities at this instant are v + kick*force/rho [s]
+    real(wp) :: residual = 0.0_wp     !! relaxation: relative residual force [-]
+    logical :: last = .false.         !! the final state
+    logical :: settled = .true.       !! relaxation: a load step has converged
+  end type instant_type
+
+  type, abstract :: observer_type
+  contains
+    procedure(observe_interface), deferred :: observe
+  end type observer_type
+
+  abstract interface
+    !> Called after the forces of an instant are known. An error ends the motion.
+    subroutine observe_interface(observer, system, instant, error)
+      import :: observer_type, system_type, instant_type, error_type
+      implicit none (type, external)
+      class(observer_type), intent(inout) :: observer
+      type(system_type), intent(inout) :: system
+      type(instant_type), intent(in) :: instant
+      type(error_type), allocatable, intent(out) :: error
+    end subroutine observe_interface
+  end interface
+
+end module pd_motion_observer

@@ -1,0 +1,377 @@
+!> A body in motion: points, families, force model, state and conditions, and the one call that
+!> brings the forces up to date. Integrators and relaxation work on this type alone.
+module pd_motion_system
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_numbers, only: inner
+  use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_force_breaking, only: strained_slots, break_bonds
+  use pd_force_forces, only: dilatation_pass, force_pass, energy_pass
+  use pd_force_model, only: model_type
+  use pd_force_reference, only: point_dilatation, point_force
+  use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
+    & moved_by_velocity
+  implicit none (type, external)
+  private
+  public :: system_type, state_type, start_system, evaluate, break_now, account, energies_type, &
+    & energies_of, add_loads, inverse_density, check_motion, faulty_slot, place
+
+  !> What moves. All arrays are over slots; dead slots stay zero.
+  type :: state_type
+    real(wp), allocatable :: u(:, :)       !! displacement (n_slots, dim) [m]
+    real(wp), allocatable :: v(:, :)       !! velocity (n_slots, dim) [m/s]
+    real(wp), allocatable :: force(:, :)   !! internal force density (n_slots, dim) [N/m3]
+    real(wp), allocatable :: p(:)          !! 2 a d delta theta, if the model needs it
+    real(wp), allocatable :: damage(:)     !! local damage [-]
+  end type state_type
+
+  type :: system_type
+    type(body_type) :: body
+    class(family_type), allocatable :: family
+    type(model_type) :: model
+    type(state_type) :: state
+    type(motion_type), allocatable :: motions(:)
+    type(load_type), allocatable :: loads(:)
+    integer(i1), allocatable :: held(:, :)      !! 1 where a component is constrained (n_slots, dim)
+    integer(i1), allocatable :: strained(:)     !! marks of the last pass
+    integer(i8) :: broken = 0_i8                !! bonds broken during the run
+    real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking [J]
+    real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
+    real(wp), allocatable :: last_u(:)          !! work accounting: place and force of each
+    real(wp), allocatable :: last_force(:)      !! component that does work, at the last step
+    logical :: loaded_and_held = .false.        !! some constrained component also bears a load
+  end type system_type
+
+  !> Energies at one instant [J].
+  type :: energies_type
+    real(wp) :: kinetic = 0.0_wp
+    real(wp) :: strain = 0.0_wp
+  end type energies_type
+
+contains
+
+  !> Make a system ready at t = 0: `u` and `v` hold the initial state, conditions are in place.
+  subroutine start_system(system)
+    type(system_type), intent(inout) :: system
+    integer :: n
+
+    n = system%body%n_slots
+    if (.not. allocated(system%motions)) allocate (system%motions(0))
+    if (.not. allocated(system%loads)) allocate (system%loads(0))
+    allocate (system%state%force(n, system%body%dim), source=0.0_wp)
+    allocate (system%state%p(merge(n, 0, system%model%dilatation)), source=0.0_wp)
+    allocate (system%strained(merge(n, 0, system%model%breaking)), source=0_i1)
+    if (.not. allocated(system%state%damage)) allocate (system%state%damage(n), source=0.0_wp)
+    call hold_components(system)
+    call remember_start(system%motions, system%state%u)
+    call impose(system%motions, 0.0_wp, system%state%u, system%state%v)
+  end subroutine start_system
+
+  !> Note which components are constrained; where several motions claim one, the last holds it.
+  pure subroutine hold_components(system)
+    type(system_type), intent(inout) :: system
+    integer(i4), allocatable :: holder(:, :)
+    integer :: m, c
+
+    allocate (holder(system%body%n_slots, system%body%dim), source=0_i4)
+    do m = 1, size(system%motions)
+      do c = 1, system%body%dim
+        if (system%motions(m)%kind(c) /= free_component) holder(system%motions(m)%slots, c) = int(m, i4)
+      end do
+    end do
+    do m = 1, size(system%motions)
+      associate (motion => system%motions(m))
+        if (allocated(motion%held)) deallocate (motion%held)
+        allocate (motion%held(size(motion%slots), system%body%dim), source=0_i1)
+        do c = 1, system%body%dim
+          where (holder(motion%slots, c) == m) motion%held(:, c) = 1_i1
+        end do
+      end associate
+    end do
+    if (allocated(system%held)) deallocate (system%held)
+    allocate (system%held(system%body%n_slots, system%body%dim))
+    system%held = merge(1_i1, 0_i1, holder > 0)
+  end subroutine hold_components
+
+  !> Steps 1 to 4 of conventions' "A step": impose at time `t`, break bonds (unless `breaking` is
+  !> false), dilatation, forces. Breaking needs no pass of its own: the first pass over the bonds
+  !> marks the strained slots, and only those are computed again.
+  subroutine evaluate(system, t, breaking)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t
+    logical, intent(in) :: breaking
+    integer(i4), allocatable :: slots(:)
+    logical :: breaks
+
+    breaks = breaking .and. system%model%breaking
+    associate (state => system%state, model => system%model)
+      call impose(system%motions, t, state%u, state%v)
+      if (model%dilatation) then
+        call dilatation_pass(system%family, model, state%u, state%p, system%strained)
+        if (breaks) then
+          call break_marked(system, slots)
+          call renew_dilatation(system, slots)
+        end if
+        call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
+      else
+        call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
+        if (breaks) then
+          call break_marked(system, slots)
+          call renew_force(system, slots)
+        end if
+      end if
+    end associate
+  end subroutine evaluate
+
+  !> Break every bond beyond its limit at the present displacements (relaxation, after a load step);
+  !> `number` is how many broke. Forces are not renewed.
+  subroutine break_now(system, number)
+    type(system_type), intent(inout) :: system
+    integer(i8), intent(out) :: number
+    integer(i4), allocatable :: slots(:)
+
+    number = system%broken
+    if (system%model%breaking) call break_marked(system, slots)
+    number = system%broken - number
+  end subroutine break_now
+
+  !> Break bonds of the marked slots and count what that costs; `slots` are those that lost some.
+  subroutine break_marked(system, slots)
+    type(system_type), intent(inout) :: system
+    integer(i4), allocatable, intent(out) :: slots(:)
+    real(wp) :: dissipated
+    integer(i8) :: broken
+
+    call strained_slots(system%strained, slots)
+    if (size(slots) == 0) return
+    call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
+      & system%state%damage, broken, dissipated)
+    system%broken = system%broken + broken
+    system%dissipated = system%dissipated + dissipated
+  end subroutine break_marked
+
+  !> Dilatation of some slots again, after they lost bonds.
+  subroutine renew_dilatation(system, slots)
+    type(system_type), intent(inout) :: system
+    integer(i4), intent(in) :: slots(:)
+    type(bonds_type) :: bonds
+    integer :: m, k
+
+    if (size(slots) == 0) return
+    call allocate_bonds(system%family, bonds)
+    associate (model => system%model)
+      do m = 1, size(slots)
+        k = slots(m)
+        call system%family%bonds_of(k, bonds)
+        system%state%p(k) = model%materials(model%material(k))%p &
+          & *point_dilatation(model, system%state%u, k, bonds)
+      end do
+    end associate
+  end subroutine renew_dilatation
+
+  !> Force of some slots again, after they lost bonds.
+  subroutine renew_force(system, slots)
+    type(system_type), intent(inout) :: system
+    integer(i4), intent(in) :: slots(:)
+    type(bonds_type) :: bonds
+    integer :: m, k
+
+    if (size(slots) == 0) return
+    call allocate_bonds(system%family, bonds)
+    do m = 1, size(slots)
+      k = slots(m)
+      call system%family%bonds_of(k, bonds)
+      system%state%force(k, :) = point_force(system%model, system%state%u, system%state%p, k, bonds)
+    end do
+  end subroutine renew_force
+
+  !> Add `scale` times the loads at time `t` to `values` (n_slots, dim); `per_density` divides by the
+  !> point's density, which turns force density into acceleration.
+  subroutine add_loads(system, t, scale, per_density, values)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t, scale
+    logical, intent(in) :: per_density
+    real(wp), intent(inout) :: values(:, :)
+    real(wp) :: factor, by
+    integer :: l, i, c, k
+
+    do l = 1, size(system%loads)
+      factor = scale*system%loads(l)%curve%value(t)
+      do c = 1, system%body%dim
+        do i = 1, size(system%loads(l)%slots)
+          k = system%loads(l)%slots(i)
+          by = factor
+          if (per_density) by = factor*inverse_density(system%model, k)
+          values(k, c) = values(k, c) + by*system%loads(l)%density(i, c)
+        end do
+      end do
+    end do
+  end subroutine add_loads
+
+  !> 1/rho of slot `k` [m3/kg].
+  pure real(wp) function inverse_density(model, k)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k
+    inverse_density = 1.0_wp/model%materials(model%material(k))%density
+  end function inverse_density
+
+  !> Work of loads and imposed motion since the last call, by the trapezoidal rule, and the reactions
+  !> at time `t`. To be called once per step, after `evaluate`.
+  subroutine account(system, t)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t
+    real(wp), allocatable :: applied(:, :)
+    real(wp) :: force, acceleration
+    logical :: first
+    integer :: m, l, c, i, k, n
+
+    first = .not. allocated(system%last_u)
+    if (first) call allocate_account(system)
+    if (system%loaded_and_held) then
+      allocate (applied(system%body%n_slots, system%body%dim), source=0.0_wp)
+      call add_loads(system, t, 1.0_wp, .false., applied)
+    end if
+    n = 0
+    do m = 1, size(system%motions)
+      associate (motion => system%motions(m))
+        motion%reaction = 0.0_wp
+        do c = 1, system%body%dim
+          acceleration = 0.0_wp
+          if (motion%kind(c) == moved_by_velocity) acceleration = motion%amplitude(c)*motion%curve%slope(t)
+          do i = 1, size(motion%slots)
+            if (motion%held(i, c) == 0_i1) cycle
+            k = motion%slots(i)
+            force = acceleration/inverse_density(system%model, k) - system%state%force(k, c)
+            if (allocated(applied)) force = force - applied(k, c)
+            force = force*system%body%volume(k)
+            motion%reaction(c) = motion%reaction(c) + force
+            call add_work(system, n, first, system%state%u(k, c), force)
+          end do
+        end do
+      end associate
+    end do
+    do l = 1, size(system%loads)
+      associate (load => system%loads(l))
+        do c = 1, system%body%dim
+          if (all(abs(load%density(:, c)) <= 0.0_wp)) cycle
+          do i = 1, size(load%slots)
+            k = load%slots(i)
+            call add_work(system, n, first, system%state%u(k, c), &
+              & load%density(i, c)*load%curve%value(t)*system%body%volume(k))
+          end do
+        end do
+      end associate
+    end do
+  end subroutine account
+
+  !> One component's share of the work since its last force and place; `n` counts the components.
+  pure subroutine add_work(system, n, first, u, force)
+    type(system_type), intent(inout) :: system
+    integer, intent(inout) :: n
+    logical, intent(in) :: first
+    real(wp), intent(in) :: u, force
+
+    n = n + 1
+    if (.not. first) system%external_work = system%external_work &
+      & + (system%last_force(n) + force)/2*(u - system%last_u(n))
+    system%last_u(n) = u
+    system%last_force(n) = force
+  end subroutine add_work
+
+  !> Room for the last force and place of every component that does work.
+  pure subroutine allocate_account(system)
+    type(system_type), intent(inout) :: system
+    integer :: n, m, l
+
+    n = 0
+    do m = 1, size(system%motions)
+      n = n + size(system%motions(m)%slots)
+    end do
+    do l = 1, size(system%loads)
+      n = n + size(system%loads(l)%slots)
+      if (any(system%held(system%loads(l)%slots, :) == 1_i1)) system%loaded_and_held = .true.
+    end do
+    allocate (system%last_u(n*system%body%dim), system%last_force(n*system%body%dim), source=0.0_wp)
+  end subroutine allocate_account
+
+  !> Kinetic and strain energy [J]; `v` are the velocities at the instant of the displacements.
+  subroutine energies_of(system, v, energies)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: v(:, :)
+    type(energies_type), intent(out) :: energies
+    real(wp), allocatable :: density(:), mass(:)
+    integer :: k, c
+
+    allocate (density(system%body%n_slots), mass(system%body%n_slots))
+    call energy_pass(system%family, system%model, system%state%u, density, system%strained)
+    energies%strain = inner(density, system%body%volume)
+    !$omp parallel do schedule(static) default(none) shared(system, v, density, mass) private(k, c)
+    do k = 1, system%body%n_slots
+      mass(k) = system%body%volume(k)/inverse_density(system%model, k)
+      density(k) = 0.0_wp
+      do c = 1, system%body%dim
+        density(k) = density(k) + v(k, c)**2
+      end do
+    end do
+    energies%kinetic = inner(mass, density)/2
+  end subroutine energies_of
+
+  !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
+  !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step.
+  integer function faulty_slot(system, rate, dt) result(slot)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: rate(:, :)
+    real(wp), intent(in) :: dt
+    real(wp) :: largest, sum_of_squares
+    integer :: k, c, at(2)
+
+    slot = 0
+    largest = 0.0_wp
+    sum_of_squares = 0.0_wp
+    do c = 1, size(rate, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(rate, c) private(k) &
+      !$omp reduction(max:largest) reduction(+:sum_of_squares)
+      do k = 1, size(rate, 1)
+        largest = max(largest, abs(rate(k, c)))
+        sum_of_squares = sum_of_squares + rate(k, c)**2
+      end do
+    end do
+    if (ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta) return
+    at = findloc(ieee_is_finite(rate), .false.)
+    if (at(1) == 0) at = maxloc(abs(rate))
+    slot = at(1)
+  end function faulty_slot
+
+  !> An error if the motion at time `t` [s] with steps of `dt` [s] is no motion any more.
+  subroutine check_motion(system, t, dt, error)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t, dt
+    type(error_type), allocatable, intent(out) :: error
+    integer :: k
+
+    k = faulty_slot(system, system%state%v, dt)
+    if (k == 0) return
+    call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))//'): point '// &
+      & to_text(int(system%body%point(k)))//' at ('//place(system, k)//') moves more than a horizon in a '// &
+      & 'step of '//to_text(dt)//' s. Likely cause: a time step above the stable one '// &
+      & '(`perifort check` prints it; lower safety or step), or an imposed velocity beyond the wave '// &
+      & 'speed', status_no_answer)
+  end subroutine check_motion
+
+  !> Position of a slot as text.
+  pure function place(system, k) result(text)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: k
+    character(:), allocatable :: text
+    integer :: c
+
+    text = to_text(system%body%x(k, 1))
+    do c = 2, system%body%dim
+      text = text//', '//to_text(system%body%x(k, c))
+    end do
+  end function place
+
+end module pd_motion_system

@@ -1,0 +1,211 @@
+!> The stable time step (7.25 in the form of conventions, "Time step and ADR mass").
+module pd_motion_time_step
+  use pd_base_kinds, only: wp
+  use pd_base_numbers, only: pi
+  use pd_body_body, only: body_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_surface, only: bond_factor
+  use pd_force_model, only: model_type
+  implicit none (type, external)
+  private
+  public :: stiffness_bound, stable_step, printed_step, book_step, chapter_stiffness, integrator_limit
+  public :: constant_stiffness, horizon_volume
+
+contains
+
+  !> M_k [N/m4] of every slot, 0 for points without bonds:
+  !> sum_j [ (q_k+q_j) Gb + (m_k I_k + m_j I_j) Gd ] vc V_j/|xi|, m = 2 max(a,0) (d delta)^2,
+  !> I_k = sum_l Gd vc V_l/|xi|. The step sqrt(2 rho/M) and the relaxation's mass come from it.
+  subroutine stiffness_bound(body, family, model, bound)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: bound(:)
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: inverse(:)
+    real(wp) :: n(body%dim)
+    integer :: k, i, j
+
+    allocate (inverse(body%n_slots), source=0.0_wp)
+    !$omp parallel default(none) shared(body, family, model, bound, inverse) private(bonds, n, k, i, j)
+    call allocate_bonds(family, bonds)
+    if (model%dilatation) then
+      !$omp do schedule(dynamic, 256)
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        call family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          j = bonds%j(i)
+          n = bonds%xi(i, :)/bonds%length(i)
+          inverse(k) = inverse(k) + factor(model%D, k, j)*bonds%weight(i)/bonds%length(i)
+        end do
+        associate (m => model%materials(model%material(k)))
+          inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*m%t**2
+        end associate
+      end do
+    end if
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      bound(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        j = bonds%j(i)
+        n = bonds%xi(i, :)/bonds%length(i)
+        bound(k) = bound(k) + ((model%materials(model%material(k))%q &
+          & + model%materials(model%material(j))%q)*factor(model%S, k, j) &
+          & + (inverse(k) + inverse(j))*factor(model%D, k, j))*bonds%weight(i)/bonds%length(i)
+      end do
+    end do
+    !$omp end parallel
+
+  contains
+
+    !> Gd or Gb of the bond k-j along n.
+    pure real(wp) function factor(g, k, j)
+      real(wp), allocatable, intent(in) :: g(:, :)
+      integer, intent(in) :: k, j
+      factor = 1.0_wp
+      if (model%surface) factor = bond_factor(n, g(k, :), g(j, :))
+    end function factor
+  end subroutine stiffness_bound
+
+  !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
+  pure real(wp) function stable_step(body, model, bound) result(step)
+    type(body_type), intent(in) :: body
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: bound(:)
+    integer :: k
+
+    step = huge(step)
+    do k = 1, body%n_slots
+      if (bound(k) > 0.0_wp) step = min(step, sqrt(2*model%materials(model%material(k))%density/bound(k)))
+    end do
+  end function stable_step
+
+  !> 7.25 as printed: without surface factors, and with the plain sign of a. Negative sums have no
+  !> step: 0 is returned. Shown beside the step that is used.
+  subroutine printed_step(body, family, model, step)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: step
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: inverse(:)
+    real(wp) :: printed, squared
+    integer :: k, i
+
+    allocate (inverse(body%n_slots), source=0.0_wp)
+    squared = huge(squared)
+    !$omp parallel default(none) shared(body, family, model, inverse) private(bonds, k, i, printed) &
+    !$omp reduction(min:squared)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      ! the printed inner sum has the plain volumes, and is all but the same with v_c
+      inverse(k) = sum(bonds%weight(:bonds%n)/bonds%length(:bonds%n))
+    end do
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      if (bonds%n == 0) cycle
+      associate (m => model%materials(model%material(k)))
+        printed = 0.0_wp
+        do i = 1, bonds%n
+          printed = printed + (2*m%a*m%t**2*(inverse(k) + inverse(bonds%j(i))) + 2*m%q) &
+            & *bonds%weight(i)/bonds%length(i)
+        end do
+        if (printed > 0.0_wp) then
+          squared = min(squared, 2*m%density/printed)
+        else
+          squared = 0.0_wp
+        end if
+      end associate
+    end do
+    !$omp end parallel
+    step = sqrt(squared)
+  end subroutine printed_step
+
+  !> Volume of the horizon [m3]: 4/3 pi delta^3, pi delta^2 h, 2 delta A.
+  pure real(wp) function horizon_volume(dim, delta, depth) result(volume)
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: delta, depth
+    select case (dim)
+    case (3); volume = 4*pi*delta**3/3
+    case (2); volume = pi*delta**2*depth
+    case default; volume = 2*delta*depth
+    end select
+  end function horizon_volume
+
+  !> The book's own estimate of the step, sqrt(2 rho dx/(V_h c)) [s], least over the materials.
+  pure real(wp) function book_step(model, dim, delta, depth, spacing) result(step)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: delta, depth, spacing
+    step = minval(sqrt(2*model%materials%density*spacing &
+      & /(horizon_volume(dim, delta, depth)*2*model%materials%q)))
+  end function book_step
+
+  !> The sum 7.32 for each component, each term times vc V_j [N/m4].
+  subroutine chapter_stiffness(body, family, model, stiffness)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: stiffness(:, :)
+    type(bonds_type) :: bonds
+    real(wp) :: term, delta
+    integer :: k, i, c, j
+
+    delta = family%rule%delta
+    !$omp parallel default(none) shared(body, family, model, stiffness, delta) private(bonds, k, i, c, j, term)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      stiffness(k, :) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      associate (m => model%materials(model%material(k)))
+        do i = 1, bonds%n
+          j = bonds%j(i)
+          term = 4*delta/bonds%length(i)*(0.5_wp*max(m%a, 0.0_wp)*m%d**2*delta/bonds%length(i) &
+            & *(body%volume(k)*bonds%weight(i)/body%volume(j) + bonds%weight(i)) + m%b)*bonds%weight(i)
+          do c = 1, body%dim
+            stiffness(k, c) = stiffness(k, c) + abs(bonds%xi(i, c))/bonds%length(i)*term
+          end do
+        end do
+      end associate
+    end do
+    !$omp end parallel
+  end subroutine chapter_stiffness
+
+  !> V_h c/spacing of every slot, the book's own estimate of the stiffness [N/m4].
+  pure subroutine constant_stiffness(body, model, delta, depth, stiffness)
+    type(body_type), intent(in) :: body
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: delta, depth
+    real(wp), intent(out) :: stiffness(:)
+    integer :: k
+
+    do k = 1, body%n_slots
+      stiffness(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      stiffness(k) = horizon_volume(body%dim, delta, depth)*2*model%materials(model%material(k))%q &
+        & /body%spacing(k)
+    end do
+  end subroutine constant_stiffness
+
+  !> Largest stable omega dt of an integrator on the undamped oscillator.
+  pure real(wp) function integrator_limit(integrator) result(limit)
+    character(*), intent(in) :: integrator
+    select case (integrator)
+    case ('adams_bashforth'); limit = 0.72_wp
+    case ('adams_moulton'); limit = 1.29_wp
+    case ('runge_kutta'); limit = 2.83_wp
+    case default; limit = 2.0_wp
+    end select
+  end function integrator_limit
+
+end module pd_motion_time_step
