@@ -8,7 +8,9 @@ program main
   use, intrinsic :: iso_fortran_env, only: output_unit, int64, real64
   use testdrive, only: collect_interface, new_testsuite, run_selected, select_suite, &
     & testsuite_type, unittest_type
+  use test_base_clock, only: collect_base_clock
   use test_base_text, only: collect_base_text
+  use test_base_version, only: collect_base_version
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -17,7 +19,9 @@ program main
   logical :: short
   character(:), allocatable :: suite_name, test_name
 
+  call register('base_clock', collect_base_clock)
   call register('base_text', collect_base_text)
+  call register('base_version', collect_base_version)
 
   call read_arguments()
   if (len(suite_name) > 0) then
