@@ -11,6 +11,7 @@ program main
   use test_base_clock, only: collect_base_clock
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
+  use test_command_line, only: collect_command_line
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -22,6 +23,7 @@ program main
   call register('base_clock', collect_base_clock)
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)
+  call register('command_line', collect_command_line)
 
   call read_arguments()
   if (len(suite_name) > 0) then
