@@ -30,25 +30,32 @@ contains
   subroutine read_command_line(line, error)
     type(command_line_type), intent(out) :: line
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: arguments(:), typed
     integer :: i, length, longest
 
     longest = 1
-    do i = 0, command_argument_count()
+    do i = 1, command_argument_count()
       call get_command_argument(i, length=length)
       longest = max(longest, length)
     end do
-    allocate (character(longest) :: arguments(command_argument_count()))
-    do i = 1, size(arguments)
-      call get_command_argument(i, arguments(i))
-    end do
+    call read_words(longest, command_argument_count(), line, error)
+  end subroutine read_command_line
+
+  subroutine read_words(longest, count, line, error)
+    integer, intent(in) :: longest, count
+    type(command_line_type), intent(out) :: line
+    type(error_type), allocatable, intent(out) :: error
+    character(longest) :: arguments(count)
+    character(:), allocatable :: typed
+    integer :: i
+
     typed = 'perifort'
-    do i = 1, size(arguments)
+    do i = 1, count
+      call get_command_argument(i, arguments(i))
       typed = typed//' '//quoted(trim(arguments(i)))
     end do
     call parse_command_line(arguments, line, error)
     line%text = typed
-  end subroutine read_command_line
+  end subroutine read_words
 
   !> Understand `arguments` (trailing blanks do not count). Commands and options are checked here,
   !> files and names are not.
