@@ -1,2 +1,138 @@
+!> Runs the tests: all of them, one suite, or one test.
+!>
+!>     perifort-test [--short] [SUITE [TEST]]
+!>
+!> `--short` leaves out the tests whose name begins with `long`. The last line is always
+!> `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such test.
 program main
+  use, intrinsic :: iso_fortran_env, only: output_unit, int64, real64
+  use testdrive, only: collect_interface, new_testsuite, run_selected, select_suite, &
+    & testsuite_type, unittest_type
+  use test_base_clock, only: collect_base_clock
+  use test_base_text, only: collect_base_text
+  use test_base_version, only: collect_base_version
+  use test_command_line, only: collect_command_line
+  implicit none (type, external)
+
+  type(testsuite_type) :: suites(100)
+  integer :: known = 0, passed = 0, failed = 0, skipped = 0
+  integer :: i
+  logical :: short
+  character(:), allocatable :: suite_name, test_name
+
+  call register('base_clock', collect_base_clock)
+  call register('base_text', collect_base_text)
+  call register('base_version', collect_base_version)
+  call register('command_line', collect_command_line)
+
+  call read_arguments()
+  if (len(suite_name) > 0) then
+    i = select_suite(suites(:known), suite_name)
+    if (i == 0) then
+      write (output_unit, '(3a)') 'no suite is called "', suite_name, '"; there are:'
+      write (output_unit, '(2x, a)') (suites(i)%name, i=1, known)
+      stop 2, quiet=.true.
+    end if
+    call run_suite(suites(i))
+    if (passed + failed + skipped == 0) then
+      write (output_unit, '(a)') 'no test of this suite was chosen'
+      stop 2, quiet=.true.
+    end if
+  else
+    do i = 1, known
+      call run_suite(suites(i))
+    end do
+  end if
+
+  if (skipped > 0) write (output_unit, '(i0, a)') skipped, ' skipped'
+  write (output_unit, '(i0, a, i0, a)') passed, ' passed, ', failed, ' failed'
+  if (failed > 0) stop 1, quiet=.true.
+
+contains
+
+  subroutine register(name, collect)
+    character(*), intent(in) :: name
+    procedure(collect_interface) :: collect
+    known = known + 1
+    suites(known) = new_testsuite(name, collect)
+  end subroutine register
+
+  subroutine read_arguments()
+    integer :: at, length
+    character(:), allocatable :: word
+
+    short = .false.
+    suite_name = ''
+    test_name = ''
+    do at = 1, command_argument_count()
+      call get_command_argument(at, length=length)
+      if (allocated(word)) deallocate (word)
+      allocate (character(length) :: word)
+      call get_command_argument(at, word)
+      if (word == '--short') then
+        short = .true.
+      else if (len(suite_name) == 0) then
+        suite_name = word
+      else
+        test_name = word
+      end if
+    end do
+  end subroutine read_arguments
+
+  !> One test at a time and never in parallel: tests set thread numbers, and HDF5 is not reentrant.
+  subroutine run_suite(suite)
+    type(testsuite_type), intent(in) :: suite
+    type(unittest_type), allocatable :: tests(:)
+    integer :: it
+
+    write (output_unit, '(a)') suite%name
+    call suite%collect(tests)
+    do it = 1, size(tests)
+      if (len(test_name) > 0 .and. tests(it)%name /= test_name) cycle
+      if (short .and. index(tests(it)%name, 'long') == 1) cycle
+      call run_test(suite, tests(it)%name)
+    end do
+  end subroutine run_suite
+
+  !> The framework writes its verdict to a scratch file, so that skipped tests can be told from
+  !> passed ones and every test takes one line, whichever version of the framework is used.
+  subroutine run_test(suite, name)
+    type(testsuite_type), intent(in) :: suite
+    character(*), intent(in) :: name
+    integer :: unit, stat, io
+    integer(int64) :: start, finish, rate
+    character(2000) :: line
+    character(12) :: seconds
+
+    ! The name goes out first: if the test crashes, one sees where.
+    write (output_unit, '(2x, a)', advance='no') name
+    flush (output_unit)
+    open (newunit=unit, status='scratch', action='readwrite')
+    stat = 0
+    call system_clock(start, rate)
+    call run_selected(suite%collect, name, unit, stat)
+    call system_clock(finish)
+    rewind (unit)
+    read (unit, '(a)', iostat=io) line
+    if (io /= 0) line = '[FAILED] no verdict'
+    if (io /= 0 .and. stat == 0) stat = 1
+    write (seconds, '(f8.2)') real(finish - start, real64)/real(rate, real64)
+    write (output_unit, '(5a)') ' ', trim(line(max(1, index(line, '[', back=.true.)):)), &
+      & ' ', trim(adjustl(seconds)), ' s'
+
+    if (stat /= 0) then
+      failed = failed + 1
+    else if (index(line, '[SKIPPED]') > 0) then
+      skipped = skipped + 1
+    else
+      passed = passed + 1
+    end if
+    do
+      read (unit, '(a)', iostat=io) line
+      if (io /= 0) exit
+      write (output_unit, '(a)') trim(line)
+    end do
+    close (unit)
+  end subroutine run_test
+
 end program main

@@ -9,7 +9,7 @@ module pd_scene_types
     & crack_group, initial_group, boundary_group, load_group, time_group, relaxation_group, &
     & output_group, probe_group, name_length, path_length, unset, is_set
 
-  integer, parameter :: name_length = 64    !! longest name of a body, material, region, ... [characters]
+  integer, parameter :: name_length = 64    !! longest name of a body, region, ... [characters]
   integer, parameter :: path_length = 1024  !! longest file name [characters]
   real(wp), parameter :: unset = -huge(1.0_wp)  !! a real the user has not given
 
@@ -35,7 +35,7 @@ module pd_scene_types
   !> `&remove`, `&region`, and the shape keys of `&no_fail`
   type :: shape_group
     character(name_length) :: name = ''          !! `&region` only
-    character(name_length) :: region = ''        !! `&no_fail` only: a named region instead of a shape
+    character(name_length) :: region = ''        !! `&no_fail` only: instead of a shape
     character(name_length) :: shape = ''         !! 'box', 'sphere', 'cylinder'
     real(wp) :: lower(3) = unset                 !! box, cylinder's ends: unset = unbounded [m]
     real(wp) :: upper(3) = unset                 !! [m]
@@ -129,7 +129,7 @@ module pd_scene_types
   !> `&relaxation`
   type :: relaxation_group
     character(name_length) :: density_matrix = 'frame_invariant' !! 'chapter', 'constant'
-    real(wp) :: safety = unset                   !! factor on the mass; 1, or 5 for 'chapter', 'constant'
+    real(wp) :: safety = unset                   !! on the mass; 1, or 5 for 'chapter', 'constant'
     real(wp) :: tolerance = 1.0e-6_wp            !! of residual force and of displacement change [-]
     integer :: maximum_iterations = 100000       !! of each relaxation
     integer :: load_steps = 1

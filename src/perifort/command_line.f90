@@ -1,0 +1,328 @@
+!> What the user typed: one command, its file or name, and options; and the texts of `--help`.
+module pd_command_line
+  use pd_base_error, only: error_type, fail, status_usage
+  use pd_base_text, only: join, nearest_name, newline
+  implicit none (type, external)
+  private
+  public :: command_line_type, parse_command_line, read_command_line, help_text, command_names
+
+  integer, parameter :: word_length = 16
+  character(word_length), parameter :: command_names(6) = [character(word_length) :: &
+    & 'run', 'check', 'template', 'reference', 'version', 'help']
+  character(word_length), parameter :: option_names(5) = [character(word_length) :: &
+    & '--output', '--threads', '--overwrite', '--quiet', '--help']
+
+  !> A command line, understood and checked.
+  type :: command_line_type
+    character(:), allocatable :: command           !! one of `command_names`, '' with bare `--help`
+    character(:), allocatable :: argument          !! scene file, template or group; '' if not given
+    character(:), allocatable :: output_directory  !! `--output`; '' = the default
+    integer :: threads = 0                         !! `--threads`; 0 = as the machine has it
+    logical :: overwrite = .false.                 !! `--overwrite`
+    logical :: quiet = .false.                     !! `--quiet`
+    logical :: help = .false.                      !! `--help`: only the text is wanted
+    character(:), allocatable :: text              !! the command line as it was typed
+  end type command_line_type
+
+contains
+
+  !> Understand the arguments of this program. Errors have the status of a wrong command line.
+  subroutine read_command_line(line, error)
+    type(command_line_type), intent(out) :: line
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i, length, longest
+
+    longest = 1
+    do i = 1, command_argument_count()
+      call get_command_argument(i, length=length)
+      longest = max(longest, length)
+    end do
+    call read_words(longest, command_argument_count(), line, error)
+  end subroutine read_command_line
+
+  subroutine read_words(longest, count, line, error)
+    integer, intent(in) :: longest, count
+    type(command_line_type), intent(out) :: line
+    type(error_type), allocatable, intent(out) :: error
+    character(longest) :: arguments(count)
+    character(:), allocatable :: typed
+    integer :: i
+
+    typed = 'perifort'
+    do i = 1, count
+      call get_command_argument(i, arguments(i))
+      typed = typed//' '//quoted(trim(arguments(i)))
+    end do
+    call parse_command_line(arguments, line, error)
+    line%text = typed
+  end subroutine read_words
+
+  !> Understand `arguments` (trailing blanks do not count). Commands and options are checked here,
+  !> files and names are not.
+  subroutine parse_command_line(arguments, line, error)
+    character(*), intent(in) :: arguments(:)
+    type(command_line_type), intent(out) :: line
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: word, name, value
+    logical :: only_names, has_value, seen(size(option_names))
+    integer :: i, at, equals, option
+
+    line%command = ''
+    line%argument = ''
+    line%output_directory = ''
+    line%text = ''
+    seen = .false.
+    only_names = .false.
+    i = 0
+    do while (i < size(arguments))
+      i = i + 1
+      word = trim(arguments(i))
+      if (word == '--' .and. .not. only_names) then
+        only_names = .true.
+      else if (index(word, '-') == 1 .and. len(word) > 1 .and. .not. only_names) then
+        name = word
+        value = ''
+        equals = index(word, '=')
+        has_value = equals > 0
+        if (has_value) then
+          name = word(:equals - 1)
+          value = word(equals + 1:)
+        end if
+        if (name == '-h') name = '--help'
+        if (name == '--version' .and. len(line%command) == 0) then
+          line%command = 'version'
+          cycle
+        end if
+        option = 0
+        do at = 1, size(option_names)
+          if (option_names(at) == name) option = at
+        end do
+        if (option == 0) then
+          call usage(error, line, "unknown option '"//name//"'"//suggestion(name, option_names) &
+            & //newline//'  known: '//join(option_names, ', '))
+          return
+        end if
+        if (seen(option)) then
+          call usage(error, line, "'"//name//"' is given twice")
+          return
+        end if
+        seen(option) = .true.
+
+        if (takes_value(name) .and. .not. has_value) then
+          i = i + 1
+          if (i <= size(arguments)) value = trim(arguments(i))
+          ! An option in the value's place means that the value was forgotten.
+          if (i > size(arguments) .or. index(value, '--') == 1) value = ''
+        else if (has_value .and. .not. takes_value(name)) then
+          call usage(error, line, "'"//name//"' takes no value, found '"//value//"'")
+          return
+        end if
+        call set_option(line, name, value, error)
+        if (allocated(error)) return
+      else if (len(line%command) == 0) then
+        call set_command(line, word, error)
+        if (allocated(error)) return
+      else if (len(line%argument) == 0) then
+        line%argument = word
+      else
+        call usage(error, line, "'"//trim(line%command)//"' takes one argument, found '"// &
+          & line%argument//"' and '"//word//"'")
+        return
+      end if
+    end do
+
+    call check_whole(line, seen, error)
+  end subroutine parse_command_line
+
+  !> Whatever can only be judged when all words are known.
+  subroutine check_whole(line, seen, error)
+    type(command_line_type), intent(inout) :: line
+    logical, intent(in) :: seen(:)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    if (line%help) return
+    if (len(line%command) == 0) then
+      call usage(error, line, 'no command is given; known: '//join(command_names, ', '))
+      return
+    end if
+    do i = 1, size(option_names)
+      if (seen(i) .and. .not. belongs(trim(option_names(i)), line%command)) then
+        call usage(error, line, "'"//trim(option_names(i))//"' is no option of '"// &
+          & line%command//"'")
+        return
+      end if
+    end do
+    select case (line%command)
+    case ('run', 'check')
+      if (len(line%argument) == 0) &
+        & call usage(error, line, "'"//line%command//"' needs the scene file")
+    case ('version')
+      if (len(line%argument) > 0) call usage(error, line, "'version' takes no argument, found '"// &
+        & line%argument//"'")
+    case ('help')
+      line%help = .true.
+      line%command = ''
+      if (len(line%argument) > 0) call set_command(line, line%argument, error)
+    case default
+      continue
+    end select
+  end subroutine check_whole
+
+  subroutine set_command(line, word, error)
+    type(command_line_type), intent(inout) :: line
+    character(*), intent(in) :: word
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: hint
+
+    if (any(command_names == word)) then
+      line%command = word
+      return
+    end if
+    hint = suggestion(word, command_names)
+    if (index(word, '.nml') > 0) hint = "; did you mean 'run "//word//"'?"
+    call usage(error, line, "unknown command '"//word//"'"//hint//newline//'  known: '// &
+      & join(command_names, ', '))
+  end subroutine set_command
+
+  subroutine set_option(line, name, value, error)
+    type(command_line_type), intent(inout) :: line
+    character(*), intent(in) :: name, value
+    type(error_type), allocatable, intent(out) :: error
+    integer :: status
+
+    select case (name)
+    case ('--output')
+      line%output_directory = value
+      if (len(value) > 0) return
+      call usage(error, line, "'--output' needs a folder, as in --output results")
+    case ('--threads')
+      status = 1
+      if (len(value) > 0 .and. len(value) <= 6 .and. verify(value, '0123456789') == 0) &
+        & read (value, *, iostat=status) line%threads
+      if (len(value) == 0) then
+        call usage(error, line, "'--threads' needs a number, as in --threads 4")
+      else if (status /= 0 .or. line%threads < 1) then
+        line%threads = 0
+        call usage(error, line, "'--threads' needs a whole number from 1 to 999999, found '"// &
+          & value//"'")
+      end if
+    case ('--overwrite')
+      line%overwrite = .true.
+    case ('--quiet')
+      line%quiet = .true.
+    case ('--help')
+      line%help = .true.
+    case default
+      call usage(error, line, "option '"//name//"' has no meaning")
+    end select
+  end subroutine set_option
+
+  pure logical function takes_value(name)
+    character(*), intent(in) :: name
+    takes_value = name == '--output' .or. name == '--threads'
+  end function takes_value
+
+  pure logical function belongs(option, command)
+    character(*), intent(in) :: option, command
+    select case (option)
+    case ('--help')
+      belongs = .true.
+    case ('--threads')
+      belongs = command == 'run' .or. command == 'check'
+    case default
+      belongs = command == 'run'
+    end select
+  end function belongs
+
+  !> An error of the command line, with the way to the right help.
+  subroutine usage(error, line, message)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type), intent(in) :: line
+    character(*), intent(in) :: message
+    character(:), allocatable :: hint
+    hint = 'perifort --help'
+    if (len(line%command) > 0 .and. line%command /= 'help') &
+      & hint = 'perifort '//line%command//' --help'
+    call fail(error, message//newline//'  see: '//hint, status_usage)
+  end subroutine usage
+
+  pure function suggestion(word, known) result(text)
+    character(*), intent(in) :: word, known(:)
+    character(:), allocatable :: text
+    text = nearest_name(word, known)
+    if (len(text) > 0) text = "; did you mean '"//text//"'?"
+  end function suggestion
+
+  !> A word as a shell would need it.
+  pure function quoted(word) result(text)
+    character(*), intent(in) :: word
+    character(:), allocatable :: text
+    text = word
+    if (len(word) == 0 .or. scan(word, ' "$&|;<>()*?') > 0) text = "'"//word//"'"
+  end function quoted
+
+  !> The help of a command; of the program for '' or `help`.
+  pure function help_text(command) result(text)
+    character(*), intent(in) :: command
+    character(:), allocatable :: text
+    integer, parameter :: w = 90
+    character(*), parameter :: threads = &
+      & '  --threads N     number of threads (default: all cores, or OMP_NUM_THREADS)'
+
+    select case (command)
+    case ('run')
+      text = join([character(w) :: &
+        & 'perifort run FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
+        & '', &
+        & 'Compute the scene in FILE and write the results.', &
+        & '', &
+        & '  --output DIR    folder of the results (default: out/ and the name of the file)', &
+        & threads, &
+        & '  --overwrite     replace results that are there', &
+        & '  --quiet         print errors only'], newline)
+    case ('check')
+      text = join([character(w) :: &
+        & 'perifort check FILE [--threads N]', &
+        & '', &
+        & 'Read and check the scene in FILE and build its points and bonds, without running it:', &
+        & 'prints points, bonds, memory, time step, what was chosen and why, and the time that a', &
+        & 'run would take.', &
+        & '', &
+        & threads], newline)
+    case ('template')
+      text = join([character(w) :: &
+        & 'perifort template [NAME]', &
+        & '', &
+        & 'Print a commented scene to start from; with a wrong NAME the known ones are listed.', &
+        & '', &
+        & '  perifort template > my.nml'], newline)
+    case ('reference')
+      text = join([character(w) :: &
+        & 'perifort reference [GROUP]', &
+        & '', &
+        & 'Print every group and key of a scene file, or those of one group: meaning, unit,', &
+        & 'default.'], newline)
+    case ('version')
+      text = join([character(w) :: &
+        & 'perifort version', &
+        & '', &
+        & 'Print the version, the compiler with its flags, and the version of HDF5.'], newline)
+    case default
+      text = join([character(w) :: &
+        & 'perifort: peridynamics, from a scene file to a picture', &
+        & '', &
+        & '  perifort run FILE            compute a scene', &
+        & '  perifort check FILE          check a scene and tell what it costs', &
+        & '  perifort template [NAME]     print a commented scene to start from', &
+        & '  perifort reference [GROUP]   print the groups and keys of a scene', &
+        & '  perifort version             print version, compiler and HDF5', &
+        & '  perifort help COMMAND        more on a command, as does COMMAND --help', &
+        & '', &
+        & 'Exit status: 0 done; 1 the input or the environment is at fault; 2 wrong command', &
+        & 'line; 3 no valid answer (unstable or not converged); 4 interrupted.'], newline)
+    end select
+    text = text//newline
+  end function help_text
+
+end module pd_command_line

@@ -1,0 +1,208 @@
+!> Commands, options, and what is said about wrong ones.
+module test_command_line
+  use pd_base_error, only: pd_error => error_type, status_usage
+  use pd_command_line, only: command_line_type, command_names, help_text, parse_command_line
+  use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
+  implicit none (type, external)
+  private
+  public :: collect_command_line
+
+  integer, parameter :: w = 20   !! longest word in these tests
+
+contains
+
+  subroutine collect_command_line(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('run with all its options', test_run), &
+      & new_unittest('options may stand before the file and take =', test_order), &
+      & new_unittest('defaults', test_defaults), &
+      & new_unittest('names after -- may begin with a dash', test_dashes), &
+      & new_unittest('help is there for every command', test_help), &
+      & new_unittest('--help excuses what is missing', test_help_excuses), &
+      & new_unittest('--version is version', test_version), &
+      & new_unittest('wrong command lines are told so', test_wrong), &
+      & new_unittest('what was meant is suggested', test_suggestions)]
+  end subroutine collect_command_line
+
+  subroutine test_run(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'run', 'a.nml', '--output', 'some/where', &
+      & '--threads', '4', '--overwrite', '--quiet'], line, fault)
+    call check(error, .not. allocated(fault), 'a good command line was refused')
+    if (allocated(error)) return
+    call check(error, line%command//' '//line%argument//' '//line%output_directory, &
+      & 'run a.nml some/where')
+    if (allocated(error)) return
+    call check(error, line%threads, 4)
+    if (allocated(error)) return
+    call check(error, line%overwrite .and. line%quiet .and. .not. line%help)
+  end subroutine test_run
+
+  subroutine test_order(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: '--quiet', '--threads=2', 'run', '--output=a=b', &
+      & 'a.nml'], line, fault)
+    call check(error, .not. allocated(fault), 'a good command line was refused')
+    if (allocated(error)) return
+    call check(error, line%command//' '//line%argument//' '//line%output_directory, 'run a.nml a=b')
+    if (allocated(error)) return
+    call check(error, line%threads, 2)
+  end subroutine test_order
+
+  subroutine test_defaults(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'check', 'a.nml'], line, fault)
+    call check(error, .not. allocated(fault), 'a good command line was refused')
+    if (allocated(error)) return
+    call check(error, line%threads == 0 .and. .not. (line%overwrite .or. line%quiet .or. line%help))
+    if (allocated(error)) return
+    call check(error, len(line%output_directory), 0)
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'template'], line, fault)
+    call check(error, .not. allocated(fault), 'template needs no name')
+    if (allocated(error)) return
+    call check(error, len(line%argument), 0)
+  end subroutine test_defaults
+
+  subroutine test_dashes(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'run', '--', '--odd.nml'], line, fault)
+    call check(error, .not. allocated(fault), 'a good command line was refused')
+    if (allocated(error)) return
+    call check(error, line%argument, '--odd.nml')
+  end subroutine test_dashes
+
+  subroutine test_help(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+    character(:), allocatable :: name
+    integer :: i
+
+    do i = 1, size(command_names) - 1
+      name = trim(command_names(i))
+      call parse_command_line([character(w) :: 'help', name], line, fault)
+      call check(error, .not. allocated(fault), 'help '//name//' was refused')
+      if (allocated(error)) return
+      call check(error, line%help .and. line%command == name, name//' is not what help is given on')
+      if (allocated(error)) return
+      call check(error, index(help_text(name), 'perifort '//name), 1, 'no help on '//name)
+      if (allocated(error)) return
+      call check(error, index(help_text(''), 'perifort '//name//' ') > 0, &
+        & name//' is not in the help of the program')
+      if (allocated(error)) return
+    end do
+  end subroutine test_help
+
+  subroutine test_help_excuses(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'run', '-h'], line, fault)
+    call check(error, .not. allocated(fault) .and. line%help, 'run -h was refused')
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: '--help'], line, fault)
+    call check(error, .not. allocated(fault) .and. line%help, '--help was refused')
+    if (allocated(error)) return
+    call check(error, len(line%command), 0)
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'help'], line, fault)
+    call check(error, .not. allocated(fault) .and. line%help, 'help was refused')
+  end subroutine test_help_excuses
+
+  subroutine test_version(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: '--version'], line, fault)
+    call check(error, .not. allocated(fault), '--version was refused')
+    if (allocated(error)) return
+    call check(error, line%command, 'version')
+  end subroutine test_version
+
+  !> Each wrong line gives the status of a wrong command line and says the words that matter.
+  subroutine test_wrong(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(w), parameter :: none(0) = [character(w) ::]
+
+    call refused(error, none, 'no command')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run'], 'needs the scene file')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', 'b'], "found 'a' and 'b'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--output'], "'--output' needs a folder")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--output', '--quiet'], "'--output' needs")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--threads'], "'--threads' needs a number")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--threads', '0'], "found '0'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--threads', '-2'], "found '-2'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--threads', '2.5'], "found '2.5'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--threads', '99999999999'], "found '9999")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--quiet=yes'], 'takes no value')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--quiet', '--quiet'], 'given twice')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'check', 'a', '--overwrite'], "no option of 'check'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'version', 'a'], 'takes no argument')
+  end subroutine test_wrong
+
+  subroutine test_suggestions(error)
+    type(error_type), allocatable, intent(out) :: error
+
+    call refused(error, [character(w) :: 'rnu', 'a.nml'], "did you mean 'run'?")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'templat'], "did you mean 'template'?")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'a.nml'], "did you mean 'run a.nml'?")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--ouput', 'b'], "did you mean '--output'?")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--frob'], 'known: --output, --threads')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'help', 'chek'], "did you mean 'check'?")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--ouput', 'b'], 'see: perifort run --help')
+  end subroutine test_suggestions
+
+  !> Fail unless these arguments are refused with the right status and with these words.
+  subroutine refused(error, arguments, words)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in) :: arguments(:)
+    character(*), intent(in) :: words
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line(arguments, line, fault)
+    if (.not. allocated(fault)) then
+      call test_failed(error, 'accepted, but should be told: '//words)
+      return
+    end if
+    call check(error, fault%status, status_usage)
+    if (allocated(error)) return
+    call check(error, index(fault%message, words) > 0, words, 'said was: '//fault%message)
+  end subroutine refused
+
+end module test_command_line
