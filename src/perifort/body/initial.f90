@@ -1,0 +1,103 @@
+!> Initial state (7.8): displacement, velocity and temperature change of every point.
+module pd_body_initial
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type, fail
+  use pd_base_text, only: to_text
+  use pd_scene_types, only: scene_type, initial_group, is_set
+  use pd_scene_table, only: table_type, read_table
+  use pd_body_body, only: body_type
+  use pd_body_generate, only: touch
+  use pd_body_shapes, only: inside
+  implicit none (type, external)
+  private
+  public :: initial_state
+
+contains
+
+  !> The groups are applied in order, each setting what it names; `u` [m] and `v` [m/s] are
+  !> (n_slots, dim), `temperature_change` [K] (n_slots).
+  subroutine initial_state(scene, body, u, v, temperature_change, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    real(wp), allocatable, intent(out) :: u(:, :), v(:, :), temperature_change(:)
+    type(error_type), allocatable, intent(out) :: error
+    logical, allocatable :: chosen(:)
+    integer :: i, r
+
+    allocate (u(body%n_slots, body%dim), v(body%n_slots, body%dim), source=0.0_wp)
+    allocate (temperature_change(body%n_slots), source=0.0_wp)
+    do i = 1, size(scene%initial)
+      associate (group => scene%initial(i))
+        if (group%file /= '') then
+          call state_from_file(scene, group, body, u, v, temperature_change, error)
+          if (allocated(error)) return
+          cycle
+        end if
+        chosen = body%point > 0
+        do r = 1, size(scene%regions)
+          if (group%region == '' .or. scene%regions(r)%name /= group%region) cycle
+          chosen = chosen .and. inside(scene%regions(r), body%x, &
+            & touch*minval(body%spacing, mask=body%point > 0))
+        end do
+        call set_field(body, chosen, group%displacement, group%displacement_gradient, u)
+        call set_field(body, chosen, group%velocity, group%velocity_gradient, v)
+        if (is_set(group%temperature_change)) where (chosen) temperature_change = group%temperature_change
+      end associate
+    end do
+  end subroutine initial_state
+
+  !> Components that the group names become value + H x.
+  pure subroutine set_field(body, chosen, value, gradient, field)
+    type(body_type), intent(in) :: body
+    logical, intent(in) :: chosen(:)
+    real(wp), intent(in) :: value(3), gradient(3, 3)
+    real(wp), intent(inout) :: field(:, :)
+    real(wp) :: constant
+    integer :: c, k
+
+    do c = 1, body%dim
+      if (.not. is_set(value(c)) .and. all(abs(gradient(c, :)) <= 0.0_wp)) cycle
+      constant = merge(value(c), 0.0_wp, is_set(value(c)))
+      do k = 1, body%n_slots
+        if (chosen(k)) field(k, c) = constant + dot_product(gradient(c, :body%dim), body%x(k, :))
+      end do
+    end do
+  end subroutine set_field
+
+  !> Columns of a table, one row per point in the order of the results.
+  subroutine state_from_file(scene, group, body, u, v, temperature_change, error)
+    type(scene_type), intent(in) :: scene
+    type(initial_group), intent(in) :: group
+    type(body_type), intent(in) :: body
+    real(wp), intent(inout) :: u(:, :), v(:, :), temperature_change(:)
+    type(error_type), allocatable, intent(out) :: error
+    type(table_type) :: table
+    integer :: column, c
+
+    call read_table(scene%file, group%file, table, error)
+    if (allocated(error)) return
+    if (size(table%values, 2) /= body%n_points) then
+      call fail(error, 'the initial state in '//trim(group%file)//' has '// &
+        & to_text(size(table%values, 2))//' rows, but the scene has '//to_text(body%n_points)// &
+        & ' points (layers included): one row per point is expected, in the order of the results')
+      return
+    end if
+    do column = 1, size(table%names)
+      associate (name => trim(table%names(column)))
+        c = index('xyz', name(len(name):))
+        if (name == 'temperature_change') then
+          temperature_change(body%slot) = table%values(column, :)
+        else if (name(:len(name) - 1) == 'displacement_' .and. c >= 1 .and. c <= body%dim) then
+          u(body%slot, c) = table%values(column, :)
+        else if (name(:len(name) - 1) == 'velocity_' .and. c >= 1 .and. c <= body%dim) then
+          v(body%slot, c) = table%values(column, :)
+        else
+          call fail(error, "unknown column '"//name//"' in "//trim(group%file)//'; known: '// &
+            & 'displacement_x.., velocity_x.. (as many as the scene has dimensions), temperature_change')
+          return
+        end if
+      end associate
+    end do
+  end subroutine state_from_file
+
+end module pd_body_initial

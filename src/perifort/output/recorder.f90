@@ -1,0 +1,332 @@
+!> Writes what a run is asked to keep: outputs of fields, rows of history with energies, reactions
+!> and probes, and the progress line.
+module pd_output_recorder
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_clock, only: phase_timer_type, progress_type
+  use pd_base_error, only: error_type
+  use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_force_forces, only: energy_pass
+  use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
+  use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
+  use pd_output_results, only: results_type
+  use pd_output_types, only: column_type, field_type
+  implicit none (type, external)
+  private
+  public :: recorder_type, schedule_type, probe_type, field_of, history_columns, planned_outputs, &
+    & planned_rows
+
+  character(*), parameter :: xyz(3) = ['x', 'y', 'z']
+
+  !> When to write.
+  type :: schedule_type
+    logical :: relaxation = .false.
+    integer :: steps = 0                 !! explicit: steps of the run; relaxation: load steps
+    integer :: every = 1                 !! outputs: steps or load steps
+    real(wp) :: interval = 0.0_wp        !! outputs: time between them [s], if > 0 instead of every
+    integer :: history_every = 1         !! rows: steps, or iterations
+  end type schedule_type
+
+  !> A point whose values stand in every row of the history.
+  type :: probe_type
+    character(:), allocatable :: name
+    integer(i4) :: slot = 0_i4
+    type(field_type), allocatable :: fields(:)
+  end type probe_type
+
+  type, extends(observer_type) :: recorder_type
+    type(results_type) :: results
+    type(schedule_type) :: schedule
+    type(field_type), allocatable :: fields(:)
+    type(probe_type), allocatable :: probes(:)
+    type(progress_type) :: progress
+    type(phase_timer_type) :: timer
+    type(energies_type) :: energies          !! of the last row
+    type(energies_type) :: first_energies    !! of the first row
+    integer :: rows = 0
+    integer :: outputs = 0
+    integer :: steps_done = 0
+    real(wp) :: time = 0.0_wp
+  contains
+    procedure :: observe
+  end type recorder_type
+
+contains
+
+  !> A field by its name in the scene.
+  pure type(field_type) function field_of(name) result(field)
+    character(*), intent(in) :: name
+    field%name = name
+    select case (name)
+    case ('displacement'); field%components = 3; field%unit = 'm'
+    case ('velocity'); field%components = 3; field%unit = 'm/s'
+    case ('force_density'); field%components = 3; field%unit = 'N/m3'
+    case ('energy_density'); field%unit = 'J/m3'
+    case default; field%unit = '1'
+    end select
+  end function field_of
+
+  !> The columns of the history, in the order in which `observe` fills them.
+  function history_columns(system, probes, relaxation) result(columns)
+    type(system_type), intent(in) :: system
+    type(probe_type), intent(in) :: probes(:)
+    logical, intent(in) :: relaxation
+    type(column_type), allocatable :: columns(:)
+    integer :: m, c, p, f
+
+    columns = [column_type('step', '1'), column_type('time', 's'), column_type('kinetic_energy', 'J'), &
+      & column_type('strain_energy', 'J'), column_type('dissipated_energy', 'J'), &
+      & column_type('external_work', 'J'), column_type('broken_bonds', '1'), &
+      & column_type('maximum_damage', '1'), column_type('step_size', 's')]
+    if (relaxation) columns = [columns, column_type('residual', '1'), column_type('load_step', '1')]
+    do m = 1, size(system%motions)
+      if (system%motions(m)%name == '') cycle
+      do c = 1, system%body%dim
+        columns = [columns, column_type(system%motions(m)%name//'_reaction_'//xyz(c), 'N')]
+      end do
+    end do
+    do p = 1, size(probes)
+      do f = 1, size(probes(p)%fields)
+        associate (field => probes(p)%fields(f))
+          if (field%components == 1) then
+            columns = [columns, column_type(probes(p)%name//'_'//trim(field%name), field%unit)]
+          else
+            do c = 1, system%body%dim
+              columns = [columns, column_type(probes(p)%name//'_'//trim(field%name)//'_'//xyz(c), field%unit)]
+            end do
+          end if
+        end associate
+      end do
+    end do
+  end function history_columns
+
+  !> Number of outputs of a run: the first state, those due, and the final state.
+  pure integer function planned_outputs(schedule, dt) result(number)
+    type(schedule_type), intent(in) :: schedule
+    real(wp), intent(in) :: dt
+    integer :: step
+
+    number = 0
+    do step = 0, schedule%steps
+      if (output_due(schedule, step, dt) .or. step == schedule%steps) number = number + 1
+    end do
+  end function planned_outputs
+
+  !> Number of rows of a run; 0 if that isn't known beforehand.
+  pure integer function planned_rows(schedule) result(number)
+    type(schedule_type), intent(in) :: schedule
+    number = 0
+    if (schedule%relaxation) return
+    number = schedule%steps/schedule%history_every + 1
+    if (mod(schedule%steps, schedule%history_every) /= 0) number = number + 1
+  end function planned_rows
+
+  !> Whether step `step` is the first at or after a multiple of the interval, or a multiple of every.
+  pure logical function output_due(schedule, step, dt) result(due)
+    type(schedule_type), intent(in) :: schedule
+    integer, intent(in) :: step
+    real(wp), intent(in) :: dt
+
+    if (schedule%interval > 0.0_wp) then
+      due = step == 0
+      if (.not. due) due = count_of(step) > count_of(step - 1)
+    else
+      due = mod(step, schedule%every) == 0
+    end if
+
+  contains
+
+    !> Intervals complete at a step, where a hair short of one counts as one.
+    pure integer(i8) function count_of(n)
+      integer, intent(in) :: n
+      count_of = int(n*dt/schedule%interval*(1 + 1.0e-12_wp) + 1.0e-9_wp, i8)
+    end function count_of
+  end function output_due
+
+  !> Look at one instant: write what is due.
+  subroutine observe(observer, system, instant, error)
+    class(recorder_type), intent(inout) :: observer
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    type(error_type), allocatable, intent(out) :: error
+    logical :: row, output
+    real(wp), allocatable :: v(:, :)
+
+    associate (schedule => observer%schedule)
+      observer%steps_done = instant%step
+      observer%time = instant%time
+      if (schedule%relaxation) then
+        row = instant%settled .or. mod(instant%step, schedule%history_every) == 0
+        output = instant%settled .and. (instant%last .or. mod(instant%load_step, schedule%every) == 0)
+        call observer%progress%update(int(instant%load_step, i8) &
+          & - merge(0_i8, 1_i8, instant%settled .or. instant%load_step == 0), instant%time, system%broken, &
+          & relaxation_note(instant))
+      else
+        row = instant%last .or. mod(instant%step, schedule%history_every) == 0
+        output = instant%last .or. output_due(schedule, instant%step, instant%dt)
+        call observer%progress%update(int(instant%step, i8), instant%time, system%broken)
+      end if
+    end associate
+    if (.not. (row .or. output)) return
+    call observer%timer%stop('time stepping')
+    call velocities_now(system, instant, v)
+    if (row) then
+      call observer%timer%start('energies and history')
+      call write_row(observer, system, instant, v, error)
+      call observer%timer%stop('energies and history')
+      if (allocated(error)) return
+    end if
+    if (output) then
+      call observer%timer%start('output')
+      call write_output(observer, system, instant, v, error)
+      call observer%timer%stop('output')
+      if (allocated(error)) return
+    end if
+    call observer%timer%start('time stepping')
+  end subroutine observe
+
+  !> What the progress line adds in relaxation.
+  pure function relaxation_note(instant) result(note)
+    type(instant_type), intent(in) :: instant
+    character(:), allocatable :: note
+    character(48) :: text
+    write (text, '("iteration ",i0,", residual ",es8.1)') instant%step, instant%residual
+    note = trim(text)
+  end function relaxation_note
+
+  !> Velocities at the instant of the displacements [m/s].
+  subroutine velocities_now(system, instant, v)
+    type(system_type), intent(in) :: system
+    type(instant_type), intent(in) :: instant
+    real(wp), allocatable, intent(out) :: v(:, :)
+    integer :: k, c
+
+    allocate (v, source=system%state%v)
+    if (instant%kick <= 0.0_wp) return
+    do c = 1, size(v, 2)
+      !$omp parallel do schedule(static) default(none) shared(system, instant, v, c) private(k)
+      do k = 1, size(v, 1)
+        v(k, c) = v(k, c) + instant%kick*system%state%force(k, c)*inverse_density(system%model, k)
+      end do
+    end do
+    call add_loads(system, instant%time, instant%kick, .true., v)
+    where (system%held == 1) v = system%state%v
+  end subroutine velocities_now
+
+  !> One row of the history.
+  subroutine write_row(recorder, system, instant, v, error)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    real(wp), intent(in) :: v(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: row(:)
+    integer :: m, p, f
+
+    call energies_of(system, v, recorder%energies)
+    if (recorder%rows == 0) recorder%first_energies = recorder%energies
+    recorder%rows = recorder%rows + 1
+    row = [real(instant%step, wp), instant%time, recorder%energies%kinetic, recorder%energies%strain, &
+      & system%dissipated, system%external_work, real(system%broken, wp), maxval(system%state%damage), &
+      & instant%dt]
+    if (recorder%schedule%relaxation) row = [row, instant%residual, real(instant%load_step, wp)]
+    do m = 1, size(system%motions)
+      if (system%motions(m)%name /= '') row = [row, system%motions(m)%reaction(:system%body%dim)]
+    end do
+    do p = 1, size(recorder%probes)
+      do f = 1, size(recorder%probes(p)%fields)
+        row = [row, probe_values(system, recorder%probes(p)%fields(f), int(recorder%probes(p)%slot), v)]
+      end do
+    end do
+    call recorder%results%add_row(row, error)
+  end subroutine write_row
+
+  !> A field at one slot: the components the dimension has, or one value.
+  function probe_values(system, field, k, v) result(values)
+    type(system_type), intent(in) :: system
+    type(field_type), intent(in) :: field
+    integer, intent(in) :: k
+    real(wp), intent(in) :: v(:, :)
+    real(wp), allocatable :: values(:)
+    type(bonds_type) :: bonds
+
+    select case (field%name)
+    case ('displacement')
+      values = system%state%u(k, :)
+    case ('velocity')
+      values = v(k, :)
+    case ('force_density')
+      values = system%state%force(k, :)
+    case ('damage')
+      values = [system%state%damage(k)]
+    case default
+      call allocate_bonds(system%family, bonds)
+      call system%family%bonds_of(k, bonds)
+      if (field%name == 'dilatation') then
+        values = [point_dilatation(system%model, system%state%u, k, bonds)]
+      else
+        values = [point_energy(system%model, system%state%u, k, bonds)]
+      end if
+    end select
+  end function probe_values
+
+  !> One output of all fields, in point order.
+  subroutine write_output(recorder, system, instant, v, error)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    real(wp), intent(in) :: v(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer :: f
+
+    call recorder%results%begin_output(instant%time, error)
+    if (allocated(error)) return
+    do f = 1, size(recorder%fields)
+      select case (recorder%fields(f)%name)
+      case ('displacement')
+        call put_vectors(system%state%u)
+      case ('velocity')
+        call put_vectors(v)
+      case ('force_density')
+        call put_vectors(system%state%force)
+      case ('damage')
+        call put_scalars(system%state%damage)
+      case ('dilatation')
+        allocate (values(system%body%n_slots))
+        call reference_dilatation(system%family, system%model, system%state%u, values)
+        call put_scalars(values)
+      case ('energy_density')
+        allocate (values(system%body%n_slots))
+        call energy_pass(system%family, system%model, system%state%u, values, system%strained)
+        call put_scalars(values)
+      end select
+      if (allocated(error)) return
+      if (allocated(values)) deallocate (values)
+    end do
+    call recorder%results%end_output(error)
+    recorder%outputs = recorder%outputs + 1
+
+  contains
+
+    subroutine put_vectors(of_slots)
+      real(wp), intent(in) :: of_slots(:, :)
+      real(wp), allocatable :: of_points(:, :)
+      integer :: i, c
+
+      allocate (of_points(system%body%n_points, 3), source=0.0_wp)
+      do c = 1, system%body%dim
+        do i = 1, system%body%n_points
+          of_points(i, c) = of_slots(system%body%slot(i), c)
+        end do
+      end do
+      call recorder%results%put_field(f, of_points, error)
+    end subroutine put_vectors
+
+    subroutine put_scalars(of_slots)
+      real(wp), intent(in) :: of_slots(:)
+      call recorder%results%put_field(f, of_slots(system%body%slot), error)
+    end subroutine put_scalars
+  end subroutine write_output
+
+end module pd_output_recorder
