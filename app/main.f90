@@ -1,6 +1,24 @@
+!> Arguments -> one command -> exit status.
 program main
-  use pd_scene_types, only: scene_type
+  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use pd_base_error, only: error_type
+  use pd_command_line, only: command_line_type, read_command_line
+  use pd_commands, only: execute
   implicit none (type, external)
-  type(scene_type) :: scene
-  print *, scene%horizon%ratio
+
+  type(command_line_type) :: line
+  type(error_type), allocatable :: error
+  integer :: status
+
+  call read_command_line(line, error)
+  if (.not. allocated(error)) call execute(line, error)
+
+  status = 0
+  if (allocated(error)) then
+    flush (output_unit)
+    write (error_unit, '(2a)') 'error: ', error%message
+    status = error%status
+  end if
+  ! Quiet: the notes on floating-point flags that gfortran adds to `stop` say nothing to a user.
+  stop status, quiet=.true.
 end program main
