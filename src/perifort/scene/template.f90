@@ -59,8 +59,8 @@ contains
       return
     end select
     text = '! '//trim(scene%header%title)//newline// &
-      & '! Values are in SI units. Keys behind a ''!'' are at the default that is shown, or not '// &
-      & 'needed here.'//newline// &
+      & "! Values are in SI units. Keys behind a '!' are at the default that is shown, or not "// &
+      & 'needed.'//newline// &
       & '! Templates: '//join(template_names, ', ')//newline//newline//commented_text(scene)
   end subroutine template_text
 
