@@ -17,7 +17,8 @@ contains
 
   !> Check a scene and complete it: afterwards every list is allocated, every body has its
   !> material, Poisson's ratios, ramps, the factor of relaxation and the lists of fields are the
-  !> ones to compute with. `source` gives the messages their places. A complete scene stays as it is.
+  !> ones to compute with. `source` gives the messages their places. A complete scene stays as it
+  !> is.
   subroutine check_scene(scene, error, source)
     type(scene_type), intent(inout) :: scene
     type(error_type), allocatable, intent(out) :: error

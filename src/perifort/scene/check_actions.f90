@@ -190,7 +190,8 @@ contains
     if (allocated(error)) return
     cloud = .false.
     do i = 1, size(scene%bodies)
-      if (body == '' .or. scene%bodies(i)%name == body) cloud = cloud .or. scene%bodies(i)%file /= ''
+      if (body /= '' .and. scene%bodies(i)%name /= body) cycle
+      cloud = cloud .or. scene%bodies(i)%file /= ''
     end do
     if (cloud) call rule_fault(error, group, number, 'side', &
       & "a 'side' of a body that is a cloud", "a cloud has no sides; use a 'region'", source)

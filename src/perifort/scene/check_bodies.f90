@@ -40,7 +40,8 @@ contains
       lattice = any(is_set(body%lower)) .or. any(is_set(body%upper)) .or. any(body%points /= 0)
       if (body%file /= '') then
         if (lattice) then
-          call rule_fault(error, 'body', number, 'file', 'a body is a lattice or a cloud, not both', &
+          call rule_fault(error, 'body', number, 'file', &
+            & 'a body is a lattice or a cloud, not both', &
             & "give either 'file' or 'lower', 'upper' and 'points'", source)
         else
           call check_file(body%file, scene%file, 'body', number, error, source)
@@ -245,7 +246,8 @@ contains
           & "group &material lacks the key 'density'", &
           & 'explicit steps in time need the mass density [kg/m3]', source)
       else
-        call check_ratio(material, scene%header%dimension, scene%header%plane, number, error, source)
+        call check_ratio(material, scene%header%dimension, scene%header%plane, number, error, &
+          & source)
       end if
       ! Relaxation has a mass of its own; 1 keeps what is derived from the density finite.
       if (.not. is_set(material%density)) material%density = 1.0_wp

@@ -140,7 +140,7 @@ contains
       if (comma == 0) comma = len(rest) + 1
       part = rest(:comma - 1)
       if ((comma > len(rest)) .neqv. (d == size(extents))) then
-        call bad('expected '//to_text(size(extents))//' subscript'//merge('s', ' ', size(extents) > 1))
+        call bad('expected '//to_text(size(extents))//' subscripts')
         return
       end if
       rest = rest(min(comma + 1, len(rest) + 1):)

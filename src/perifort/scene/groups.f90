@@ -4,7 +4,7 @@
 !> Defaults are those of the types in `pd_scene_types`.
 module pd_scene_groups
   use pd_base_kinds, only: wp
-  use pd_scene_keys, only: keys_type, mode_describe
+  use pd_scene_keys, only: keys_type, mode_describe, mode_write
   use pd_scene_types, only: header_type, body_group, shape_group, material_group, horizon_group, &
     & crack_group, initial_group, boundary_group, load_group, time_group, relaxation_group, &
     & output_group, probe_group, is_set
@@ -13,8 +13,8 @@ module pd_scene_groups
   public :: visit_scene_header, visit_body, visit_remove, visit_region, visit_material, &
     & visit_horizon, visit_crack, visit_no_fail, visit_initial, visit_boundary, visit_load, &
     & visit_time, visit_relaxation, visit_output, visit_probe
-  public :: group_names, shape_names, group_repeatable, group_purpose, describe_group, field_names, sides, &
-    & default_fields, default_probe_fields
+  public :: group_names, shape_names, field_names, sides, default_fields, default_probe_fields
+  public :: group_repeatable, group_purpose, describe_group
 
   character(10), parameter :: group_names(15) = [character(10) :: 'scene', 'body', 'remove', &
     & 'region', 'material', 'horizon', 'crack', 'no_fail', 'initial', 'boundary', 'load', 'time', &
@@ -170,8 +170,8 @@ contains
     call keys%key('upper', group%upper, 'm', 'lattice: upper corner')
     call keys%key('points', group%points, '', 'lattice: points along each direction, at the '// &
       & 'centres of cubic cells', at_least=1)
-    call keys%key('file', group%file, 'cloud instead of a lattice: a text file with the columns '// &
-      & "x y z volume, '#' starts a comment")
+    call keys%key('file', group%file, 'cloud instead of a lattice: a text file with the '// &
+      & "columns x y z volume, '#' starts a comment")
   end subroutine visit_body
 
   !> `&remove`
@@ -205,20 +205,21 @@ contains
     type(keys_type), intent(inout) :: keys
     type(shape_group), intent(inout) :: group
     logical, intent(in) :: required
-    logical :: box, describe
+    logical :: plain
 
-    describe = keys%mode == mode_describe
-    box = group%shape == 'box' .or. describe
+    ! Written: only keys that the kind of shape has. Reading starts before the kind is known.
+    plain = keys%mode == mode_write .and. group%shape /= 'sphere' .and. group%shape /= 'cylinder'
     call keys%key('shape', group%shape, 'kind of shape; in 2D a sphere is a circle', &
       & required=required, allowed=shape_names)
-    call keys%key('lower', group%lower, 'm', "box: lower corner; cylinder: its lower end along "// &
+    call keys%key('lower', group%lower, 'm', 'box: lower corner; cylinder: its lower end along '// &
       & 'the axis', default='unbounded')
-    call keys%key('upper', group%upper, 'm', "box: upper corner; cylinder: its upper end along "// &
+    call keys%key('upper', group%upper, 'm', 'box: upper corner; cylinder: its upper end along '// &
       & 'the axis', default='unbounded')
     call keys%key('centre', group%centre, 'm', 'sphere: centre; cylinder: a point of the axis', &
-      & hidden=box .and. .not. describe)
+      & hidden=plain)
     call keys%key('radius', group%radius, 'm', 'sphere, cylinder: radius', above=0.0_wp)
-    call keys%key('axis', group%axis, 'cylinder: direction of the axis', allowed=axes)
+    call keys%key('axis', group%axis, 'cylinder: direction of the axis', allowed=axes, &
+      & hidden=keys%mode == mode_write .and. group%shape /= 'cylinder')
   end subroutine visit_shape
 
   !> `&material`
@@ -231,8 +232,8 @@ contains
       & "Poisson's ratio only", allowed=[character(11) :: 'state_based', 'bond_based'])
     call keys%key('youngs_modulus', group%youngs_modulus, 'Pa', "Young's modulus E", &
       & required=.true., above=0.0_wp)
-    call keys%key('poissons_ratio', group%poissons_ratio, '-', "Poisson's ratio nu; -1 < nu < "// &
-      & '1/2, in plane stress < 1', default='bond_based: 1/4 (3D, plane strain), 1/3 '// &
+    call keys%key('poissons_ratio', group%poissons_ratio, '-', "Poisson's ratio nu, below 1/2 "// &
+      & 'except in plane stress', default='bond_based: 1/4 (3D, plane strain), 1/3 '// &
       & '(plane stress); 1D: 0; else required', above=-1.0_wp, below=1.0_wp)
     call keys%key('ignore_poissons_ratio', group%ignore_poissons_ratio, 'bond_based: accept '// &
       & "another Poisson's ratio and compute with the one that the model has")
@@ -352,8 +353,8 @@ contains
       & allowed=[character(16) :: 'forward_backward', 'velocity_verlet', 'adams_bashforth', &
       & 'adams_moulton', 'runge_kutta'])
     call keys%key('step', group%step, 's', 'time step, instead of safety', above=0.0_wp)
-    call keys%key('safety', group%safety, '-', "the time step as a fraction of the integrator's "// &
-      & 'limit (7.25)', above=0.0_wp, hidden=is_set(group%step))
+    call keys%key('safety', group%safety, '-', 'the time step as a fraction of the '// &
+      & "integrator's limit (7.25)", above=0.0_wp, hidden=is_set(group%step))
     call keys%key('steps', group%steps, '', 'number of steps', at_least=1, &
       & default='explicit: steps or duration is required', hidden=group%steps == 0)
     call keys%key('duration', group%duration, 's', 'time to compute, instead of steps', &

@@ -8,11 +8,13 @@
 module pd_scene_keys
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
-  use pd_base_text, only: join, lower_case, nearest_name, newline, to_text
+  use pd_base_text, only: join, nearest_name, to_text
+  use pd_scene_convert, only: to_real, to_integer, to_logical, to_string, real_range, &
+    & integer_range, unit_note
   use pd_scene_elements, only: find_elements, growing
-  use pd_scene_source, only: source_type, token_type, source_fault
+  use pd_scene_source, only: source_type, source_fault
   use pd_scene_types, only: is_set
-  use pd_scene_values, only: exact_text, parse_integer, parse_logical, parse_real, quoted_text
+  use pd_scene_values, only: exact_text, list_text, quoted_text
   implicit none (type, external)
   private
   public :: keys_type, key_info, mode_read, mode_describe, mode_write
@@ -53,7 +55,7 @@ module pd_scene_keys
     generic :: key => text_key, integer_key, real_key, logical_key, integers_key, reals_key, &
       & matrix_key
     generic :: list => real_list, text_list
-    procedure, private :: note_key, complain, note_missing, find, to_real
+    procedure, private :: note_key, complain, note_missing, find
   end type keys_type
 
 contains
@@ -116,8 +118,8 @@ contains
   end subroutine finish_reading
 
   !> A text. `allowed`: the only values, matched in any case; `word`: a name that may stand in
-  !> column headers, so letters, digits, `_` and `-` only.
-  subroutine text_key(keys, name, value, meaning, required, allowed, default, word)
+  !> column headers, so letters, digits, `_` and `-` only; `hidden`: not to be written.
+  subroutine text_key(keys, name, value, meaning, required, allowed, default, word, hidden)
     class(keys_type), intent(inout) :: keys
     character(*), intent(in) :: name
     character(*), intent(inout) :: value
@@ -125,26 +127,24 @@ contains
     logical, intent(in), optional :: required
     character(*), intent(in), optional :: allowed(:)
     character(*), intent(in), optional :: default
-    logical, intent(in), optional :: word
-    character(:), allocatable :: choice, shown
+    logical, intent(in), optional :: word, hidden
+    character(:), allocatable :: choice, shown, message, note
     integer, allocatable :: slots(:)
-    integer :: i
 
     choice = ''
-    if (present(allowed)) then
-      do i = 1, size(allowed)
-        if (i > 1) choice = choice//', '
-        choice = choice//quoted_text(trim(allowed(i)))
-      end do
-    end if
+    if (present(allowed)) choice = list_text(allowed)
     shown = ''
     if (len_trim(value) > 0) shown = quoted_text(trim(value))
+    if (present(hidden)) then
+      if (hidden) shown = ''
+    end if
     call keys%note_key(name, 'text', '', meaning, shown, choice, required, default)
     if (keys%mode /= mode_read) return
     call keys%find(name, [integer ::], slots)
     call keys%note_missing(name, size(slots) == 0, required)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call to_string(keys, keys%source%tokens(slots(1)), name, value, allowed, word)
+    call to_string(keys%source%tokens(slots(1)), name, value, message, note, allowed, word)
+    call keys%complain(slots(1), message, note)
   end subroutine text_key
 
   !> A whole number within `at_least` and `at_most`.
@@ -159,7 +159,7 @@ contains
     character(*), intent(in), optional :: default
     logical, intent(in), optional :: hidden
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown
+    character(:), allocatable :: shown, message, note
 
     shown = to_text(value)
     if (present(hidden)) then
@@ -171,7 +171,8 @@ contains
     call keys%find(name, [integer ::], slots)
     call keys%note_missing(name, size(slots) == 0, required)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call to_integer(keys, keys%source%tokens(slots(1)), name, value, at_least, at_most)
+    call to_integer(keys%source%tokens(slots(1)), name, value, message, note, at_least, at_most)
+    call keys%complain(slots(1), message, note)
   end subroutine integer_key
 
   !> A real within the open bounds `above`, `below` and the closed ones `at_least`, `at_most`.
@@ -186,7 +187,7 @@ contains
     character(*), intent(in), optional :: default
     logical, intent(in), optional :: hidden
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown
+    character(:), allocatable :: shown, message, note
 
     shown = ''
     if (is_set(value)) shown = exact_text(value)
@@ -199,8 +200,9 @@ contains
     call keys%find(name, [integer ::], slots)
     call keys%note_missing(name, size(slots) == 0, required)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call keys%to_real(keys%source%tokens(slots(1)), name, unit, value, above, below, at_least, &
-      & at_most)
+    call to_real(keys%source%tokens(slots(1)), name, unit, value, message, note, above, below, &
+      & at_least, at_most)
+    call keys%complain(slots(1), message, note)
   end subroutine real_key
 
   !> True or false.
@@ -210,22 +212,14 @@ contains
     logical, intent(inout) :: value
     character(*), intent(in) :: meaning
     integer, allocatable :: slots(:)
-    character(:), allocatable :: note
-    logical :: found
+    character(:), allocatable :: message, note
 
     call keys%note_key(name, 'logical', '', meaning, '.'//to_text(value)//'.', '')
     if (keys%mode /= mode_read) return
     call keys%find(name, [integer ::], slots)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    associate (token => keys%source%tokens(slots(1)))
-      call parse_logical(token%text, found, note)
-      if (token%quoted) note = 'expected .true. or .false. without quotes'
-      if (len(note) > 0) then
-        call keys%complain(token, bad_value(token, name), note)
-      else
-        value = found
-      end if
-    end associate
+    call to_logical(keys%source%tokens(slots(1)), name, value, message, note)
+    call keys%complain(slots(1), message, note)
   end subroutine logical_key
 
   !> Whole numbers along the directions.
@@ -238,7 +232,7 @@ contains
     integer, intent(in), optional :: at_least
     character(*), intent(in), optional :: default
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown
+    character(:), allocatable :: shown, message, note
     integer :: i
 
     shown = ''
@@ -254,7 +248,8 @@ contains
     call keys%note_missing(name, size(slots) == 0, required)
     do i = 1, size(slots)
       if (slots(i) == 0 .or. allocated(keys%fault)) cycle
-      call to_integer(keys, keys%source%tokens(slots(i)), name, value(i), at_least)
+      call to_integer(keys%source%tokens(slots(i)), name, value(i), message, note, at_least)
+      call keys%complain(slots(i), message, note)
     end do
   end subroutine integers_key
 
@@ -269,15 +264,12 @@ contains
     logical, intent(in), optional :: hidden
     integer, allocatable :: slots(:)
     integer :: i, last
-    character(:), allocatable :: shown
+    character(:), allocatable :: shown, message, note
 
     shown = ''
     last = count(is_set(value))
     if (all(is_set(value(:last)))) then
-      do i = 1, last
-        if (i > 1) shown = shown//', '
-        shown = shown//exact_text(value(i))
-      end do
+      shown = list_text(value(:last))
     else
       ! A gap: the elements are spelled one by one, the first without its own key name.
       do i = 1, size(value)
@@ -297,7 +289,8 @@ contains
     call keys%note_missing(name, size(slots) == 0, required)
     do i = 1, size(slots)
       if (slots(i) == 0 .or. allocated(keys%fault)) cycle
-      call keys%to_real(keys%source%tokens(slots(i)), name, unit, value(i))
+      call to_real(keys%source%tokens(slots(i)), name, unit, value(i), message, note)
+      call keys%complain(slots(i), message, note)
     end do
   end subroutine reals_key
 
@@ -308,19 +301,12 @@ contains
     real(wp), intent(inout) :: value(:, :)
     character(*), intent(in) :: unit, meaning
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown
+    character(:), allocatable :: shown, message, note
     integer :: i, j, k
 
     shown = ''
     if (keys%mode == mode_describe) shown = '0.0'
-    if (any(abs(value) > 0.0_wp)) then
-      do j = 1, size(value, 2)
-        do i = 1, size(value, 1)
-          if (i*j > 1) shown = shown//', '
-          shown = shown//exact_text(value(i, j))
-        end do
-      end do
-    end if
+    if (any(abs(value) > 0.0_wp)) shown = list_text([value])
     call keys%note_key(name, 'real('//to_text(size(value, 1))//','//to_text(size(value, 2))//')', &
       & unit, meaning, shown, '')
     if (keys%mode /= mode_read) return
@@ -329,7 +315,8 @@ contains
       if (slots(k) == 0 .or. allocated(keys%fault)) cycle
       i = modulo(k - 1, size(value, 1)) + 1
       j = (k - i)/size(value, 1) + 1
-      call keys%to_real(keys%source%tokens(slots(k)), name, unit, value(i, j))
+      call to_real(keys%source%tokens(slots(k)), name, unit, value(i, j), message, note)
+      call keys%complain(slots(k), message, note)
     end do
   end subroutine matrix_key
 
@@ -357,16 +344,11 @@ contains
     character(*), intent(in) :: unit, meaning
     character(*), intent(in), optional :: default
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown
+    character(:), allocatable :: shown, message, note
     integer :: i
 
     shown = ''
-    if (allocated(value)) then
-      do i = 1, size(value)
-        if (i > 1) shown = shown//', '
-        shown = shown//exact_text(value(i))
-      end do
-    end if
+    if (allocated(value)) shown = list_text(value)
     call keys%note_key(name, 'real list', unit, meaning, shown, '', default=default)
     if (keys%mode /= mode_read) return
     call keys%find(name, growing, slots)
@@ -376,7 +358,8 @@ contains
     if (allocated(value)) deallocate (value)
     allocate (value(size(slots)), source=0.0_wp)
     do i = 1, size(slots)
-      call keys%to_real(keys%source%tokens(slots(i)), name, unit, value(i))
+      call to_real(keys%source%tokens(slots(i)), name, unit, value(i), message, note)
+      call keys%complain(slots(i), message, note)
       if (allocated(keys%fault)) return
     end do
   end subroutine real_list
@@ -390,22 +373,12 @@ contains
     character(*), intent(in) :: allowed(:)
     character(*), intent(in), optional :: default
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown, choice
+    character(:), allocatable :: shown, message, note
     integer :: i
 
     shown = ''
-    choice = ''
-    if (allocated(value)) then
-      do i = 1, size(value)
-        if (i > 1) shown = shown//', '
-        shown = shown//quoted_text(trim(value(i)))
-      end do
-    end if
-    do i = 1, size(allowed)
-      if (i > 1) choice = choice//', '
-      choice = choice//quoted_text(trim(allowed(i)))
-    end do
-    call keys%note_key(name, 'text list', '', meaning, shown, choice, default=default)
+    if (allocated(value)) shown = list_text(value)
+    call keys%note_key(name, 'text list', '', meaning, shown, list_text(allowed), default=default)
     if (keys%mode /= mode_read) return
     call keys%find(name, growing, slots)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
@@ -415,11 +388,12 @@ contains
     allocate (value(size(slots)))
     do i = 1, size(slots)
       value(i) = ''
-      call to_string(keys, keys%source%tokens(slots(i)), name, value(i), allowed)
+      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, allowed)
+      call keys%complain(slots(i), message, note)
       if (allocated(keys%fault)) return
       if (any(value(:i - 1) == value(i))) then
-        call keys%complain(keys%source%tokens(slots(i)), "'"//trim(value(i))// &
-          & "' stands twice in '"//name//"'", 'once is enough')
+        call keys%complain(slots(i), "'"//trim(value(i))//"' stands twice in '"//name//"'", &
+          & 'once is enough')
         return
       end if
     end do
@@ -467,15 +441,17 @@ contains
     if (allocated(error) .and. .not. allocated(keys%fault)) call move_alloc(error, keys%fault)
   end subroutine find
 
-  !> Keep the first fault of a value.
+  !> Keep the first fault of a value; a message '' is none.
   subroutine complain(keys, token, message, note)
     class(keys_type), intent(inout) :: keys
-    type(token_type), intent(in) :: token
+    integer, intent(in) :: token
     character(*), intent(in) :: message, note
 
-    if (allocated(keys%fault)) return
-    call source_fault(keys%source, token%line, token%column, token%width, message// &
-      & ' in group &'//keys%source%sections(keys%section)%name, note, keys%fault)
+    if (allocated(keys%fault) .or. len(message) == 0) return
+    associate (place => keys%source%tokens(token))
+      call source_fault(keys%source, place%line, place%column, place%width, message// &
+        & ' in group &'//keys%source%sections(keys%section)%name, note, keys%fault)
+    end associate
   end subroutine complain
 
   !> Keep the first required key that is missing.
@@ -504,153 +480,10 @@ contains
 
     do i = 1, size(slots)
       if (slots(i) /= 0) cycle
-      call keys%complain(keys%source%tokens(slots(size(slots))), "'"//name//'('// &
+      call keys%complain(slots(size(slots)), "'"//name//'('// &
         & to_text(i)//")' is not given", 'element '//to_text(size(slots))//' needs all before it')
       return
     end do
   end subroutine check_gaps
-
-  !> A token as a real within bounds.
-  subroutine to_real(keys, token, name, unit, value, above, below, at_least, at_most)
-    class(keys_type), intent(inout) :: keys
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name, unit
-    real(wp), intent(inout) :: value
-    real(wp), intent(in), optional :: above, below, at_least, at_most
-    character(:), allocatable :: note
-    real(wp) :: found
-    logical :: inside
-
-    call parse_real(token%text, found, note)
-    if (token%quoted) note = 'expected a number without quotes'
-    if (len(note) > 0) then
-      call keys%complain(token, bad_value(token, name), note//unit_note(unit))
-      return
-    end if
-    inside = .true.
-    if (present(above)) inside = inside .and. found > above
-    if (present(below)) inside = inside .and. found < below
-    if (present(at_least)) inside = inside .and. found >= at_least
-    if (present(at_most)) inside = inside .and. found <= at_most
-    if (inside) then
-      value = found
-    else
-      call keys%complain(token, "'"//name//"' is out of range", 'expected '// &
-        & real_range(above, below, at_least, at_most)//unit_note(unit))
-    end if
-  end subroutine to_real
-
-  !> A token as a whole number within bounds.
-  subroutine to_integer(keys, token, name, value, at_least, at_most)
-    class(keys_type), intent(inout) :: keys
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value
-    integer, intent(in), optional :: at_least, at_most
-    character(:), allocatable :: note
-    integer :: found
-    logical :: inside
-
-    call parse_integer(token%text, found, note)
-    if (token%quoted) note = 'expected a whole number without quotes'
-    if (len(note) > 0) then
-      call keys%complain(token, bad_value(token, name), note)
-      return
-    end if
-    inside = .true.
-    if (present(at_least)) inside = inside .and. found >= at_least
-    if (present(at_most)) inside = inside .and. found <= at_most
-    if (inside) then
-      value = found
-    else
-      call keys%complain(token, "'"//name//"' is out of range", &
-        & 'expected '//integer_range(at_least, at_most))
-    end if
-  end subroutine to_integer
-
-  !> A token as a text, checked for length, choice and characters.
-  subroutine to_string(keys, token, name, value, allowed, word)
-    class(keys_type), intent(inout) :: keys
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
-    character(*), intent(inout) :: value
-    character(*), intent(in), optional :: allowed(:)
-    logical, intent(in), optional :: word
-    character(*), parameter :: word_characters = &
-      & 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-'
-    character(:), allocatable :: note, nearest
-    integer :: i
-
-    if (.not. token%quoted) then
-      call keys%complain(token, bad_value(token, name), "expected a text in quotes, such as '"// &
-        & token%text//"'")
-    else if (len_trim(token%text) == 0) then
-      call keys%complain(token, "empty text for key '"//name//"'", &
-        & 'expected at least one character; leave the key out for its default')
-    else if (len_trim(token%text) > len(value)) then
-      call keys%complain(token, "the text for key '"//name//"' is too long", &
-        & to_text(len_trim(token%text))//' characters, at most '//to_text(len(value)))
-    else if (present(allowed)) then
-      do i = 1, size(allowed)
-        if (lower_case(trim(token%text)) == lower_case(trim(allowed(i)))) then
-          value = allowed(i)
-          return
-        end if
-      end do
-      nearest = nearest_name(token%text, allowed)
-      note = 'allowed: '//join(allowed, ', ')
-      if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note
-      call keys%complain(token, "unknown value '"//token%text//"' of key '"//name//"'", note)
-    else
-      if (present(word)) then
-        if (word .and. verify(trim(token%text), word_characters) > 0) then
-          call keys%complain(token, bad_value(token, name), &
-            & 'names are made of letters, digits, _ and -')
-          return
-        end if
-      end if
-      value = token%text
-    end if
-  end subroutine to_string
-
-  !> The first half of a message on a value.
-  pure function bad_value(token, name) result(message)
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
-    character(:), allocatable :: message
-    message = "bad value '"//token%text//"' for key '"//name//"'"
-  end function bad_value
-
-  !> ` [Pa]`, or nothing without a unit.
-  pure function unit_note(unit) result(note)
-    character(*), intent(in) :: unit
-    character(:), allocatable :: note
-    note = ''
-    if (len(unit) > 0 .and. unit /= '-') note = ' ['//unit//']'
-  end function unit_note
-
-  !> Bounds of a real in words, '' without any.
-  function real_range(above, below, at_least, at_most) result(range)
-    real(wp), intent(in), optional :: above, below, at_least, at_most
-    character(:), allocatable :: range
-
-    range = ''
-    if (present(above)) range = '> '//to_text(above)
-    if (present(at_least)) range = '>= '//to_text(at_least)
-    if (len(range) > 0 .and. (present(below) .or. present(at_most))) range = range//' and '
-    if (present(below)) range = range//'< '//to_text(below)
-    if (present(at_most)) range = range//'<= '//to_text(at_most)
-  end function real_range
-
-  !> Bounds of a whole number in words, '' without any.
-  function integer_range(at_least, at_most) result(range)
-    integer, intent(in), optional :: at_least, at_most
-    character(:), allocatable :: range
-
-    range = ''
-    if (present(at_least)) range = '>= '//to_text(at_least)
-    if (present(at_least) .and. present(at_most)) range = range//' and '
-    if (present(at_most)) range = range//'<= '//to_text(at_most)
-  end function integer_range
 
 end module pd_scene_keys

@@ -7,10 +7,15 @@ module pd_scene_values
   use pd_base_text, only: lower_case, to_text
   implicit none (type, external)
   private
-  public :: parse_real, parse_integer, parse_logical, exact_text, quoted_text
+  public :: parse_real, parse_integer, parse_logical, exact_text, quoted_text, list_text
 
   character(*), parameter :: digits = '0123456789'
   integer, parameter :: largest_exponent = 300  !! beyond it a sum of squares overflows anyway
+
+  !> Values as they stand after a key, parted by commas.
+  interface list_text
+    module procedure :: reals_text, texts_text
+  end interface list_text
 
 contains
 
@@ -134,5 +139,31 @@ contains
     end do
     quoted = quoted//"'"
   end function quoted_text
+
+  !> Reals parted by commas.
+  function reals_text(values) result(text)
+    real(wp), intent(in) :: values(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(values)
+      if (i > 1) text = text//', '
+      text = text//exact_text(values(i))
+    end do
+  end function reals_text
+
+  !> Quoted texts parted by commas.
+  pure function texts_text(values) result(text)
+    character(*), intent(in) :: values(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(values)
+      if (i > 1) text = text//', '
+      text = text//quoted_text(trim(values(i)))
+    end do
+  end function texts_text
 
 end module pd_scene_values
