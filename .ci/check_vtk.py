@@ -1,122 +1,116 @@
-"""Open a results file with h5py and, as ParaView does, with vtk as a time series; compare the two.
+#!/usr/bin/env python3
+"""Open results as other programs do and step through their times.
 
-    check_vtk.py NAME.vtkhdf
+    check_vtk.py NAME.vtkhdf [NAME.pvd] [--partial]
+
+The HDF5 file is read with h5py and with VTK's own reader, the .pvd series with VTK's XML reader; where both are
+given their values must agree. --partial: the file's writer did not live to close it.
 """
-import csv
 import sys
+import xml.etree.ElementTree as tree
 from pathlib import Path
 
 import h5py
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as pipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
-
-HISTORY = ["step", "time", "kinetic_energy", "strain_energy", "dissipated_energy", "external_work",
-           "broken_bonds", "maximum_damage", "step_size"]
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 
-def require(condition, message):
-    if not condition:
-        sys.exit(f"check_vtk: {message}")
+def arrays_of(data):
+    """The point arrays of a VTK data set by name."""
+    point_data = data.GetPointData()
+    return {point_data.GetArrayName(i): vtk_to_numpy(point_data.GetArray(i))
+            for i in range(point_data.GetNumberOfArrays())}
 
 
-def read_with_h5py(path):
-    """Points, times, {name: values of every step}, and the checks of what vtk ignores."""
+def check_hdf(path, partial):
+    """Check the file's own consistency, then that VTK sees the same numbers in every step."""
     with h5py.File(path, "r") as file:
         root = file["VTKHDF"]
-        kind = root.attrs["Type"]
-        require((kind.decode() if isinstance(kind, bytes) else kind) == "PolyData", f"type {kind}")
-        require(list(root.attrs["Version"]) == [2, 0], "layout version")
-        points = root["Points"][()]
-        n = len(points)
-        require(points.shape == (n, 3) and n > 0, f"points have the shape {points.shape}")
-        require(list(root["NumberOfPoints"][()]) == [n], "NumberOfPoints")
-        steps = root["Steps"]
-        count = int(steps.attrs["NSteps"])
-        times = steps["Values"][:count]
-        require(count >= 2, f"{count} steps are no time series")
-        require(len(times) == count and np.all(np.diff(times) > 0), f"times {times}")
-        require(not np.any(steps["PointOffsets"][:count]), "points are written once")
-        fields = {}
+        assert list(root.attrs["Version"]) == [2, 0] and root.attrs["Type"] in (b"PolyData", "PolyData")
+        points = root["Points"][:]
+        steps = int(root["Steps"].attrs["NSteps"])
+        times = root["Steps/Values"][:steps]
+        fields = {name: data[:steps * len(points)] for name, data in root["PointData"].items()}
         for name, data in root["PointData"].items():
-            offsets = steps["PointDataOffsets"][name][:count]
-            require(list(offsets) == [k * n for k in range(count)], f"offsets of {name}")
-            require(data.shape[0] >= count * n, f"{name} has {data.shape[0]} rows")
-            values = data[:count * n]
-            require(np.all(np.isfinite(values)), f"{name} is not finite")
-            fields[name] = values.reshape(count, n, *values.shape[1:])
-        require(len(fields) > 0, "no field was written")
+            assert "units" in data.attrs, f"{name} has no units"
+            if not partial:
+                assert len(data) == steps * len(points), f"{name}: {len(data)} rows for {steps} steps"
+        if not partial:
+            for name, data in root["Steps"].items():
+                if isinstance(data, h5py.Dataset):
+                    assert len(data) == steps, f"Steps/{name}: {len(data)} entries for {steps} steps"
+        rows = int(file["history"].attrs["rows"])
+        for name, data in file["history"].items():
+            assert "units" in data.attrs, f"history/{name} has no units"
+            assert len(data) >= rows if partial else len(data) == rows, f"history/{name}: {len(data)}, not {rows}"
+        for name, data in file["points"].items():
+            assert len(data) == len(points), f"points/{name}: {len(data)} values for {len(points)} points"
+        assert len(file["scene/text"][()]) > 0
 
-        volume = file["points/volume"][()]
-        require(volume.shape == (n,) and volume.dtype == np.float64 and np.all(volume > 0), "volume")
-        for name in ("body", "material", "layer"):
-            data = file["points"][name]
-            require(data.shape == (n,) and data.dtype == np.int32, f"/points/{name}")
-        for name in ("text", "command"):
-            require(name in file["scene"], f"/scene/{name}")
-        for name in ("version", "compiler"):
-            require(name in file["scene"].attrs, f"attribute {name} of /scene")
-        check_history(path, file["history"])
-    return points, times, fields
-
-
-def check_history(path, group):
-    """All columns are there, of one length, with units, finite, and the same in the .csv file."""
-    columns = {name: data[()] for name, data in group.items()}
-    for name in HISTORY:
-        require(name in columns, f"/history/{name} is missing")
-    rows = len(columns["step"])
-    require(rows >= 2 and columns["step"][0] == 0, "history rows")
-    for name, values in columns.items():
-        require(len(values) == rows, f"/history/{name} has {len(values)} of {rows} rows")
-        require("units" in group[name].attrs, f"/history/{name} has no units")
-        require(np.all(np.isfinite(values)), f"/history/{name} is not finite")
-    require(np.all(np.diff(columns["step"]) > 0), "history steps do not rise")
-    with open(Path(path).with_name("history.csv"), newline="", encoding="utf-8") as table:
-        lines = [line for line in csv.reader(table) if line and not line[0].startswith("#")]
-    header, body = [name.strip() for name in lines[0]], lines[1:]
-    require(len(body) == rows, f"history.csv has {len(body)} of {rows} rows")
-    for at, name in enumerate(header):
-        name = name.split(" ")[0].split("[")[0]
-        require(name in columns, f"history.csv has a column '{name}' of its own")
-        written = np.array([float(line[at]) for line in body])
-        require(np.allclose(written, columns[name], rtol=1e-6, atol=1e-300), f"history.csv: {name}")
-    require(len(header) == len(columns), "history.csv lacks columns")
-
-
-def check_with_vtk(path, points, times, fields):
-    """The reader offers the same times, and every step has the same points and arrays."""
     reader = vtkHDFReader()
-    require(reader.CanReadFile(str(path)), "vtk cannot read the file")
+    assert reader.CanReadFile(str(path)), f"VTK cannot read {path}"
     reader.SetFileName(str(path))
     reader.UpdateInformation()
-    known = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
-    require(known is not None and np.allclose(known, times, rtol=1e-12), f"vtk's times {known}")
-    require(reader.GetNumberOfSteps() == len(times), "vtk's number of steps")
-    for k in range(len(times)):
-        reader.SetStep(k)
+    assert reader.GetNumberOfSteps() == steps, f"VTK sees {reader.GetNumberOfSteps()} steps, not {steps}"
+    if steps == 1:
+        seen = [reader.GetTimeValue()]
+    else:
+        seen = reader.GetOutputInformation(0).Get(pipeline.TIME_STEPS())
+    assert np.array_equal(seen, times), "VTK sees other times"
+    n = len(points)
+    for step in range(steps):
+        reader.SetStep(step)
         reader.Update()
         output = reader.GetOutput()
-        require(output.GetNumberOfPoints() == len(points), f"vtk's points in step {k}")
-        require(output.GetNumberOfVerts() == len(points), f"vtk's vertices in step {k}")
-        require(np.array_equal(vtk_to_numpy(output.GetPoints().GetData()), points), "positions")
-        data = output.GetPointData()
-        require({data.GetArrayName(i) for i in range(data.GetNumberOfArrays())} == set(fields),
-                f"vtk's arrays in step {k}")
+        assert output.GetNumberOfPoints() == n and output.GetNumberOfVerts() == n
+        assert np.array_equal(vtk_to_numpy(output.GetPoints().GetData()), points)
+        found = arrays_of(output)
         for name, values in fields.items():
-            seen = vtk_to_numpy(data.GetArray(name))
-            require(np.array_equal(seen, values[k]), f"{name} in step {k} differs")
+            assert np.array_equal(found[name], values[step * n:(step + 1) * n]), f"{name}, step {step}"
+    print(f"{path}: {steps} steps, {n} points, {rows} history rows, fields {', '.join(fields)}")
+    return times, points, fields
 
 
-def main():
-    path = Path(sys.argv[1])
-    require(path.is_file(), f"{path} is not there")
-    points, times, fields = read_with_h5py(path)
-    check_with_vtk(path, points, times, fields)
-    print(f"{path.name}: {len(points)} points, {len(times)} steps, {', '.join(sorted(fields))}: "
-          "the same with h5py and vtk")
+def check_series(path, partial, hdf=None):
+    """Check a .pvd series, against the HDF5 file of the same run if there is one."""
+    files = [(float(entry.get("timestep")), path.parent / entry.get("file"))
+             for entry in tree.parse(path).getroot().iter("DataSet")]
+    assert files, f"{path} lists nothing"
+    if hdf is not None and not partial:
+        assert [time for time, _ in files] == list(hdf[0]), "the series has other times"
+    for step, (_, name) in enumerate(files):
+        reader = vtkXMLUnstructuredGridReader()
+        reader.SetFileName(str(name))
+        reader.Update()
+        output = reader.GetOutput()
+        n = output.GetNumberOfPoints()
+        assert n > 0 and output.GetNumberOfCells() == n, f"{name}: {n} points"
+        found = arrays_of(output)
+        assert found, f"{name} holds no arrays"
+        if hdf is None or step >= len(hdf[0]):
+            continue
+        assert np.array_equal(vtk_to_numpy(output.GetPoints().GetData()), hdf[1])
+        for key, values in hdf[2].items():
+            assert np.array_equal(found[key], values[step * n:(step + 1) * n]), f"{name}: {key}"
+    print(f"{path}: {len(files)} files")
+
+
+def main(arguments):
+    """Check the files named on the command line."""
+    partial = "--partial" in arguments
+    hdf = None
+    paths = [Path(name) for name in arguments if not name.startswith("--")]
+    if not paths:
+        sys.exit(__doc__)
+    for path in sorted(paths, key=lambda path: path.suffix == ".pvd"):
+        if path.suffix == ".pvd":
+            check_series(path, partial, hdf)
+        else:
+            hdf = check_hdf(path, partial)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

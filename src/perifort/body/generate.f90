@@ -5,9 +5,10 @@
 module pd_body_generate
   use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type, fail
-  use pd_base_text, only: to_text
+  use pd_base_text, only: newline, to_text
   use pd_scene_types, only: scene_type, body_group, is_set
-  use pd_scene_table, only: read_numbers
+  use pd_scene_file, only: resolve_path
+  use pd_scene_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_shapes, only: inside
   implicit none (type, external)
@@ -141,22 +142,24 @@ contains
     real(wp), intent(in) :: depth
     type(body_type), intent(out) :: body
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: table(:, :)
+    type(table_type) :: table
+    character(:), allocatable :: path
     integer :: worst
 
-    call read_numbers(scene%file, scene%bodies(i)%file, 4, table, error)
+    path = resolve_path(trim(scene%bodies(i)%file), scene%file)
+    call read_table(path, table, error, columns=4)
     if (allocated(error)) return
-    call allocate_points(body, scene%header%dimension, size(table, 2))
-    if (size(table, 2) == 0) then
-      call fail(error, 'the cloud '//trim(scene%bodies(i)%file)//' has no points')
+    if (size(table%values, 2) == 0) then
+      call fail(error, 'the cloud '//path//' has no points')
       return
     end if
-    body%x = transpose(table(:body%dim, :))
-    body%volume = table(4, :)
+    call allocate_points(body, scene%header%dimension, size(table%values, 2))
+    body%x = transpose(table%values(:body%dim, :))
+    body%volume = table%values(4, :)
     worst = minloc(body%volume, dim=1)
     if (body%volume(worst) <= 0.0_wp) then
-      call fail(error, 'the cloud '//trim(scene%bodies(i)%file)//' has a point without a positive '// &
-        & 'volume: point '//to_text(worst)//' has '//to_text(body%volume(worst)))
+      call fail(error, 'every point of a cloud needs a positive volume (the fourth column), but here '// &
+        & 'it is '//to_text(body%volume(worst))//newline//' --> '//path//':'//to_text(table%lines(worst)))
       return
     end if
     body%spacing = (body%volume/depth)**(1.0_wp/body%dim)

@@ -4,6 +4,7 @@ module pd_body_initial
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
   use pd_scene_types, only: scene_type, initial_group, is_set
+  use pd_scene_file, only: resolve_path
   use pd_scene_table, only: table_type, read_table
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
@@ -71,33 +72,39 @@ contains
     type(body_type), intent(in) :: body
     real(wp), intent(inout) :: u(:, :), v(:, :), temperature_change(:)
     type(error_type), allocatable, intent(out) :: error
+    character(18), parameter :: known(7) = [character(18) :: 'displacement_x', 'displacement_y', &
+      & 'displacement_z', 'velocity_x', 'velocity_y', 'velocity_z', 'temperature_change']
+    character(:), allocatable :: path
     type(table_type) :: table
-    integer :: column, c
+    integer :: column, which
 
-    call read_table(scene%file, group%file, table, error)
+    path = resolve_path(trim(group%file), scene%file)
+    call read_table(path, table, error, allowed=pack(known, of_dimension(body%dim)))
     if (allocated(error)) return
     if (size(table%values, 2) /= body%n_points) then
-      call fail(error, 'the initial state in '//trim(group%file)//' has '// &
-        & to_text(size(table%values, 2))//' rows, but the scene has '//to_text(body%n_points)// &
-        & ' points (layers included): one row per point is expected, in the order of the results')
+      call fail(error, 'the initial state in '//path//' has '//to_text(size(table%values, 2))// &
+        & ' rows, but the scene has '//to_text(body%n_points)//' points (layers included): one row '// &
+        & 'per point is expected, in the order of the results')
       return
     end if
     do column = 1, size(table%names)
-      associate (name => trim(table%names(column)))
-        c = index('xyz', name(len(name):))
-        if (name == 'temperature_change') then
-          temperature_change(body%slot) = table%values(column, :)
-        else if (name(:len(name) - 1) == 'displacement_' .and. c >= 1 .and. c <= body%dim) then
-          u(body%slot, c) = table%values(column, :)
-        else if (name(:len(name) - 1) == 'velocity_' .and. c >= 1 .and. c <= body%dim) then
-          v(body%slot, c) = table%values(column, :)
-        else
-          call fail(error, "unknown column '"//name//"' in "//trim(group%file)//'; known: '// &
-            & 'displacement_x.., velocity_x.. (as many as the scene has dimensions), temperature_change')
-          return
-        end if
-      end associate
+      which = findloc(known == table%names(column), .true., dim=1)
+      select case (which)
+      case (1:3)
+        u(body%slot, which) = table%values(column, :)
+      case (4:6)
+        v(body%slot, which - 3) = table%values(column, :)
+      case default
+        temperature_change(body%slot) = table%values(column, :)
+      end select
     end do
   end subroutine state_from_file
+
+  !> Which columns a dimension has.
+  pure function of_dimension(dim) result(has)
+    integer, intent(in) :: dim
+    logical :: has(7)
+    has = [.true., dim > 1, dim > 2, .true., dim > 1, dim > 2, .true.]
+  end function of_dimension
 
 end module pd_body_initial

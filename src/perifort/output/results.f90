@@ -1,0 +1,465 @@
+!> The results of a run, in the files that the user wants: what the solver talks to.
+!>
+!>     call results%create(directory, stem, positions, fields, ...)
+!>     call results%put_points('volume', volume, error)       ! any number of these
+!>     call results%add_row([...], error)                     ! at any time
+!>     call results%begin_output(time, error)
+!>     call results%put_field('displacement', u, error)       ! each field once
+!>     call results%end_output(error)
+!>     call results%close(error)
+!>
+!> Nothing of an earlier run is touched before the first output is complete. After an error call
+!> `close` none the less: it leaves the files as they were at the last complete output.
+module pd_output_results
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_text, only: join, lower_case, nearest_name, to_text, with_unit
+  use pd_output_files, only: file_exists, in_directory, make_directory, remove_file
+  use pd_output_history, only: csv_type, history_type
+  use pd_output_types, only: column_type, field_type, label_length
+  use pd_output_vtkhdf, only: vtkhdf_file
+  use pd_output_vtu, only: remove_series, vtu_series
+  implicit none (type, external)
+  private
+  public :: results_type, existing_results, refuse_existing, column_type, field_type, label_length
+
+  !> The results of one run.
+  type :: results_type
+    private
+    character(:), allocatable :: directory, stem
+    type(field_type), allocatable :: fields(:)
+    type(column_type), allocatable :: columns(:)
+    logical, allocatable :: given(:)     !! fields of the output under way
+    type(vtkhdf_file) :: vtkhdf
+    type(vtu_series) :: vtu
+    type(history_type) :: history
+    type(csv_type) :: csv
+    integer :: points = 0
+    integer :: planned_outputs = 0
+    integer :: outputs = 0               !! complete ones
+    real(wp) :: time = 0.0_wp            !! of the output under way [s]
+    logical :: in_output = .false.
+    logical :: use_vtkhdf = .false., use_vtu = .false.
+    logical :: open = .false.
+    logical :: started = .false.         !! the files have their names
+    logical :: failed = .false.
+  contains
+    procedure :: create
+    procedure, private :: put_points_real, put_points_i4, put_points_i1
+    !> Write an array over the points (volume [m3], body, region_NAME, ...), before the first
+    !> output: `values(n)` real, 32-bit or 8-bit integer. Only the HDF5 file has a place for it.
+    generic :: put_points => put_points_real, put_points_i4, put_points_i1
+    procedure :: begin_output
+    procedure, private :: put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
+    !> Write one field of the output under way, by its number or name: `values(n)`, or
+    !> `values(n, 3)` for vectors.
+    generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
+    procedure :: end_output
+    procedure :: add_row
+    procedure :: close => close_results
+    procedure :: planned_bytes
+    procedure :: output_count
+  end type results_type
+
+contains
+
+  !> The first file of earlier results of this stem in `directory`; '' if there is none.
+  function existing_results(directory, stem) result(path)
+    character(*), intent(in) :: directory, stem
+    character(:), allocatable :: path
+
+    path = in_directory(directory, trim(stem)//'.vtkhdf')
+    if (file_exists(path)) return
+    path = in_directory(directory, trim(stem)//'.pvd')
+    if (file_exists(path)) return
+    path = in_directory(directory, 'history.csv')
+    if (.not. file_exists(path)) path = ''
+  end function existing_results
+
+  !> Fail if earlier results would have to be overwritten and mustn't be. Cheap: meant to be
+  !> called before any long preparation.
+  subroutine refuse_existing(directory, stem, overwrite, error)
+    character(*), intent(in) :: directory, stem
+    logical, intent(in) :: overwrite
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: path
+
+    if (overwrite) return
+    path = existing_results(directory, stem)
+    if (path /= '') call fail(error, 'there are results already: '//path// &
+      & ' (--overwrite replaces them, --output DIR puts the new ones elsewhere)')
+  end subroutine refuse_existing
+
+  !> Begin the results `directory/stem.*` and `directory/history.csv`.
+  !>
+  !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
+  !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
+  !> `precision` ('double', 'single') is that of the fields, `format` one of 'vtkhdf', 'vtu', 'both'.
+  !> `scene_text`, `command` and the program's `version` are kept in the file.
+  subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
+    & planned_rows, precision, format, scene_text, command, version, overwrite, error)
+    class(results_type), intent(out) :: self
+    character(*), intent(in) :: directory, stem
+    real(wp), intent(in) :: positions(:, :)
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    character(*), intent(in) :: precision, format
+    character(*), intent(in) :: scene_text, command, version
+    logical, intent(in) :: overwrite
+    type(error_type), allocatable, intent(out) :: error
+    logical :: single
+
+    call check_description(positions, fields, columns, precision, format, error)
+    if (allocated(error)) return
+    call refuse_existing(directory, stem, overwrite, error)
+    if (allocated(error)) return
+    call make_directory(directory, error)
+    if (allocated(error)) return
+
+    self%directory = trim(directory)
+    self%stem = trim(stem)
+    allocate (self%fields, source=fields)
+    allocate (self%columns, source=columns)
+    allocate (self%given(size(fields)), source=.false.)
+    self%points = size(positions, 1)
+    self%planned_outputs = planned_outputs
+    single = lower_case(precision) == 'single'
+    self%use_vtkhdf = lower_case(format) /= 'vtu'
+    self%use_vtu = lower_case(format) /= 'vtkhdf'
+    call self%history%start(size(columns))
+    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
+    if (self%use_vtkhdf) then
+      call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), positions, fields, &
+        & planned_outputs, columns, planned_rows, single, scene_text, command, version, error)
+      if (allocated(error)) then
+        call explain_need(self, 'the layout', self%vtkhdf%layout_bytes(), error)
+        return
+      end if
+    end if
+    self%open = .true.
+  end subroutine create
+
+  !> Whether names, shapes and words are usable.
+  subroutine check_description(positions, fields, columns, precision, format, error)
+    real(wp), intent(in) :: positions(:, :)
+    type(field_type), intent(in) :: fields(:)
+    type(column_type), intent(in) :: columns(:)
+    character(*), intent(in) :: precision, format
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    if (size(positions, 1) < 1) then
+      call fail(error, 'results need at least one point')
+    else if (size(positions, 2) /= 3) then
+      call fail(error, 'positions need three components, whatever the dimension')
+    else if (all(lower_case(trim(precision)) /= ['single', 'double'])) then
+      call fail(error, 'unknown precision '''//trim(precision)//''': single, double')
+    else if (all(lower_case(trim(format)) /= ['vtkhdf', 'vtu   ', 'both  '])) then
+      call fail(error, 'unknown format '''//trim(format)//''': vtkhdf, vtu, both')
+    end if
+    do i = 1, size(fields)
+      if (allocated(error)) return
+      call check_name(fields(i)%name, fields(:i - 1)%name, error)
+      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3])) &
+        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1 nor 3 components')
+    end do
+    do i = 1, size(columns)
+      if (allocated(error)) return
+      call check_name(columns(i)%name, columns(:i - 1)%name, error)
+    end do
+  end subroutine check_description
+
+  !> A name is there, new, and no path; a comma would part it in the table.
+  subroutine check_name(name, others, error)
+    character(*), intent(in) :: name, others(:)
+    type(error_type), allocatable, intent(out) :: error
+
+    if (name == '' .or. scan(trim(name), '/,"<>&'//new_line('a')) > 0 .or. name == '.') then
+      call fail(error, '''' //trim(name)//''' can''t name a field or column of the results')
+    else if (any(others == name)) then
+      call fail(error, 'two fields or columns of the results are named '//trim(name))
+    end if
+  end subroutine check_name
+
+  subroutine put_points_real(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (allocated(error)) self%failed = .true.
+  end subroutine put_points_real
+
+  subroutine put_points_i4(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i4), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (allocated(error)) self%failed = .true.
+  end subroutine put_points_i4
+
+  subroutine put_points_i1(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i1), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (allocated(error)) self%failed = .true.
+  end subroutine put_points_i1
+
+  !> Begin the output of the state at `time` [s].
+  subroutine begin_output(self, time, error)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: time
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%open .or. self%in_output) then
+      call fail(error, 'an output begins in results that are not open, or within another')
+      return
+    end if
+    self%given = .false.
+    self%time = time
+    if (self%use_vtkhdf) call self%vtkhdf%begin_output(error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%begin_output(error)
+    if (allocated(error)) call explain_output(self, error)
+    self%in_output = .not. allocated(error)
+  end subroutine begin_output
+
+  subroutine put_scalar_at(self, field, values, error)
+    class(results_type), intent(inout) :: self
+    integer, intent(in) :: field
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+
+    call check_field(self, field, size(values), 1, error)
+    if (allocated(error)) return
+    if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
+    if (allocated(error)) call explain_output(self, error)
+    self%given(field) = .not. allocated(error)
+  end subroutine put_scalar_at
+
+  subroutine put_vector_at(self, field, values, error)
+    class(results_type), intent(inout) :: self
+    integer, intent(in) :: field
+    real(wp), intent(in) :: values(:, :)
+    type(error_type), allocatable, intent(out) :: error
+
+    call check_field(self, field, size(values, 1), size(values, 2), error)
+    if (allocated(error)) return
+    if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
+    if (allocated(error)) call explain_output(self, error)
+    self%given(field) = .not. allocated(error)
+  end subroutine put_vector_at
+
+  subroutine put_scalar_named(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: field
+
+    call find_field(self, name, field, error)
+    if (.not. allocated(error)) call self%put_field(field, values, error)
+  end subroutine put_scalar_named
+
+  subroutine put_vector_named(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: values(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: field
+
+    call find_field(self, name, field, error)
+    if (.not. allocated(error)) call self%put_field(field, values, error)
+  end subroutine put_vector_named
+
+  !> The number of a field.
+  subroutine find_field(self, name, field, error)
+    class(results_type), intent(in) :: self
+    character(*), intent(in) :: name
+    integer, intent(out) :: field
+    type(error_type), allocatable, intent(out) :: error
+
+    do field = 1, size(self%fields)
+      if (self%fields(field)%name == name) return
+    end do
+    call fail(error, 'these results have no field '''//trim(name)//''': '// &
+      & join(self%fields%name, ', '))
+  end subroutine find_field
+
+  !> Whether a field can be written now, with values of this shape.
+  subroutine check_field(self, field, points, components, error)
+    class(results_type), intent(in) :: self
+    integer, intent(in) :: field, points, components
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%in_output) then
+      call fail(error, 'a field is given outside an output')
+    else if (field < 1 .or. field > size(self%fields)) then
+      call fail(error, 'these results have no field '//to_text(field))
+    else if (self%given(field)) then
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is given twice in one output')
+    else if (points /= self%points .or. components /= self%fields(field)%components) then
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%points) &
+        & //' x '//to_text(self%fields(field)%components)//', not '//to_text(points)//' x ' &
+        & //to_text(components))
+    end if
+  end subroutine check_field
+
+  !> Complete the output under way; all fields must have been given. History rows so far go with it.
+  subroutine end_output(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: table(:, :)
+    integer :: i
+
+    if (.not. self%in_output) then
+      call fail(error, 'an output ends that has not begun')
+      return
+    end if
+    do i = 1, size(self%fields)
+      if (self%given(i)) cycle
+      call fail(error, 'field '//trim(self%fields(i)%name)//' is missing from an output')
+      return
+    end do
+    ! rows first: a file that counts this output holds the history up to it
+    call self%history%take(table)
+    if (self%use_vtkhdf) then
+      call self%vtkhdf%append_rows(table, error)
+      if (.not. allocated(error)) call self%vtkhdf%end_output(self%time, error)
+    end if
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%end_output(self%time, error)
+    if (.not. allocated(error)) call start_files(self, error)
+    if (.not. allocated(error) .and. self%csv%is_open()) call self%csv%append(table, error)
+    if (allocated(error)) then
+      call explain_output(self, error)
+    else
+      self%outputs = self%outputs + 1
+      self%in_output = .false.
+    end if
+  end subroutine end_output
+
+  !> Put the files in their places, once: here, and not before, older results go.
+  subroutine start_files(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    if (self%started) return
+    if (self%use_vtkhdf) then
+      call self%vtkhdf%publish(error)
+    else
+      call remove_file(in_directory(self%directory, self%stem//'.vtkhdf'))
+    end if
+    if (allocated(error)) return
+    call remove_series(self%directory, self%stem, merge(1, 0, self%use_vtu))
+    if (size(self%columns) > 0) then
+      call self%csv%open(in_directory(self%directory, 'history.csv'), self%columns, error)
+    else
+      call remove_file(in_directory(self%directory, 'history.csv'))
+    end if
+    self%started = .not. allocated(error)
+  end subroutine start_files
+
+  !> Add a row of the history: a value for each column. Rows reach the files with each output, at
+  !> least about once a second, and with `close`.
+  subroutine add_row(self, values, error)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%open) then
+      call fail(error, 'a history row is given to results that are not open')
+      return
+    end if
+    call self%history%add(values, error)
+    if (allocated(error) .or. .not. self%started .or. self%in_output) return
+    if (self%history%is_due()) call write_rows(self, error)
+  end subroutine add_row
+
+  !> Write the rows that wait.
+  subroutine write_rows(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: table(:, :)
+
+    call self%history%take(table)
+    if (self%use_vtkhdf) call self%vtkhdf%append_rows(table, error)
+    if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%append(table, error)
+    if (allocated(error)) call explain_need(self, 'the history', &
+      & 8_i8*size(table, kind=i8), error)
+  end subroutine write_rows
+
+  !> Say which output failed.
+  subroutine explain_output(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(inout) :: error
+    integer(i8) :: bytes
+
+    bytes = 0
+    if (self%use_vtkhdf) bytes = self%vtkhdf%output_bytes()
+    if (self%use_vtu) bytes = bytes + self%vtu%output_bytes()
+    call explain_need(self, 'output '//to_text(self%outputs + 1)//' at '// &
+      & with_unit(self%time, 's'), bytes, error)
+  end subroutine explain_output
+
+  !> Say what failed, how much it needed and what is safe. From here on nothing more is written.
+  subroutine explain_need(self, what, bytes, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: what
+    integer(i8), intent(in) :: bytes
+    type(error_type), allocatable, intent(inout) :: error
+
+    self%failed = .true.
+    error%message = 'results, '//what//': '//error%message//' ('//what//' needs ' &
+      & //with_unit(real(bytes, wp), 'B', 3)//'; complete before it: '//to_text(self%outputs) &
+      & //' outputs)'
+  end subroutine explain_need
+
+  !> Complete the files. After an error they stay as they were at the last complete output; if
+  !> nothing was written, nothing is left behind.
+  subroutine close_results(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+
+    if (.not. self%open) return
+    self%open = .false.
+    if (self%use_vtu) call self%vtu%abandon()
+    if (.not. self%failed) then
+      if (.not. self%started .and. self%history%has_rows()) call start_files(self, error)
+      if (self%started .and. .not. allocated(error)) call write_rows(self, error)
+    end if
+    if (self%failed .or. allocated(error) .or. .not. self%started) then
+      if (self%use_vtkhdf) call self%vtkhdf%abandon()
+      if (self%csv%is_open()) call self%csv%close(ignored)
+      return
+    end if
+    if (self%use_vtkhdf) call self%vtkhdf%finish(error)
+    if (self%csv%is_open()) then
+      call self%csv%close(ignored)
+      if (allocated(ignored) .and. .not. allocated(error)) call move_alloc(ignored, error)
+    end if
+  end subroutine close_results
+
+  !> Bytes that all planned outputs and rows take, within some kilobytes.
+  pure integer(i8) function planned_bytes(self)
+    class(results_type), intent(in) :: self
+
+    planned_bytes = 0
+    if (self%use_vtkhdf) planned_bytes = self%vtkhdf%planned_bytes()
+    if (self%use_vtu) planned_bytes = planned_bytes &
+      & + max(1, self%planned_outputs)*self%vtu%output_bytes()
+  end function planned_bytes
+
+  !> Complete outputs so far.
+  pure integer function output_count(self)
+    class(results_type), intent(in) :: self
+    output_count = self%outputs
+  end function output_count
+
+end module pd_output_results
