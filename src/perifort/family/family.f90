@@ -28,6 +28,7 @@ module pd_family_family
     procedure(bonds_of_interface), deferred :: bonds_of
     procedure(break_interface), deferred :: break_bond
     procedure(memory_interface), deferred :: bytes
+    procedure(describe_interface), deferred :: describe
   end type family_type
 
   abstract interface
@@ -54,6 +55,14 @@ module pd_family_family
       implicit none (type, external)
       class(family_type), intent(in) :: family
     end function memory_interface
+
+    !> What kind of family it is and why, in a line.
+    function describe_interface(family) result(text)
+      import :: family_type
+      implicit none (type, external)
+      class(family_type), intent(in) :: family
+      character(:), allocatable :: text
+    end function describe_interface
   end interface
 
 contains

@@ -23,6 +23,7 @@ module pd_family_list
     procedure :: bonds_of
     procedure :: break_bond
     procedure :: bytes
+    procedure :: describe
   end type list_family_type
 
 contains
@@ -122,5 +123,12 @@ contains
     bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*(3 + family%dim)
     if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds
   end function bytes
+
+  function describe(family) result(text)
+    class(list_family_type), intent(in) :: family
+    character(:), allocatable :: text
+    text = 'list: the neighbours of every point stored one by one'
+    if (allocated(family%fraction)) text = text//', with their volume fractions'
+  end function describe
 
 end module pd_family_list

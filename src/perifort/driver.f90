@@ -1,0 +1,370 @@
+!> From a scene to its results, in the steps of chapter 7: points, families, cracks, surface
+!> correction, initial and boundary conditions, time step or mass, integration.
+module pd_driver
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_clock, only: duration_text, output_is_terminal, phase_timer_type, wall_time
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text, with_unit
+  use pd_base_version, only: program_version
+  use pd_scene_types, only: scene_type, is_set, material_group
+  use pd_scene_write, only: scene_text
+  use pd_body_body, only: body_type, in_point_order
+  use pd_body_generate, only: generate_body, touch
+  use pd_body_initial, only: initial_state
+  use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
+  use pd_body_shapes, only: inside
+  use pd_family_cracks, only: cut_bonds
+  use pd_family_list, only: list_family_type, new_list_family
+  use pd_family_neighbours, only: check_overlap
+  use pd_family_surface, only: surface_factors
+  use pd_family_volume, only: volume_rule_type, volume_rule_number
+  use pd_force_breaking, only: damage_of
+  use pd_force_model, only: new_model
+  use pd_motion_explicit, only: run_explicit
+  use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, region_mask
+  use pd_motion_plan, only: plan_type, make_plan, depth_of
+  use pd_motion_relaxation, only: run_relaxation
+  use pd_motion_system, only: system_type, start_system, evaluate
+  use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, planned_outputs, &
+    & planned_rows
+  use pd_output_results, only: refuse_existing
+  use pd_output_summary, only: summary_before, summary_after
+  implicit none (type, external)
+  private
+  public :: run_scene, check_scene, run_options_type, prepare, set_up_type
+
+  !> How to run, from the command line.
+  type :: run_options_type
+    character(:), allocatable :: output_directory  !! '' = out/<stem of the scene file>
+    character(:), allocatable :: command           !! as typed, kept in the results
+    integer :: threads = 0                         !! 0 = as many as OpenMP offers
+    logical :: overwrite = .false.
+    logical :: quiet = .false.
+  end type run_options_type
+
+  !> Everything that stands before the first step.
+  type :: set_up_type
+    type(system_type) :: system
+    type(plan_type) :: plan
+    type(probe_type), allocatable :: probes(:)
+    integer(i8) :: cut = 0_i8                      !! bonds cut by cracks
+    integer :: lonely = 0                          !! points without a neighbour
+    type(phase_timer_type) :: timer
+  end type set_up_type
+
+contains
+
+  !> Compute a scene and write its results.
+  subroutine run_scene(scene, options, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    type(recorder_type) :: recorder
+    type(error_type), allocatable :: late
+    character(:), allocatable :: directory, stem
+
+    call use_threads(options%threads)
+    stem = stem_of(scene)
+    directory = 'out/'//stem
+    if (allocated(options%output_directory)) then
+      if (options%output_directory /= '') directory = options%output_directory
+    end if
+    call refuse_existing(directory, stem, options%overwrite, error)
+    if (allocated(error)) return
+    call prepare(scene, set_up, error)
+    if (allocated(error)) return
+    associate (system => set_up%system, plan => set_up%plan)
+      call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, set_up%lonely, &
+        & omp_get_max_threads()))
+      call open_recorder(scene, options, set_up, directory, stem, recorder, error)
+      if (allocated(error)) return
+      call recorder%timer%start('time stepping')
+      if (plan%relaxes) then
+        call run_relaxation(system, plan%relaxation, recorder, error)
+      else
+        call run_explicit(system, plan%integrator, plan%step, plan%steps, recorder, error)
+      end if
+      call recorder%timer%stop('time stepping')
+      call recorder%progress%finish()
+      call recorder%results%close(late)
+      if (.not. allocated(error) .and. allocated(late)) call move_alloc(late, error)
+      if (allocated(error)) return
+      call say(options, summary_after(system, recorder, directory))
+    end associate
+  end subroutine run_scene
+
+  !> Read, validate, build points and families, and say what a run would do, without running.
+  subroutine check_scene(scene, options, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    real(wp) :: begin, seconds
+    integer :: i
+
+    call use_threads(options%threads)
+    call prepare(scene, set_up, error)
+    if (allocated(error)) return
+    associate (system => set_up%system, plan => set_up%plan)
+      call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, set_up%lonely, &
+        & omp_get_max_threads()))
+      ! the first evaluation touches the memory, the others are timed
+      call evaluate(system, 0.0_wp, breaking=.false.)
+      begin = wall_time()
+      do i = 1, 100
+        call evaluate(system, 0.0_wp, breaking=.false.)
+        seconds = (wall_time() - begin)/i
+        if (seconds*i > 0.5_wp) exit
+      end do
+      if (plan%relaxes) then
+        call say(options, '  run time        '//with_unit(seconds, 's', 3)//' an iteration (measured)')
+      else
+        call say(options, '  run time        about '//duration_text(seconds*plan%steps &
+          & *evaluations(plan%integrator))//' without output ('//with_unit(seconds, 's', 3)// &
+          & ' an evaluation of the forces, measured)')
+      end if
+    end associate
+  end subroutine check_scene
+
+  !> Force evaluations of one step.
+  pure integer function evaluations(integrator)
+    character(*), intent(in) :: integrator
+    select case (integrator)
+    case ('runge_kutta'); evaluations = 4
+    case ('adams_moulton'); evaluations = 2
+    case default; evaluations = 1
+    end select
+  end function evaluations
+
+  !> Points, families, corrections, cracks, conditions and the plan of a scene.
+  subroutine prepare(scene, set_up, error)
+    type(scene_type), intent(in) :: scene
+    type(set_up_type), intent(out) :: set_up
+    type(error_type), allocatable, intent(out) :: error
+    type(material_type), allocatable :: materials(:)
+    type(list_family_type) :: list
+    real(wp), allocatable :: temperature_change(:)
+    real(wp) :: delta
+
+    associate (system => set_up%system, timer => set_up%timer)
+      call timer%start('points')
+      call generate_body(scene, system%body, delta, error)
+      if (allocated(error)) return
+      materials = materials_of_scene(scene, delta)
+      call timer%stop('points')
+
+      call timer%start('families')
+      call new_list_family(system%body, volume_rule_type(volume_rule_number( &
+        & trim(scene%horizon%volume_correction)), delta), list)
+      allocate (system%family, source=list)
+      call check_overlap(system%body, system%family, set_up%lonely, error)
+      if (allocated(error)) return
+      call timer%stop('families')
+
+      call timer%start('conditions')
+      call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, error)
+      if (allocated(error)) return
+      call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
+        & no_fail_zone(scene, system%body), temperature_change, system%model)
+      call motions_of_scene(scene, system%body, system%motions, error)
+      if (allocated(error)) return
+      call loads_of_scene(scene, system%body, system%loads, error)
+      if (allocated(error)) return
+      call timer%stop('conditions')
+
+      call timer%start('surface correction')
+      system%model%surface = scene%horizon%surface_correction == 'energy'
+      if (system%model%surface) call surface_factors(system%body, system%family, materials, &
+        & system%model%D, system%model%S)
+      call timer%stop('surface correction')
+
+      call timer%start('cracks')
+      call cut_bonds(scene%cracks, system%body, system%family, set_up%cut)
+      allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
+      if (set_up%cut > 0_i8) call damage_of(system%body, system%family, system%state%damage)
+      call timer%stop('cracks')
+
+      call timer%start('time step')
+      call start_system(system)
+      call make_plan(scene, system, set_up%plan, error)
+      if (allocated(error)) return
+      call timer%stop('time step')
+      call find_probes(scene, system%body, set_up%probes)
+    end associate
+  end subroutine prepare
+
+  !> The materials with the horizon's parameters.
+  pure function materials_of_scene(scene, delta) result(materials)
+    type(scene_type), intent(in) :: scene
+    real(wp), intent(in) :: delta
+    type(material_type), allocatable :: materials(:)
+    logical :: plane_strain
+    integer :: i
+
+    plane_strain = scene%header%dimension == 2 .and. scene%header%plane == 'strain'
+    allocate (materials(size(scene%materials)))
+    do i = 1, size(materials)
+      associate (group => scene%materials(i), m => materials(i))
+        m = new_material(group%youngs_modulus, group%poissons_ratio, group%density, &
+          & scene%header%dimension, plane_strain, scene%header%thickness, scene%header%area, delta, &
+          & group%model == 'bond_based')
+        if (is_set(group%critical_stretch)) m%critical_stretch = group%critical_stretch
+        if (is_set(group%critical_energy_release_rate)) m%critical_stretch = &
+          & critical_stretch_from_energy(m, group%critical_energy_release_rate, scene%header%dimension, delta)
+        m%break_in_compression = group%break_in_compression
+        m%expansion = group%thermal_expansion
+        if (plane_strain) m%expansion = (1 + m%poissons_ratio)*m%expansion
+      end associate
+    end do
+  end function materials_of_scene
+
+  !> Slots in the no-fail zones of a scene.
+  function no_fail_zone(scene, body) result(zone)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    logical, allocatable :: zone(:)
+    integer :: i
+
+    allocate (zone(body%n_slots), source=.false.)
+    do i = 1, size(scene%no_fail)
+      if (scene%no_fail(i)%region /= '') then
+        zone = zone .or. region_mask(scene, body, scene%no_fail(i)%region)
+      else
+        zone = zone .or. (inside(scene%no_fail(i), body%x, &
+          & touch*minval(body%spacing, mask=body%point > 0)) .and. body%point > 0)
+      end if
+    end do
+  end function no_fail_zone
+
+  !> The nearest point of each probe; ties go to the lowest point number.
+  subroutine find_probes(scene, body, probes)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    type(probe_type), allocatable, intent(out) :: probes(:)
+    real(wp) :: distance, least
+    integer :: p, i, f
+
+    allocate (probes(size(scene%probes)))
+    do p = 1, size(probes)
+      probes(p)%name = trim(scene%probes(p)%name)
+      least = huge(least)
+      do i = 1, body%n_points
+        distance = norm2(body%x(body%slot(i), :) - scene%probes(p)%point(:body%dim))
+        ! a hair's breadth nearer is no nearer: ties must not depend on rounding
+        if (distance >= least - touch*body%spacing(body%slot(i))) cycle
+        least = distance
+        probes(p)%slot = body%slot(i)
+      end do
+      allocate (probes(p)%fields(size(scene%probes(p)%fields)))
+      do f = 1, size(probes(p)%fields)
+        probes(p)%fields(f) = field_of(trim(scene%probes(p)%fields(f)))
+      end do
+    end do
+  end subroutine find_probes
+
+  !> Files, history and progress of a run.
+  subroutine open_recorder(scene, options, set_up, directory, stem, recorder, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(set_up_type), intent(in) :: set_up
+    character(*), intent(in) :: directory, stem
+    type(recorder_type), intent(inout) :: recorder
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: positions(:, :)
+    character(:), allocatable :: command
+    integer :: f, c
+
+    associate (body => set_up%system%body, plan => set_up%plan, schedule => recorder%schedule)
+      recorder%timer = set_up%timer
+      recorder%probes = set_up%probes
+      schedule%relaxation = plan%relaxes
+      schedule%steps = plan%steps
+      schedule%every = scene%output%every
+      if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
+      if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
+      schedule%history_every = scene%output%history_every
+      if (schedule%history_every == 0) schedule%history_every = max(1, merge( &
+        & plan%relaxation%maximum_iterations, plan%steps, plan%relaxes)/2000)
+      allocate (recorder%fields(size(scene%output%fields)))
+      do f = 1, size(recorder%fields)
+        recorder%fields(f) = field_of(trim(scene%output%fields(f)))
+      end do
+      allocate (positions(body%n_points, 3), source=0.0_wp)
+      do c = 1, body%dim
+        call in_point_order(body, body%x(:, c), positions(:, c))
+      end do
+      command = ''
+      if (allocated(options%command)) command = options%command
+      call recorder%results%create(directory, stem, positions, recorder%fields, &
+        & planned_outputs(schedule, plan%step), &
+        & history_columns(set_up%system, recorder%probes, plan%relaxes), planned_rows(schedule), &
+        & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
+        & program_version, options%overwrite, error)
+      if (allocated(error)) return
+      call put_points(scene, body, recorder, error)
+      if (allocated(error)) return
+      call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet)
+    end associate
+  end subroutine open_recorder
+
+  !> What each point is: volume, body, material, layer, regions.
+  subroutine put_points(scene, body, recorder, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    type(recorder_type), intent(inout) :: recorder
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: volume(:)
+    integer(i4), allocatable :: number(:)
+    logical, allocatable :: mask(:)
+    integer :: r
+
+    allocate (volume(body%n_points), number(body%n_points))
+    call in_point_order(body, body%volume, volume)
+    call recorder%results%put_points('volume', volume, error)
+    if (allocated(error)) return
+    call in_point_order(body, body%body, number)
+    call recorder%results%put_points('body', number, error)
+    if (allocated(error)) return
+    call in_point_order(body, body%material, number)
+    call recorder%results%put_points('material', number, error)
+    if (allocated(error)) return
+    call in_point_order(body, body%layer, number)
+    call recorder%results%put_points('layer', number, error)
+    do r = 1, size(scene%regions)
+      if (allocated(error)) return
+      mask = region_mask(scene, body, trim(scene%regions(r)%name))
+      call recorder%results%put_points('region_'//trim(scene%regions(r)%name), &
+        & merge(1_i1, 0_i1, mask(body%slot)), error)
+    end do
+  end subroutine put_points
+
+  !> The scene file's name without folder and ending.
+  pure function stem_of(scene) result(stem)
+    type(scene_type), intent(in) :: scene
+    character(:), allocatable :: stem
+    integer :: dot
+
+    stem = 'scene'
+    if (.not. allocated(scene%file)) return
+    if (scene%file == '') return
+    stem = scene%file(index(scene%file, '/', back=.true.) + 1:)
+    dot = index(stem, '.', back=.true.)
+    if (dot > 1) stem = stem(:dot - 1)
+  end function stem_of
+
+  !> Let OpenMP use this many threads; 0 leaves its own choice.
+  subroutine use_threads(threads)
+    integer, intent(in) :: threads
+    if (threads > 0) call omp_set_num_threads(threads)
+  end subroutine use_threads
+
+  subroutine say(options, text)
+    type(run_options_type), intent(in) :: options
+    character(*), intent(in) :: text
+    if (.not. options%quiet) write (output_unit, '(a)') text
+  end subroutine say
+
+end module pd_driver

@@ -1,0 +1,68 @@
+!> What must not be: points on top of each other. And what may surprise: points with no neighbour.
+module pd_family_neighbours
+  use pd_base_kinds, only: wp, i4
+  use pd_base_error, only: error_type, fail
+  use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  implicit none (type, external)
+  private
+  public :: check_overlap
+
+contains
+
+  !> An error if two bodies overlap (centres closer than half a spacing) or two points coincide;
+  !> `lonely` is the number of points without any bond.
+  subroutine check_overlap(body, family, lonely, error)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    integer, intent(out) :: lonely
+    type(error_type), allocatable, intent(out) :: error
+    type(bonds_type) :: bonds
+    integer(i4), allocatable :: other(:)
+    integer :: k, i, j
+    real(wp) :: near
+
+    lonely = 0
+    allocate (other(body%n_slots), source=0_i4)
+    !$omp parallel default(none) shared(body, family, other) private(bonds, k, i, j, near) reduction(+:lonely)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      if (bonds%n == 0) lonely = lonely + 1
+      do i = 1, bonds%n
+        j = bonds%j(i)
+        near = 1.0e-6_wp
+        if (body%body(j) /= body%body(k)) near = 0.5_wp
+        if (bonds%length(i) < near*(body%spacing(k) + body%spacing(j))/2) other(k) = int(j, i4)
+      end do
+    end do
+    !$omp end parallel
+    k = findloc(other > 0, .true., dim=1)
+    if (k == 0) return
+    j = other(k)
+    if (body%body(k) /= body%body(j)) then
+      call fail(error, 'bodies '//to_text(int(body%body(k)))//' and '//to_text(int(body%body(j)))// &
+        & ' overlap: their points '//at(k)//' and '//at(j)//' are closer than half a spacing')
+    else
+      call fail(error, 'two points of body '//to_text(int(body%body(k)))//' coincide: '//at(k)//' and '//at(j))
+    end if
+
+  contains
+
+    !> A point's number and position.
+    pure function at(s) result(text)
+      integer, intent(in) :: s
+      character(:), allocatable :: text
+      integer :: c
+      text = to_text(int(body%point(s)))//' ('//to_text(body%x(s, 1))
+      do c = 2, body%dim
+        text = text//', '//to_text(body%x(s, c))
+      end do
+      text = text//')'
+    end function at
+  end subroutine check_overlap
+
+end module pd_family_neighbours

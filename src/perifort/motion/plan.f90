@@ -1,0 +1,113 @@
+!> What a run will do in time: the step and its number, or the relaxation's mass.
+module pd_motion_plan
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type, fail
+  use pd_base_text, only: to_text
+  use pd_scene_types, only: scene_type, is_set
+  use pd_motion_relaxation, only: relaxation_type
+  use pd_motion_system, only: system_type
+  use pd_motion_time_step, only: stiffness_bound, stable_step, printed_step, book_step, &
+    & chapter_stiffness, constant_stiffness, integrator_limit
+  implicit none (type, external)
+  private
+  public :: plan_type, make_plan, depth_of
+
+  real(wp), parameter :: default_safety = 5.0_wp  !! of the masses that are not stable by themselves
+
+  type :: plan_type
+    logical :: relaxes = .false.
+    character(:), allocatable :: integrator
+    real(wp) :: step = 0.0_wp          !! [s]
+    integer :: steps = 0
+    real(wp) :: limit = 0.0_wp         !! 7.25 as used, for the integrator [s]
+    real(wp) :: printed = 0.0_wp       !! 7.25 as printed [s], 0 if it has no value
+    real(wp) :: book = 0.0_wp          !! the book's estimate sqrt(2 rho dx/(V_h c)) [s]
+    type(relaxation_type) :: relaxation
+  end type plan_type
+
+contains
+
+  !> Make the plan of a scene for its system.
+  subroutine make_plan(scene, system, plan, error)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(plan_type), intent(out) :: plan
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: bound(:)
+
+    allocate (bound(system%body%n_slots))
+    call stiffness_bound(system%body, system%family, system%model, bound)
+    plan%relaxes = scene%time%method == 'relaxation'
+    plan%integrator = trim(scene%time%integrator)
+    if (.not. any(bound > 0.0_wp)) then
+      call fail(error, 'no point of the scene has a neighbour within the horizon: there is nothing '// &
+        & 'to compute. Is the horizon''s ratio or length too small?')
+      return
+    end if
+    if (plan%relaxes) then
+      call plan_relaxation(scene, system, bound, plan%relaxation)
+      plan%steps = plan%relaxation%load_steps
+      return
+    end if
+    plan%limit = stable_step(system%body, system%model, bound)*integrator_limit(plan%integrator)/2
+    call printed_step(system%body, system%family, system%model, plan%printed)
+    plan%book = book_step(system%model, system%body%dim, system%family%rule%delta, depth_of(scene), &
+      & minval(system%body%spacing, mask=system%body%point > 0))
+    plan%step = scene%time%safety*plan%limit
+    if (is_set(scene%time%step)) plan%step = scene%time%step
+    plan%steps = scene%time%steps
+    if (.not. is_set(scene%time%duration)) return
+    if (scene%time%duration/plan%step > 0.9_wp*huge(1)) then
+      call fail(error, 'the duration of '//to_text(scene%time%duration)//' s needs '// &
+        & to_text(scene%time%duration/plan%step)//' steps of '//to_text(plan%step)//' s, more than '// &
+        & to_text(huge(1)))
+      return
+    end if
+    plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
+    plan%step = scene%time%duration/plan%steps
+  end subroutine make_plan
+
+  !> The fictitious mass of every component, for a step of 1.
+  subroutine plan_relaxation(scene, system, bound, relaxation)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: bound(:)
+    type(relaxation_type), intent(out) :: relaxation
+    real(wp) :: safety
+    integer :: c
+
+    relaxation%load_steps = scene%relaxation%load_steps
+    relaxation%maximum_iterations = scene%relaxation%maximum_iterations
+    relaxation%tolerance = scene%relaxation%tolerance
+    allocate (relaxation%mass(system%body%n_slots, system%body%dim), source=0.0_wp)
+    safety = default_safety
+    if (scene%relaxation%density_matrix == 'frame_invariant') safety = 1.0_wp
+    if (is_set(scene%relaxation%safety)) safety = scene%relaxation%safety
+    select case (scene%relaxation%density_matrix)
+    case ('chapter')
+      call chapter_stiffness(system%body, system%family, system%model, relaxation%mass)
+      relaxation%mass = safety*relaxation%mass/4
+    case ('constant')
+      call constant_stiffness(system%body, system%model, system%family%rule%delta, depth_of(scene), &
+        & relaxation%mass(:, 1))
+      do c = system%body%dim, 1, -1
+        relaxation%mass(:, c) = safety*relaxation%mass(:, 1)/4
+      end do
+    case default
+      do c = 1, system%body%dim
+        relaxation%mass(:, c) = safety*bound/2
+      end do
+    end select
+  end subroutine plan_relaxation
+
+  !> What turns dx^dim into a volume: thickness in 2D, area in 1D.
+  pure real(wp) function depth_of(scene) result(depth)
+    type(scene_type), intent(in) :: scene
+    select case (scene%header%dimension)
+    case (1); depth = scene%header%area
+    case (2); depth = scene%header%thickness
+    case default; depth = 1.0_wp
+    end select
+  end function depth_of
+
+end module pd_motion_plan

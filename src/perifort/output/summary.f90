@@ -1,0 +1,158 @@
+!> What the user reads on the terminal: what will be computed and why so, and what it came to.
+module pd_output_summary
+  use pd_base_kinds, only: wp, i8
+  use pd_base_clock, only: duration_text
+  use pd_base_text, only: to_text, with_unit, newline
+  use pd_scene_types, only: scene_type
+  use pd_motion_plan, only: plan_type
+  use pd_motion_system, only: system_type
+  use pd_output_recorder, only: recorder_type, probe_type
+  implicit none (type, external)
+  private
+  public :: summary_before, summary_after, memory_of
+
+contains
+
+  !> The scene as it will be computed: points, bonds, memory, kernels and why, time step, probes.
+  function summary_before(scene, system, plan, probes, cut, lonely, threads) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(plan_type), intent(in) :: plan
+    type(probe_type), intent(in) :: probes(:)
+    integer(i8), intent(in) :: cut        !! bonds removed by cracks
+    integer, intent(in) :: lonely         !! points without a bond
+    integer, intent(in) :: threads
+    character(:), allocatable :: text
+    integer :: p
+
+    text = ''
+    if (scene%header%title /= '') text = trim(scene%header%title)//newline
+    text = text//line('points', to_text(system%body%n_points)//', '// &
+      & to_text(scene%header%dimension)//'D, horizon '//with_unit(system%family%rule%delta, 'm'))
+    text = text//line('bonds', to_text(system%family%n_bonds)//' (each from both ends), at most '// &
+      & to_text(system%family%most_bonds)//' a point')
+    if (size(scene%cracks) > 0) text = text//line('cracks', to_text(size(scene%cracks))//', which cut '// &
+      & to_text(cut)//' bonds')
+    if (lonely > 0) text = text//line('warning', to_text(lonely)//' points have no neighbour and stay put')
+    text = text//line('memory', with_unit(real(memory_of(system), wp), 'B', 3))
+    text = text//kernels(scene, system)
+    text = text//line('threads', to_text(threads))
+    if (plan%relaxes) then
+      text = text//line('relaxation', to_text(plan%relaxation%load_steps)//' load step(s), tolerance '// &
+        & to_text(plan%relaxation%tolerance)//', density matrix '//trim(scene%relaxation%density_matrix))
+    else
+      text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
+        & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &
+        & ' (7.25, '//plan%integrator//')')
+      text = text//line('', '7.25 as printed '//printed(plan)//', the book''s estimate '// &
+        & with_unit(plan%book, 's', 6))
+      if (plan%step > plan%limit) text = text//line('warning', 'the time step is above the stable one')
+      text = text//line('steps', to_text(plan%steps)//', to t = '//with_unit(plan%steps*plan%step, 's', 6))
+    end if
+    do p = 1, size(probes)
+      text = text//line('probe', probes(p)%name//' is point '// &
+        & to_text(int(system%body%point(probes(p)%slot)))//' at ('//position(system, int(probes(p)%slot))//') m')
+    end do
+  end function summary_before
+
+  !> The kernels chosen, each with its reason.
+  function kernels(scene, system) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+
+    associate (model => system%model)
+      text = line('families', system%family%describe())
+      if (model%dilatation) then
+        text = text//line('kernels', 'dilatation and force pass: some material has a /= 0; '// &
+          & trim(scene%horizon%dilatation)//' dilatation')
+      else
+        text = text//line('kernels', 'force pass only: a = 0 in every material (bond-based)')
+      end if
+      text = text//line('', merge('surface factors: corrected by energy             ', &
+        & 'no surface factors: surface_correction = ''none''  ', model%surface))
+      if (model%breaking) then
+        text = text//line('', 'bonds can break'//trim(merge(', in compression too', repeat(' ', 20), model%compression)))
+      else if (any(scene%materials%critical_stretch > 0.0_wp) .or. &
+        & any(scene%materials%critical_energy_release_rate > 0.0_wp)) then
+        text = text//line('', 'no bond can break: all points lie in no-fail zones')
+      else
+        text = text//line('', 'no bond can break: no material has a critical stretch')
+      end if
+      text = text//line('', merge('thermal strain           ', 'no temperature, no thermal', model%thermal))
+    end associate
+  end function kernels
+
+  pure function printed(plan) result(text)
+    type(plan_type), intent(in) :: plan
+    character(:), allocatable :: text
+    text = 'has no value (its sum is negative)'
+    if (plan%printed > 0.0_wp) text = with_unit(plan%printed, 's', 6)
+  end function printed
+
+  !> What the run came to: time per phase, speed, energies, damage, where the results are.
+  function summary_after(system, recorder, directory) result(text)
+    type(system_type), intent(in) :: system
+    type(recorder_type), intent(in) :: recorder
+    character(*), intent(in) :: directory
+    character(:), allocatable :: text
+    real(wp) :: supply, balance, largest
+
+    text = recorder%timer%table()//newline
+    if (recorder%steps_done > 0) text = text//line('speed', &
+      & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
+      & /(real(system%family%n_bonds, wp)*recorder%steps_done), 3)//' ns per bond and step, '// &
+      & to_text(recorder%steps_done/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
+    associate (now => recorder%energies, first => recorder%first_energies)
+      text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
+      text = text//line('strain energy', with_unit(now%strain, 'J'))
+      if (system%model%breaking) then
+        text = text//line('dissipated', with_unit(system%dissipated, 'J')//' by breaking '// &
+          & to_text(system%broken)//' bonds')
+        text = text//line('damage', 'at most '//to_text(maxval(system%state%damage), 3))
+      end if
+      text = text//line('external work', with_unit(system%external_work, 'J'))
+      if (.not. recorder%schedule%relaxation) then
+        supply = first%kinetic + first%strain + system%external_work
+        balance = now%kinetic + now%strain + system%dissipated - supply
+        largest = max(abs(now%kinetic) + abs(now%strain) + system%dissipated, abs(supply))
+        if (largest > 0.0_wp) text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '// &
+          & to_text(100*abs(balance)/largest, 2)//' % of the energy')
+      end if
+    end associate
+    text = text//line('results', directory)
+  end function summary_after
+
+  !> Memory of points and families [bytes].
+  pure integer(i8) function memory_of(system) result(bytes)
+    type(system_type), intent(in) :: system
+    integer :: reals
+    reals = system%body%dim*4 + 2          ! x, u, v, f; volume, spacing
+    reals = reals + 1                      ! damage
+    if (system%model%dilatation) reals = reals + 1
+    if (system%model%breaking) reals = reals + 1
+    if (system%model%surface) reals = reals + 2*system%body%dim
+    bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) + system%family%bytes()
+  end function memory_of
+
+  !> A labelled line.
+  pure function line(label, content) result(text)
+    character(*), intent(in) :: label, content
+    character(:), allocatable :: text
+    character(18) :: column
+    column = '  '//label
+    text = column//content//newline
+  end function line
+
+  pure function position(system, k) result(text)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: k
+    character(:), allocatable :: text
+    integer :: c
+    text = to_text(system%body%x(k, 1))
+    do c = 2, system%body%dim
+      text = text//', '//to_text(system%body%x(k, c))
+    end do
+  end function position
+
+end module pd_output_summary
