@@ -1,0 +1,76 @@
+!> The commands of the program: each a few lines that call what does the work.
+module pd_commands
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  use hdf5, only: h5get_libversion_f
+  use pd_base_error, only: error_type, fail, status_usage
+  use pd_base_text, only: to_text
+  use pd_base_version, only: compiler_flags, compiler_name, program_version
+  use pd_command_line, only: command_line_type, help_text
+  use pd_driver, only: check_scene, run_options_type, run_scene
+  use pd_scene_read, only: read_scene
+  use pd_scene_reference, only: write_reference
+  use pd_scene_template, only: write_template
+  use pd_scene_types, only: scene_type
+  implicit none (type, external)
+  private
+  public :: execute, hdf5_version
+
+contains
+
+  !> Do what the command line says. Answers go to standard output; `error` tells what went wrong and
+  !> with which exit status.
+  subroutine execute(line, error)
+    type(command_line_type), intent(in) :: line
+    type(error_type), allocatable, intent(out) :: error
+    type(run_options_type) :: options
+    type(scene_type) :: scene
+
+    if (line%help) then
+      write (output_unit, '(a)', advance='no') help_text(line%command)
+      return
+    end if
+
+    select case (line%command)
+    case ('run', 'check')
+      options%output_directory = line%output_directory
+      options%command = line%text
+      options%threads = line%threads
+      options%overwrite = line%overwrite
+      options%quiet = line%quiet
+      call read_scene(line%argument, scene, error)
+      if (allocated(error)) return
+      if (line%command == 'run') then
+        call run_scene(scene, options, error)
+      else
+        call check_scene(scene, options, error)
+      end if
+    case ('template')
+      call write_template(output_unit, line%argument, error)
+    case ('reference')
+      call write_reference(output_unit, line%argument, error)
+    case ('version')
+      call write_version()
+    case default
+      call fail(error, "unknown command '"//line%command//"'", status_usage)
+    end select
+  end subroutine execute
+
+  !> Version, compiler with flags, HDF5.
+  subroutine write_version()
+    write (output_unit, '(2a)') 'perifort ', program_version
+    write (output_unit, '(2a)') 'compiler  ', compiler_name()
+    write (output_unit, '(2a)') 'flags     ', compiler_flags()
+    write (output_unit, '(2a)') 'HDF5      ', hdf5_version()
+  end subroutine write_version
+
+  !> The version of the HDF5 library in use, as `1.10.8`.
+  function hdf5_version() result(text)
+    character(:), allocatable :: text
+    integer :: major, minor, release, status
+
+    call h5get_libversion_f(major, minor, release, status)
+    text = 'unknown'
+    if (status == 0) text = to_text(major)//'.'//to_text(minor)//'.'//to_text(release)
+  end function hdf5_version
+
+end module pd_commands
