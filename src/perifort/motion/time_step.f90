@@ -37,7 +37,7 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          inverse(k) = inverse(k) + factor(model%D, k, j)*bonds%weight(i)/bonds%length(i)
+          inverse(k) = inverse(k) + factor(model, model%D, n, k, j)*bonds%weight(i)/bonds%length(i)
         end do
         associate (m => model%materials(model%material(k)))
           inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*m%t**2
@@ -53,22 +53,22 @@ contains
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
         bound(k) = bound(k) + ((model%materials(model%material(k))%q &
-          & + model%materials(model%material(j))%q)*factor(model%S, k, j) &
-          & + (inverse(k) + inverse(j))*factor(model%D, k, j))*bonds%weight(i)/bonds%length(i)
+          & + model%materials(model%material(j))%q)*factor(model, model%S, n, k, j) &
+          & + (inverse(k) + inverse(j))*factor(model, model%D, n, k, j))*bonds%weight(i)/bonds%length(i)
       end do
     end do
     !$omp end parallel
-
-  contains
-
-    !> Gd or Gb of the bond k-j along n.
-    pure real(wp) function factor(g, k, j)
-      real(wp), allocatable, intent(in) :: g(:, :)
-      integer, intent(in) :: k, j
-      factor = 1.0_wp
-      if (model%surface) factor = bond_factor(n, g(k, :), g(j, :))
-    end function factor
   end subroutine stiffness_bound
+
+  !> Gd or Gb of the bond k-j along the unit vector n.
+  pure real(wp) function factor(model, g, n, k, j)
+    type(model_type), intent(in) :: model
+    real(wp), allocatable, intent(in) :: g(:, :)
+    real(wp), intent(in) :: n(:)
+    integer, intent(in) :: k, j
+    factor = 1.0_wp
+    if (model%surface) factor = bond_factor(n, g(k, :), g(j, :))
+  end function factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
   pure real(wp) function stable_step(body, model, bound) result(step)

@@ -69,8 +69,8 @@ contains
       else
         text = text//line('kernels', 'force pass only: a = 0 in every material (bond-based)')
       end if
-      text = text//line('', merge('surface factors: corrected by energy             ', &
-        & 'no surface factors: surface_correction = ''none''  ', model%surface))
+      text = text//line('', trim(merge('surface factors: corrected by energy ', &
+        & 'no surface factors: switched off     ', model%surface)))
       if (model%breaking) then
         text = text//line('', 'bonds can break'//trim(merge(', in compression too', repeat(' ', 20), model%compression)))
       else if (any(scene%materials%critical_stretch > 0.0_wp) .or. &
@@ -79,7 +79,7 @@ contains
       else
         text = text//line('', 'no bond can break: no material has a critical stretch')
       end if
-      text = text//line('', merge('thermal strain           ', 'no temperature, no thermal', model%thermal))
+      text = text//line('', trim(merge('thermal strain   ', 'no thermal strain', model%thermal)))
     end associate
   end function kernels
 
