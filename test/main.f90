@@ -12,6 +12,16 @@ program main
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
   use test_command_line, only: collect_command_line
+  use test_scene_check, only: collect_scene_check
+  use test_scene_elements, only: collect_scene_elements
+  use test_scene_file, only: collect_scene_file
+  use test_scene_read, only: collect_scene_read
+  use test_scene_reference, only: collect_scene_reference
+  use test_scene_source, only: collect_scene_source
+  use test_scene_table, only: collect_scene_table
+  use test_scene_template, only: collect_scene_template
+  use test_scene_values, only: collect_scene_values
+  use test_scene_write, only: collect_scene_write
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -24,6 +34,16 @@ program main
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)
   call register('command_line', collect_command_line)
+  call register('scene_check', collect_scene_check)
+  call register('scene_elements', collect_scene_elements)
+  call register('scene_file', collect_scene_file)
+  call register('scene_read', collect_scene_read)
+  call register('scene_reference', collect_scene_reference)
+  call register('scene_source', collect_scene_source)
+  call register('scene_table', collect_scene_table)
+  call register('scene_template', collect_scene_template)
+  call register('scene_values', collect_scene_values)
+  call register('scene_write', collect_scene_write)
 
   call read_arguments()
   if (len(suite_name) > 0) then

@@ -22,7 +22,7 @@ module pd_scene_table
   end type table_type
 
   character(*), parameter :: separators = ' ,'//achar(9)
-  character(*), parameter :: plain_characters = '0123456789+-.eEdD ,'//achar(9)
+  character(*), parameter :: number_start = '+-.0123456789'
   integer, parameter :: longest_plain = 30  !! characters of a number that is surely in range
 
 contains
@@ -181,20 +181,25 @@ contains
     end associate
   end subroutine read_row
 
-  !> Whether a line surely holds only numbers in range: their characters, no exponent of three
-  !> digits, no double comma.
+  !> Whether a line surely holds only numbers in range: signs where they belong, no exponent of
+  !> three digits. The runtime would read `2-5` as 2e-5, and trap on `1e999`.
   pure logical function is_plain(text) result(plain)
     character(*), intent(in) :: text
-    integer :: first, final, mark
+    integer :: first, final, mark, signs
 
-    plain = verify(text, plain_characters) == 0 .and. index(text, ',') == 0
+    plain = index(text, ',') == 0
     final = 0
     do while (plain)
       call next_word(text, final, first)
       if (first > len(text)) return
       mark = scan(text(first:final), 'eEdD')
-      plain = final - first < longest_plain
-      if (mark > 0) plain = plain .and. final - first + 1 - mark <= 3
+      mark = merge(final + 1, first + mark - 1, mark == 0)
+      plain = final - first < longest_plain .and. verify(text(first:first), number_start) == 0 &
+        & .and. verify(text(first + 1:mark - 1), '0123456789.') == 0
+      if (mark > final) cycle
+      signs = scan(text(mark + 1:min(mark + 1, final)), '+-')
+      plain = plain .and. final - mark - signs <= 2 .and. &
+        & verify(text(mark + 1 + signs:final), '0123456789') == 0
     end do
   end function is_plain
 
