@@ -2,7 +2,7 @@
 module test_scene_table
   use pd_base_kinds, only: wp
   use pd_base_error, only: scene_error => error_type
-  use pd_scene_table, only: column_of, read_numbers, read_table, read_table_text, table_type
+  use pd_scene_table, only: column_of, read_table, read_table_text, table_type
   use test_scene_expect, only: expect_parts, line
   use testdrive, only: check, error_type, new_unittest, unittest_type
   implicit none (type, external)
@@ -21,7 +21,7 @@ contains
       & new_unittest('faults have a place', test_faults), &
       & new_unittest('faults of headers', test_header_faults), &
       & new_unittest('many rows', test_many), &
-      & new_unittest('a file beside the scene', test_file)]
+      & new_unittest('a table from a file', test_file)]
   end subroutine collect_scene_table
 
   subroutine test_rows(error)
@@ -142,7 +142,6 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(table_type) :: table
     type(scene_error), allocatable :: found
-    real(wp), allocatable :: values(:, :)
     character(*), parameter :: path = 'test_scene_table.txt'
     integer :: unit
 
@@ -152,12 +151,12 @@ contains
     open (newunit=unit, file=path, action='write', status='replace')
     write (unit, '(a)') '0 1 2 3', '4 5 6 7'
     close (unit)
-    call read_numbers('./scene.nml', path, 4, values, found)
+    call read_table(path, table, found, columns=4)
     open (newunit=unit, file=path)
     close (unit, status='delete')
     call check(error,.not. allocated(found), 'refused')
     if (allocated(error)) return
-    call check(error, values(4, 2), 7.0_wp)
+    call check(error, table%values(4, 2), 7.0_wp)
   end subroutine test_file
 
 end module test_scene_table

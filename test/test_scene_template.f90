@@ -73,6 +73,8 @@ contains
     rewind (unit)
     read (unit, '(a)', iostat=status) first
     close (unit)
+    call check(error, status, 0)
+    if (allocated(error)) return
     call check(error, trim(first), text(:index(text, line) - 1))
   end subroutine test_default
 

@@ -1,5 +1,6 @@
 !> Scenes as text: what is written reads back to the same scene.
 module test_scene_write
+  use pd_base_kinds, only: wp
   use pd_scene_types, only: scene_type
   use pd_scene_write, only: commented_text, scene_text
   use test_scene_expect, only: expect_scene, good_head, line
@@ -69,9 +70,9 @@ contains
     call check(error, scene_text(second), scene_text(first))
     if (allocated(error)) return
     call check(error, all(abs(second%initial(1)%displacement_gradient - &
-      & first%initial(1)%displacement_gradient) <= 0.0) .and. &
-      & all(abs(second%regions(1)%upper - first%regions(1)%upper) <= 0.0) .and. &
-      & abs(second%materials(1)%youngs_modulus - 123.456789e9_8) <= 0.0)
+      & first%initial(1)%displacement_gradient) <= 0.0_wp) .and. &
+      & all(abs(second%regions(1)%upper - first%regions(1)%upper) <= 0.0_wp) .and. &
+      & abs(second%materials(1)%youngs_modulus - 123.456789e9_wp) <= 0.0_wp)
   end subroutine test_full
 
   subroutine test_commented(error)

@@ -99,6 +99,7 @@ contains
   subroutine to_string(token, name, value, message, note, allowed, word)
     type(token_type), intent(in) :: token
     character(*), intent(in) :: name
+    ! allow(C072): a text is assigned only after its length has been checked.
     character(*), intent(inout) :: value
     character(:), allocatable, intent(out) :: message, note
     character(*), intent(in), optional :: allowed(:)

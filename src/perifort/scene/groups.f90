@@ -73,7 +73,8 @@ contains
     case ('no_fail')
       purpose = 'A zone where no bond breaks: a region by its name, or a shape.'
     case ('initial')
-      purpose = 'The state at the start, of all points or of a region.'
+      purpose = 'The state at the start, of all points or of a region. The groups are applied '// &
+        & 'in order, each setting what it names.'
     case ('boundary')
       purpose = 'Imposed motion of a layer added outside a side, or of a region. '// &
         & 'Components not named stay free.'
@@ -142,6 +143,8 @@ contains
       call visit_output(keys, output)
     case ('probe')
       call visit_probe(keys, probe)
+    case default
+      continue  ! callers know the names of all groups
     end select
   end subroutine describe_group
 

@@ -122,6 +122,7 @@ contains
   subroutine text_key(keys, name, value, meaning, required, allowed, default, word, hidden)
     class(keys_type), intent(inout) :: keys
     character(*), intent(in) :: name
+    ! allow(C072): a text is assigned only after its length has been checked.
     character(*), intent(inout) :: value
     character(*), intent(in) :: meaning
     logical, intent(in), optional :: required
@@ -368,6 +369,7 @@ contains
   subroutine text_list(keys, name, value, meaning, allowed, default)
     class(keys_type), intent(inout) :: keys
     character(*), intent(in) :: name
+    ! allow(C072): a text is assigned only after its length has been checked.
     character(*), allocatable, intent(inout) :: value(:)
     character(*), intent(in) :: meaning
     character(*), intent(in) :: allowed(:)

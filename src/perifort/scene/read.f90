@@ -150,6 +150,8 @@ contains
       call visit_output(keys, scene%output)
     case ('probe')
       call visit_probe(keys, scene%probes(number))
+    case default
+      continue  ! callers know the names of all groups
     end select
     call keys%finish_reading(error)
   end subroutine read_group

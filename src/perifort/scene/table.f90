@@ -6,13 +6,13 @@ module pd_scene_table
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
   use pd_base_text, only: join, lower_case, nearest_name, to_text
-  use pd_scene_file, only: read_text_file, resolve_path, split_lines
+  use pd_scene_file, only: read_text_file, split_lines
   use pd_scene_source, only: source_type, source_fault
   use pd_scene_types, only: name_length
   use pd_scene_values, only: parse_real
   implicit none (type, external)
   private
-  public :: table_type, read_table, read_table_text, read_numbers, column_of
+  public :: table_type, read_table, read_table_text, column_of
 
   !> A table as read.
   type :: table_type
@@ -88,20 +88,6 @@ contains
     table%lines = table%lines(:row)
     table%values = table%values(:, :row)
   end subroutine read_table_text
-
-  !> The numbers `values(column, row)` of a file that a scene names, looked for as such files are.
-  subroutine read_numbers(scene_file, name, columns, values, error)
-    character(*), intent(in) :: scene_file
-    character(*), intent(in) :: name
-    integer, intent(in) :: columns
-    real(wp), allocatable, intent(out) :: values(:, :)
-    type(error_type), allocatable, intent(out) :: error
-    type(table_type) :: table
-
-    call read_table(resolve_path(trim(name), scene_file), table, error, columns)
-    if (allocated(error)) return
-    call move_alloc(table%values, values)
-  end subroutine read_numbers
 
   !> The number of the column of this name, 0 if there is none.
   pure integer function column_of(table, name) result(column)

@@ -126,6 +126,8 @@ contains
       call visit_output(keys, scene%output)
     case ('probe')
       call visit_probe(keys, scene%probes(i))
+    case default
+      continue  ! callers know the names of all groups
     end select
   end subroutine visit_one
 
