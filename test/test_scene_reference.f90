@@ -1,11 +1,12 @@
 !> The reference: complete, and true to the defaults.
 module test_scene_reference
   use pd_base_error, only: scene_error => error_type, status_usage
+  use pd_scene_file, only: read_text_file
   use pd_scene_groups, only: describe_group, group_names, group_purpose
   use pd_scene_keys, only: keys_type
   use pd_scene_reference, only: write_reference
   use test_scene_expect, only: expect_parts
-  use testdrive, only: check, error_type, new_unittest, unittest_type
+  use testdrive, only: check, error_type, new_unittest, skip_test, unittest_type
   implicit none (type, external)
   private
   public :: collect_scene_reference
@@ -18,7 +19,8 @@ contains
       & new_unittest('every group and key is there', test_complete), &
       & new_unittest('one group', test_group), &
       & new_unittest('a group that does not exist', test_unknown), &
-      & new_unittest('every key says what it means', test_meaning)]
+      & new_unittest('every key says what it means', test_meaning), &
+      & new_unittest('the page in doc is up to date', test_page)]
   end subroutine collect_scene_reference
 
   !> What `write_reference` writes.
@@ -106,5 +108,21 @@ contains
       end do
     end do
   end subroutine test_meaning
+
+  !> Tests run in the project's folder, so the page is at hand.
+  subroutine test_page(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_error), allocatable :: found
+    character(:), allocatable :: text, page
+
+    call read_text_file('doc/input-reference.md', page, found)
+    if (allocated(found)) then
+      call skip_test(error, 'not run in the project''s folder')
+      return
+    end if
+    call reference_of('', text, found)
+    call check(error, page == text, 'doc/input-reference.md differs from what the program prints;'// &
+      & ' write it anew with: ./pf reference > doc/input-reference.md')
+  end subroutine test_page
 
 end module test_scene_reference

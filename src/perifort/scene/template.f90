@@ -126,7 +126,7 @@ contains
     scene%bodies(1)%name = 'block'
     scene%bodies(1)%lower = [0.0_wp, -0.05_wp, -0.05_wp]
     scene%bodies(1)%upper = [0.5_wp, 0.05_wp, 0.05_wp]
-    scene%bodies(1)%points = [40, 8, 8]
+    scene%bodies(1)%points = [30, 6, 6]
     scene%materials(1)%poissons_ratio = 0.3_wp
     scene%boundaries(1)%name = 'clamp'
     scene%boundaries(1)%side = 'x_min'
@@ -160,8 +160,8 @@ contains
     scene%boundaries(2)%side = 'y_min'
     scene%boundaries(2)%velocity(2) = -20.0_wp
     scene%materials(1)%critical_stretch = 0.04472_wp
-    scene%time%duration = 16.7e-6_wp
-    scene%output%interval = 1.67e-6_wp
+    scene%time%duration = 24.0e-6_wp
+    scene%output%interval = 2.0e-6_wp
   end subroutine crack
 
   !> 2D: a plate with a hole, stretched slowly until it cracks.
@@ -172,7 +172,7 @@ contains
     call allocate_groups(scene)
     call brittle(scene)
     scene%header%title = 'Plate with a hole, stretched slowly'
-    scene%bodies(1)%points(:2) = [50, 50]
+    scene%bodies(1)%points(:2) = [40, 40]
     scene%removed(1)%shape = 'sphere'
     scene%removed(1)%radius = 0.005_wp
     scene%boundaries(1)%name = 'top'
