@@ -121,8 +121,8 @@ contains
       return
     end if
     call reference_of('', text, found)
-    call check(error, page == text, 'doc/input-reference.md differs from what the program prints;'// &
-      & ' write it anew with: ./pf reference > doc/input-reference.md')
+    call check(error, page == text, 'doc/input-reference.md differs from what the program '// &
+      & 'prints; write it anew with: ./pf reference > doc/input-reference.md')
   end subroutine test_page
 
 end module test_scene_reference

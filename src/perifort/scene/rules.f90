@@ -1,4 +1,4 @@
-!> Helpers of the rules that a scene must keep: a fault at the place of a key, names that must
+!> Tools for the rules that a scene must keep: a fault at the place of a key, names that must
 !> exist, components that the dimension does not have.
 !>
 !> A scene built in memory has no source; its faults then name the group and the key only.
