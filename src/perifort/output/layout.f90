@@ -312,7 +312,8 @@ contains
     end do
   end subroutine copy_static
 
-  !> Copy the complete outputs and rows, field by field and block by block.
+  !> Copy the complete outputs and rows, and what there is of an output under way, field by field
+  !> and block by block. `outputs` and `rows` count the complete ones.
   subroutine copy_time_series(self, from, outputs, rows, to, error)
     class(layout_type), intent(in) :: self
     type(hdf5_file), intent(in) :: from
@@ -325,7 +326,7 @@ contains
     do i = 1, size(self%fields)
       if (allocated(error)) return
       call copy_rows(from, to, '/VTKHDF/PointData/'//trim(self%fields(i)%name), &
-        & outputs*self%points, self%single, error)
+        & (outputs + 1)*self%points, self%single, error)
     end do
     do i = 1, size(self%columns)
       if (allocated(error)) return
@@ -339,7 +340,7 @@ contains
       & call change_attribute(to, '/VTKHDF/Steps', 'NSteps', outputs, error)
   end subroutine copy_time_series
 
-  !> Copy the first `rows` rows of a dataset of reals.
+  !> Copy the first `rows` rows of a dataset of reals, or all if there are fewer.
   subroutine copy_rows(from, to, path, rows, single, error)
     type(hdf5_file), intent(in) :: from, to
     character(*), intent(in) :: path
@@ -353,8 +354,9 @@ contains
 
     call get_shape(from, path, components, extent, error)
     if (allocated(error)) return
-    do first = 0, rows - 1, block_rows
-      count = min(int(block_rows, i8), rows - first)
+    extent = min(extent, rows)
+    do first = 0, extent - 1, block_rows
+      count = min(int(block_rows, i8), extent - first)
       if (.not. allocated(values)) allocate (values(components, count))
       call read_rows(from, path, first, values(:, :count), error)
       if (allocated(error)) return
