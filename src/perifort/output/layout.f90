@@ -145,7 +145,10 @@ contains
     if (allocated(error)) return
     call put_attribute(file, steps, 'NSteps', 0_i8, error)
     if (allocated(error)) return
-    call make_series(file, steps//'/Values', storage_f8, 1, s, chunk, error)
+    ! Readers take the number of times for NSteps and must never find more times: the two change
+    ! together. Made one after the other, their records are neighbours, which HDF5 joins into one
+    ! write; and if it doesn't, NSteps comes first.
+    call make_series(file, steps//'/Values', storage_f8, 1, 1_i8, s, error)
     if (allocated(error)) return
     call put_multiples(file, steps//'/PartOffsets', s, 0_i8, chunk, error)
     if (allocated(error)) return
@@ -322,6 +325,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer :: i
 
+    call set_rows(to, '/VTKHDF/Steps/Values', 1, max(1_i8, outputs), error)
+    if (allocated(error)) return
     call copy_rows(from, to, '/VTKHDF/Steps/Values', outputs, .false., error)
     do i = 1, size(self%fields)
       if (allocated(error)) return

@@ -194,11 +194,19 @@ contains
     class(vtkhdf_file), intent(inout) :: self
     real(wp), intent(in) :: time
     type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
 
+    call set_rows(self%file, '/VTKHDF/Steps/Values', 1, self%outputs + 1, error)
+    if (allocated(error)) return
     call write_rows(self%file, '/VTKHDF/Steps/Values', self%outputs, [time], error)
     if (.not. allocated(error)) call change_attribute(self%file, '/VTKHDF/Steps', 'NSteps', &
       & self%outputs + 1, error)
-    if (.not. allocated(error)) call flush_file(self%file, error)
+    if (allocated(error)) then
+      ! the new length is still in memory only: take it back
+      call set_rows(self%file, '/VTKHDF/Steps/Values', 1, max(1_i8, self%outputs), ignored)
+      return
+    end if
+    call flush_file(self%file, error)
     if (.not. allocated(error)) self%outputs = self%outputs + 1
   end subroutine end_output
 
@@ -292,7 +300,9 @@ contains
     if (self%current == self%path) return
     call seal(self, error)
     if (.not. allocated(error)) call rename_file(self%current, self%path, error)
-    if (.not. allocated(error)) self%current = self%path
+    if (allocated(error)) return
+    self%current = self%path
+    self%file%name = self%path
   end subroutine publish
 
   !> Cut off room that wasn't needed and close the file.
