@@ -29,6 +29,7 @@ module pd_output_layout
     integer(i8) :: row_capacity = 0  !! rows of the history there is room for
     logical :: single = .false.      !! fields in single precision
   contains
+    procedure :: make_heart
     procedure :: make_time_series
     procedure :: copy_time_series
     procedure :: trim_time_series
@@ -39,6 +40,30 @@ module pd_output_layout
   end type layout_type
 
 contains
+
+  !> Begin a file, before all else: what an output is counted by.
+  !>
+  !> Readers take the number of times for NSteps, and VTK's writes past its memory when it finds
+  !> more. So the two change together: made one after the other in a file that is still empty,
+  !> their records are neighbours at a fixed place, and HDF5 joins them into one write.
+  !> Should another version not do so, NSteps is written first.
+  subroutine make_heart(self, file, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: file
+    type(error_type), allocatable, intent(out) :: error
+
+    call make_group(file, '/VTKHDF', error)
+    if (allocated(error)) return
+    call make_group(file, '/VTKHDF/Steps', error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF/Steps', 'NSteps', 0_i8, error)
+    if (allocated(error)) return
+    call make_series(file, '/VTKHDF/Steps/Values', storage_f8, 1, 1_i8, self%capacity, error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
+  end subroutine make_heart
 
   !> `/scene`: what was computed, by what.
   subroutine put_scene(file, scene_text, command, version, error)
@@ -65,12 +90,6 @@ contains
     integer :: i
 
     n = size(positions, 1, kind=i8)
-    call make_group(file, '/VTKHDF', error)
-    if (allocated(error)) return
-    call put_attribute(file, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
-    if (allocated(error)) return
-    call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
-    if (allocated(error)) return
     call put_array(file, '/VTKHDF/NumberOfPoints', [n], error)
     if (allocated(error)) return
     call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, n, error)
@@ -128,7 +147,7 @@ contains
     end do
   end subroutine put_multiples
 
-  !> What grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
+  !> What else grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
   subroutine make_time_series(self, file, error)
     class(layout_type), intent(in) :: self
     type(hdf5_file), intent(in) :: file
@@ -141,15 +160,6 @@ contains
 
     s = self%capacity
     chunk = min(s, small_chunk/8)
-    call make_group(file, steps, error)
-    if (allocated(error)) return
-    call put_attribute(file, steps, 'NSteps', 0_i8, error)
-    if (allocated(error)) return
-    ! Readers take the number of times for NSteps and must never find more times: the two change
-    ! together. Made one after the other, their records are neighbours, which HDF5 joins into one
-    ! write; and if it doesn't, NSteps comes first.
-    call make_series(file, steps//'/Values', storage_f8, 1, 1_i8, s, error)
-    if (allocated(error)) return
     call put_multiples(file, steps//'/PartOffsets', s, 0_i8, chunk, error)
     if (allocated(error)) return
     call put_multiples(file, steps//'/PointOffsets', s, 0_i8, chunk, error)
@@ -306,12 +316,9 @@ contains
       & '/VTKHDF/Polygons', '/VTKHDF/Strips']
     integer :: i
 
-    call make_group(to, '/VTKHDF', error)
-    if (.not. allocated(error)) call put_attribute(to, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
-    if (.not. allocated(error)) call put_attribute(to, '/VTKHDF', 'Type', 'PolyData', error)
     do i = 1, size(parts)
-      if (allocated(error)) return
       call copy_object(from, trim(parts(i)), to, error)
+      if (allocated(error)) return
     end do
   end subroutine copy_static
 

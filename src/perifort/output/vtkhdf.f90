@@ -84,7 +84,8 @@ contains
     if (allocated(error)) return
     call create_file(self%current, self%file, error)
     if (allocated(error)) return
-    call put_geometry(self%file, positions, error)
+    call self%layout%make_heart(self%file, error)
+    if (.not. allocated(error)) call put_geometry(self%file, positions, error)
     if (.not. allocated(error)) call put_scene(self%file, scene_text, command, version, error)
     if (.not. allocated(error)) call make_group(self%file, '/points', error)
     if (.not. allocated(error)) call self%layout%make_time_series(self%file, error)
@@ -272,6 +273,7 @@ contains
     self%layout%row_capacity = row_capacity
     name = self%path//'.grow'
     call create_file(name, bigger, error)
+    if (.not. allocated(error)) call self%layout%make_heart(bigger, error)
     if (.not. allocated(error)) call copy_static(self%file, bigger, error)
     if (.not. allocated(error)) call self%layout%make_time_series(bigger, error)
     if (.not. allocated(error)) call self%layout%copy_time_series(self%file, &
@@ -315,15 +317,20 @@ contains
     if (.not. allocated(error)) call close_file(self%file, error)
   end subroutine finish
 
-  !> Close the file as it is; one that never got its final name is removed.
+  !> Write nothing more. A file that has its final name is left as it was at its last complete
+  !> output: closing it would write records that belong to what failed, so its identifier is
+  !> given up instead. One that never got its final name is removed.
   subroutine abandon(self)
     class(vtkhdf_file), intent(inout) :: self
     type(error_type), allocatable :: ignored
 
-    call close_file(self%file, ignored)
     if (allocated(self%current)) then
-      if (self%current /= self%path) call remove_file(self%current)
+      if (self%current /= self%path) then
+        call close_file(self%file, ignored)
+        call remove_file(self%current)
+      end if
     end if
+    self%file%id = -1
   end subroutine abandon
 
   !> Bytes that one output takes.
