@@ -82,6 +82,7 @@ contains
 
     call start_hdf5(error)
     if (allocated(error)) return
+    call remove_file(path//'.grow')  ! a killed run may have left it
     call create_file(self%current, self%file, error)
     if (allocated(error)) return
     call self%layout%make_heart(self%file, error)
