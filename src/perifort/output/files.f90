@@ -1,11 +1,11 @@
 !> Files and folders: what standard Fortran leaves out, through the C library and without a shell.
 module pd_output_files
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   implicit none (type, external)
   private
-  public :: make_directory, rename_file, remove_file, file_exists, directory_exists, file_bytes, &
+  public :: make_directory, rename_file, remove_file, cut_file, file_exists, directory_exists, file_bytes, &
     & set_environment, in_directory
 
   interface
@@ -27,6 +27,13 @@ module pd_output_files
       implicit none (type, external)
       character(kind=c_char), intent(in) :: path(*)
     end function c_remove
+
+    integer(c_int) function c_truncate(path, length) bind(c, name='truncate')
+      import :: c_char, c_int, c_int64_t
+      implicit none (type, external)
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int64_t), value :: length
+    end function c_truncate
 
     integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
       import :: c_char, c_int
@@ -90,6 +97,15 @@ contains
     if (.not. file_exists(path)) return
     status = c_remove(trim(path)//c_null_char)
   end subroutine remove_file
+
+  !> Cut a file to its first `bytes` bytes.
+  subroutine cut_file(path, bytes)
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: bytes
+    integer(c_int) :: status
+
+    status = c_truncate(trim(path)//c_null_char, int(bytes, c_int64_t))
+  end subroutine cut_file
 
   !> Whether there is a file (or folder) of this name.
   logical function file_exists(path)

@@ -75,6 +75,9 @@ contains
     integer :: status
 
     call set_environment('HDF5_USE_FILE_LOCKING', 'FALSE')
+    ! all files are closed here; what the library does at the program's end, after a full disk,
+    ! is to try again what failed, and to crash
+    call h5dont_atexit_f(status)
     call h5open_f(status)
     if (status == 0) call h5eset_auto_f(0, status)
     if (status /= 0) call fail(error, 'the HDF5 library does not start')

@@ -152,7 +152,7 @@ contains
   end subroutine close_csv
 
   !> Whether the file is open.
-  pure logical function is_csv_open(self)
+  logical function is_csv_open(self)
     class(csv_type), intent(in) :: self
     is_csv_open = self%sink%is_open()
   end function is_csv_open

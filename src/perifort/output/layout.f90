@@ -29,6 +29,7 @@ module pd_output_layout
     integer(i8) :: row_capacity = 0  !! rows of the history there is room for
     logical :: single = .false.      !! fields in single precision
   contains
+    procedure :: make_heart
     procedure :: make_time_series
     procedure :: copy_time_series
     procedure :: trim_time_series
@@ -39,6 +40,30 @@ module pd_output_layout
   end type layout_type
 
 contains
+
+  !> Begin a file, before all else: what an output is counted by.
+  !>
+  !> Readers take the number of times for NSteps, and VTK's writes past its memory when it finds
+  !> more. So the two change together: made one after the other in a file that is still empty,
+  !> their records are neighbours at a fixed place, and HDF5 joins them into one write.
+  !> Should another version not do so, NSteps is written first.
+  subroutine make_heart(self, file, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: file
+    type(error_type), allocatable, intent(out) :: error
+
+    call make_group(file, '/VTKHDF', error)
+    if (allocated(error)) return
+    call make_group(file, '/VTKHDF/Steps', error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF/Steps', 'NSteps', 0_i8, error)
+    if (allocated(error)) return
+    call make_series(file, '/VTKHDF/Steps/Values', storage_f8, 1, 1_i8, self%capacity, error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
+  end subroutine make_heart
 
   !> `/scene`: what was computed, by what.
   subroutine put_scene(file, scene_text, command, version, error)
@@ -65,12 +90,6 @@ contains
     integer :: i
 
     n = size(positions, 1, kind=i8)
-    call make_group(file, '/VTKHDF', error)
-    if (allocated(error)) return
-    call put_attribute(file, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
-    if (allocated(error)) return
-    call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
-    if (allocated(error)) return
     call put_array(file, '/VTKHDF/NumberOfPoints', [n], error)
     if (allocated(error)) return
     call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, n, error)
@@ -128,7 +147,7 @@ contains
     end do
   end subroutine put_multiples
 
-  !> What grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
+  !> What else grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
   subroutine make_time_series(self, file, error)
     class(layout_type), intent(in) :: self
     type(hdf5_file), intent(in) :: file
@@ -141,12 +160,6 @@ contains
 
     s = self%capacity
     chunk = min(s, small_chunk/8)
-    call make_group(file, steps, error)
-    if (allocated(error)) return
-    call put_attribute(file, steps, 'NSteps', 0_i8, error)
-    if (allocated(error)) return
-    call make_series(file, steps//'/Values', storage_f8, 1, s, chunk, error)
-    if (allocated(error)) return
     call put_multiples(file, steps//'/PartOffsets', s, 0_i8, chunk, error)
     if (allocated(error)) return
     call put_multiples(file, steps//'/PointOffsets', s, 0_i8, chunk, error)
@@ -303,16 +316,14 @@ contains
       & '/VTKHDF/Polygons', '/VTKHDF/Strips']
     integer :: i
 
-    call make_group(to, '/VTKHDF', error)
-    if (.not. allocated(error)) call put_attribute(to, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
-    if (.not. allocated(error)) call put_attribute(to, '/VTKHDF', 'Type', 'PolyData', error)
     do i = 1, size(parts)
-      if (allocated(error)) return
       call copy_object(from, trim(parts(i)), to, error)
+      if (allocated(error)) return
     end do
   end subroutine copy_static
 
-  !> Copy the complete outputs and rows, field by field and block by block.
+  !> Copy the complete outputs and rows, and what there is of an output under way, field by field
+  !> and block by block. `outputs` and `rows` count the complete ones.
   subroutine copy_time_series(self, from, outputs, rows, to, error)
     class(layout_type), intent(in) :: self
     type(hdf5_file), intent(in) :: from
@@ -321,11 +332,13 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer :: i
 
+    call set_rows(to, '/VTKHDF/Steps/Values', 1, max(1_i8, outputs), error)
+    if (allocated(error)) return
     call copy_rows(from, to, '/VTKHDF/Steps/Values', outputs, .false., error)
     do i = 1, size(self%fields)
       if (allocated(error)) return
       call copy_rows(from, to, '/VTKHDF/PointData/'//trim(self%fields(i)%name), &
-        & outputs*self%points, self%single, error)
+        & (outputs + 1)*self%points, self%single, error)
     end do
     do i = 1, size(self%columns)
       if (allocated(error)) return
@@ -339,7 +352,7 @@ contains
       & call change_attribute(to, '/VTKHDF/Steps', 'NSteps', outputs, error)
   end subroutine copy_time_series
 
-  !> Copy the first `rows` rows of a dataset of reals.
+  !> Copy the first `rows` rows of a dataset of reals, or all if there are fewer.
   subroutine copy_rows(from, to, path, rows, single, error)
     type(hdf5_file), intent(in) :: from, to
     character(*), intent(in) :: path
@@ -353,8 +366,9 @@ contains
 
     call get_shape(from, path, components, extent, error)
     if (allocated(error)) return
-    do first = 0, rows - 1, block_rows
-      count = min(int(block_rows, i8), rows - first)
+    extent = min(extent, rows)
+    do first = 0, extent - 1, block_rows
+      count = min(int(block_rows, i8), extent - first)
       if (.not. allocated(values)) allocate (values(components, count))
       call read_rows(from, path, first, values(:, :count), error)
       if (allocated(error)) return

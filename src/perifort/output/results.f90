@@ -94,7 +94,7 @@ contains
   !>
   !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
   !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
-  !> `precision` ('double', 'single') is that of the fields, `format` one of 'vtkhdf', 'vtu', 'both'.
+  !> `precision` ('double', 'single') is that of the fields; `format` is 'vtkhdf', 'vtu' or 'both'.
   !> `scene_text`, `command` and the program's `version` are kept in the file.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
     & planned_rows, precision, format, scene_text, command, version, overwrite, error)

@@ -1,8 +1,14 @@
 !> Text files written piece by piece, with certainty that what was written is there.
+!>
+!> The C library's streams are used because they tell whether buffered text reached the file;
+!> a Fortran runtime library may lose that news.
 module pd_output_sink
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_null_ptr, &
+    & c_ptr, c_size_t
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   use pd_base_text, only: newline
+  use pd_output_files, only: cut_file
   implicit none (type, external)
   private
   public :: sink_type
@@ -10,9 +16,11 @@ module pd_output_sink
   !> A text file under way.
   type :: sink_type
     private
-    integer :: unit = -1
+    type(c_ptr) :: stream = c_null_ptr
     character(:), allocatable :: path
     integer(i8) :: bytes = 0  !! written so far
+    integer(i8) :: safe = 0   !! certain to be in the file
+    logical :: broken = .false.
   contains
     procedure :: open => open_sink
     procedure :: put
@@ -22,6 +30,34 @@ module pd_output_sink
     procedure :: is_open
   end type sink_type
 
+  interface
+    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
+      import :: c_char, c_ptr
+      implicit none (type, external)
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+    end function c_fopen
+
+    integer(c_size_t) function c_fwrite(text, size, count, stream) bind(c, name='fwrite')
+      import :: c_char, c_ptr, c_size_t
+      implicit none (type, external)
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_size_t), value :: size, count
+      type(c_ptr), value :: stream
+    end function c_fwrite
+
+    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
+      import :: c_int, c_ptr
+      implicit none (type, external)
+      type(c_ptr), value :: stream
+    end function c_fflush
+
+    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
+      import :: c_int, c_ptr
+      implicit none (type, external)
+      type(c_ptr), value :: stream
+    end function c_fclose
+  end interface
+
 contains
 
   !> Make the file, or empty one that is there.
@@ -29,15 +65,11 @@ contains
     class(sink_type), intent(out) :: self
     character(*), intent(in) :: path
     type(error_type), allocatable, intent(out) :: error
-    character(512) :: message
-    integer :: status
 
     self%path = path
-    open (newunit=self%unit, file=path, access='stream', form='unformatted', action='write', &
-      & status='replace', iostat=status, iomsg=message)
-    if (status == 0) return
-    self%unit = -1
-    call fail(error, 'cannot make '//path//': '//trim(message))
+    self%stream = c_fopen(path//c_null_char, 'wb'//c_null_char)
+    if (.not. c_associated(self%stream)) &
+      & call fail(error, 'cannot make '//path//': '//reason_at(path, ''))
   end subroutine open_sink
 
   !> Write a piece of text.
@@ -45,12 +77,14 @@ contains
     class(sink_type), intent(inout) :: self
     character(*), intent(in) :: text
     type(error_type), allocatable, intent(out) :: error
-    character(512) :: message
-    integer :: status
+    integer(c_size_t) :: count
 
-    write (self%unit, iostat=status, iomsg=message) text
-    if (status /= 0) call fail(error, 'cannot write '//self%path//': '//trim(message))
-    self%bytes = self%bytes + len(text)
+    if (len(text) == 0) return
+    count = c_fwrite(text, 1_c_size_t, len(text, kind=c_size_t), self%stream)
+    self%bytes = self%bytes + len(text, kind=i8)
+    if (count == len(text, kind=c_size_t)) return
+    self%broken = .true.
+    call fail(error, 'cannot write '//self%path//': '//reason_at(self%path, '.probe'))
   end subroutine put
 
   !> Write a line.
@@ -61,40 +95,64 @@ contains
     call self%put(text//newline, error)
   end subroutine line
 
-  !> Hand all to the system. That a buffer couldn't be written is seen only by the file's
-  !> size: the runtime library keeps the reason to itself.
+  !> Hand all to the system.
   subroutine flush_sink(self, error)
     class(sink_type), intent(inout) :: self
     type(error_type), allocatable, intent(out) :: error
-    character(512) :: message
-    integer(i8) :: bytes
-    integer :: status
 
-    message = ''
-    flush (self%unit, iostat=status, iomsg=message)
-    inquire (file=self%path, size=bytes)
-    if (status == 0 .and. bytes == self%bytes) return
-    if (message == '') message = 'the disk takes no more (is it full?)'
-    call fail(error, 'cannot write '//self%path//': '//trim(message))
+    if (c_fflush(self%stream) == 0 .and. .not. self%broken) then
+      self%safe = self%bytes
+    else
+      self%broken = .true.
+      call fail(error, 'cannot write '//self%path//': '//reason_at(self%path, '.probe'))
+    end if
   end subroutine flush_sink
 
-  !> Complete the file.
+  !> Complete the file; after a failure it ends with the last piece that was flushed.
   subroutine close_sink(self, error)
     class(sink_type), intent(inout) :: self
     type(error_type), allocatable, intent(out) :: error
-    integer :: status
+    integer(c_int) :: status
 
-    if (self%unit == -1) return
+    if (.not. self%is_open()) return
     call self%flush(error)
-    close (self%unit, iostat=status)
-    self%unit = -1
+    status = c_fclose(self%stream)
+    self%stream = c_null_ptr
     if (status /= 0 .and. .not. allocated(error)) call fail(error, 'cannot complete '//self%path)
+    if (allocated(error)) call cut_file(self%path, self%safe)
   end subroutine close_sink
 
   !> Whether the file is open.
-  pure logical function is_open(self)
+  logical function is_open(self)
     class(sink_type), intent(in) :: self
-    is_open = self%unit /= -1
+    is_open = c_associated(self%stream)
   end function is_open
+
+  !> Why nothing can be written at `path`: C keeps its reason in errno, which has no portable
+  !> name, but writing a file beside it fails for the same reason.
+  function reason_at(path, suffix) result(reason)
+    character(*), intent(in) :: path, suffix
+    character(:), allocatable :: reason
+    character(:), allocatable :: block
+    character(512) :: message
+    integer :: unit, status, ignored
+
+    message = ''
+    open (newunit=unit, file=path//suffix, access='stream', form='unformatted', action='write', &
+      & iostat=status, iomsg=message)
+    if (status == 0 .and. suffix /= '') then
+      allocate (character(524288) :: block)  ! more than the runtime library would keep back
+      block(:) = ' '
+      write (unit, iostat=status, iomsg=message) block
+      close (unit, status='delete', iostat=ignored)
+    else if (status == 0) then
+      close (unit, iostat=ignored)
+    end if
+    reason = 'the system gives no reason (is the disk full?)'
+    if (status == 0) return
+    reason = trim(message)
+    status = index(reason, ': ', back=.true.)
+    if (status > 0) reason = reason(status + 2:)
+  end function reason_at
 
 end module pd_output_sink

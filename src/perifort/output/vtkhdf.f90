@@ -82,9 +82,11 @@ contains
 
     call start_hdf5(error)
     if (allocated(error)) return
+    call remove_file(path//'.grow')  ! a killed run may have left it
     call create_file(self%current, self%file, error)
     if (allocated(error)) return
-    call put_geometry(self%file, positions, error)
+    call self%layout%make_heart(self%file, error)
+    if (.not. allocated(error)) call put_geometry(self%file, positions, error)
     if (.not. allocated(error)) call put_scene(self%file, scene_text, command, version, error)
     if (.not. allocated(error)) call make_group(self%file, '/points', error)
     if (.not. allocated(error)) call self%layout%make_time_series(self%file, error)
@@ -194,11 +196,19 @@ contains
     class(vtkhdf_file), intent(inout) :: self
     real(wp), intent(in) :: time
     type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
 
+    call set_rows(self%file, '/VTKHDF/Steps/Values', 1, self%outputs + 1, error)
+    if (allocated(error)) return
     call write_rows(self%file, '/VTKHDF/Steps/Values', self%outputs, [time], error)
     if (.not. allocated(error)) call change_attribute(self%file, '/VTKHDF/Steps', 'NSteps', &
       & self%outputs + 1, error)
-    if (.not. allocated(error)) call flush_file(self%file, error)
+    if (allocated(error)) then
+      ! the new length is still in memory only: take it back
+      call set_rows(self%file, '/VTKHDF/Steps/Values', 1, max(1_i8, self%outputs), ignored)
+      return
+    end if
+    call flush_file(self%file, error)
     if (.not. allocated(error)) self%outputs = self%outputs + 1
   end subroutine end_output
 
@@ -264,6 +274,7 @@ contains
     self%layout%row_capacity = row_capacity
     name = self%path//'.grow'
     call create_file(name, bigger, error)
+    if (.not. allocated(error)) call self%layout%make_heart(bigger, error)
     if (.not. allocated(error)) call copy_static(self%file, bigger, error)
     if (.not. allocated(error)) call self%layout%make_time_series(bigger, error)
     if (.not. allocated(error)) call self%layout%copy_time_series(self%file, &
@@ -292,7 +303,9 @@ contains
     if (self%current == self%path) return
     call seal(self, error)
     if (.not. allocated(error)) call rename_file(self%current, self%path, error)
-    if (.not. allocated(error)) self%current = self%path
+    if (allocated(error)) return
+    self%current = self%path
+    self%file%name = self%path
   end subroutine publish
 
   !> Cut off room that wasn't needed and close the file.
@@ -305,15 +318,20 @@ contains
     if (.not. allocated(error)) call close_file(self%file, error)
   end subroutine finish
 
-  !> Close the file as it is; one that never got its final name is removed.
+  !> Write nothing more. A file that has its final name is left as it was at its last complete
+  !> output: closing it would write records that belong to what failed, so its identifier is
+  !> given up instead. One that never got its final name is removed.
   subroutine abandon(self)
     class(vtkhdf_file), intent(inout) :: self
     type(error_type), allocatable :: ignored
 
-    call close_file(self%file, ignored)
     if (allocated(self%current)) then
-      if (self%current /= self%path) call remove_file(self%current)
+      if (self%current /= self%path) then
+        call close_file(self%file, ignored)
+        call remove_file(self%current)
+      end if
     end if
+    self%file%id = -1
   end subroutine abandon
 
   !> Bytes that one output takes.
