@@ -16,12 +16,14 @@ module pd_driver
   use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
   use pd_body_shapes, only: inside
   use pd_family_cracks, only: cut_bonds
+  use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
+  use pd_force_weights, only: build_weights
   use pd_motion_explicit, only: run_explicit
   use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, region_mask
   use pd_motion_plan, only: plan_type, make_plan, depth_of
@@ -66,7 +68,6 @@ contains
     type(error_type), allocatable :: late
     character(:), allocatable :: directory, stem
 
-    call use_threads(options%threads)
     stem = stem_of(scene)
     directory = 'out/'//stem
     if (allocated(options%output_directory)) then
@@ -74,8 +75,10 @@ contains
     end if
     call refuse_existing(directory, stem, options%overwrite, error)
     if (allocated(error)) return
+    if (options%threads > 0) call omp_set_num_threads(options%threads)
     call prepare(scene, set_up, error)
     if (allocated(error)) return
+    call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, set_up%lonely, &
         & omp_get_max_threads()))
@@ -105,9 +108,10 @@ contains
     real(wp) :: begin, seconds
     integer :: i
 
-    call use_threads(options%threads)
+    if (options%threads > 0) call omp_set_num_threads(options%threads)
     call prepare(scene, set_up, error)
     if (allocated(error)) return
+    call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, set_up%lonely, &
         & omp_get_max_threads()))
@@ -145,7 +149,6 @@ contains
     type(set_up_type), intent(out) :: set_up
     type(error_type), allocatable, intent(out) :: error
     type(material_type), allocatable :: materials(:)
-    type(list_family_type) :: list
     real(wp), allocatable :: temperature_change(:)
     real(wp) :: delta
 
@@ -157,9 +160,9 @@ contains
       call timer%stop('points')
 
       call timer%start('families')
-      call new_list_family(system%body, volume_rule_type(volume_rule_number( &
-        & trim(scene%horizon%volume_correction)), delta), list)
-      allocate (system%family, source=list)
+      call make_family(scene, volume_rule_type(volume_rule_number( &
+        & trim(scene%horizon%volume_correction)), delta), system, error)
+      if (allocated(error)) return
       call check_overlap(system%body, system%family, set_up%lonely, error)
       if (allocated(error)) return
       call timer%stop('families')
@@ -179,6 +182,7 @@ contains
       system%model%surface = scene%horizon%surface_correction == 'energy'
       if (system%model%surface) call surface_factors(system%body, system%family, materials, &
         & system%model%D, system%model%S)
+      call finish_family(system)
       call timer%stop('surface correction')
 
       call timer%start('cracks')
@@ -195,6 +199,48 @@ contains
       call find_probes(scene, system%body, set_up%probes)
     end associate
   end subroutine prepare
+
+  !> Families of the kind that suits the points; the body is arranged in their slots.
+  subroutine make_family(scene, rule, system, error)
+    type(scene_type), intent(in) :: scene
+    type(volume_rule_type), intent(in) :: rule
+    type(system_type), intent(inout) :: system
+    type(error_type), allocatable, intent(out) :: error
+    type(lattice_family_type), allocatable :: lattice
+    type(list_family_type), allocatable :: list
+    character(:), allocatable :: reason
+    logical :: suits
+
+    call lattice_suits(system%body, suits, reason)
+    if (suits) then
+      allocate (lattice)
+      call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), lattice, &
+        & error)
+      if (allocated(error)) return
+      call move_alloc(lattice, system%family)
+    else
+      allocate (list)
+      call new_list_family(system%body, rule, list)
+      list%reason = reason
+      call move_alloc(list, system%family)
+    end if
+  end subroutine make_family
+
+  !> What a lattice keeps of the model: the weights of its blocks.
+  subroutine finish_family(system)
+    type(system_type), intent(inout) :: system
+    select type (family => system%family)
+    type is (lattice_family_type)
+      call build_weights(family, system%model)
+    end select
+  end subroutine finish_family
+
+  !> Whether some material of the scene can fail.
+  pure logical function any_critical(scene)
+    type(scene_type), intent(in) :: scene
+    any_critical = any(is_set(scene%materials%critical_stretch)) .or. &
+      & any(is_set(scene%materials%critical_energy_release_rate))
+  end function any_critical
 
   !> The materials with the horizon's parameters.
   pure function materials_of_scene(scene, delta) result(materials)
@@ -355,11 +401,14 @@ contains
     if (dot > 1) stem = stem(:dot - 1)
   end function stem_of
 
-  !> Let OpenMP use this many threads; 0 leaves its own choice.
-  subroutine use_threads(threads)
-    integer, intent(in) :: threads
-    if (threads > 0) call omp_set_num_threads(threads)
-  end subroutine use_threads
+  !> Use one thread for a body whose step is over before another thread has woken, unless the user
+  !> has asked for a number.
+  subroutine choose_threads(options, system)
+    type(run_options_type), intent(in) :: options
+    type(system_type), intent(in) :: system
+    integer(i8), parameter :: worth_a_thread = 40000_i8  ! bonds, about 20 us of work
+    if (options%threads == 0 .and. system%family%n_bonds < worth_a_thread) call omp_set_num_threads(1)
+  end subroutine choose_threads
 
   subroutine say(options, text)
     type(run_options_type), intent(in) :: options

@@ -19,6 +19,7 @@ module pd_family_list
     real(wp), allocatable :: volume(:)         !! [m3]
     real(wp), allocatable :: spacing(:)        !! [m]
     real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
+    character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
     procedure :: break_bond
@@ -128,6 +129,7 @@ contains
     class(list_family_type), intent(in) :: family
     character(:), allocatable :: text
     text = 'list: the neighbours of every point stored one by one'
+    if (allocated(family%reason)) text = text//' ('//family%reason//')'
     if (allocated(family%fraction)) text = text//', with their volume fractions'
   end function describe
 

@@ -3,9 +3,10 @@ module pd_force_forces
   use pd_base_kinds, only: wp, i1
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
+  use pd_family_lattice, only: lattice_family_type
+  use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
   use pd_force_model, only: model_type
-  use pd_force_reference, only: reference_energy
   implicit none (type, external)
   private
   public :: dilatation_pass, force_pass, energy_pass
@@ -15,7 +16,7 @@ contains
   !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds can
   !> break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.
   subroutine dilatation_pass(family, model, u, p, strained)
-    class(family_type), intent(in) :: family
+    class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in) :: u(:, :)
     real(wp), intent(out) :: p(:)
@@ -24,12 +25,14 @@ contains
     select type (family)
     type is (list_family_type)
       call list_dilatation(family, model, u, p, strained)
+    type is (lattice_family_type)
+      call lattice_dilatation(family, model, u, p, strained)
     end select
   end subroutine dilatation_pass
 
   !> Internal force density of all slots (n_slots, dim) [N/m3]; `strained` as above.
   subroutine force_pass(family, model, u, p, force, strained)
-    class(family_type), intent(in) :: family
+    class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in) :: u(:, :)
     real(wp), intent(in) :: p(:)
@@ -39,6 +42,8 @@ contains
     select type (family)
     type is (list_family_type)
       call list_force(family, model, u, p, force, strained)
+    type is (lattice_family_type)
+      call lattice_force(family, model, u, p, force, strained)
     end select
   end subroutine force_pass
 
@@ -53,8 +58,8 @@ contains
     select type (family)
     type is (list_family_type)
       call list_energy(family, model, u, energy, strained)
-    class default
-      call reference_energy(family, model, u, energy)
+    type is (lattice_family_type)
+      call lattice_energy(family, model, u, energy)
     end select
   end subroutine energy_pass
 

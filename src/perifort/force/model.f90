@@ -24,6 +24,7 @@ module pd_force_model
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
     real(wp), allocatable :: expansion(:)    !! alpha dT of each slot [-], allocated if thermal
     real(wp), allocatable :: critical(:)     !! s_c of each slot, `never` or `no_fail`
+    real(wp) :: least_critical = never       !! smallest s_c of all
     integer(i1), allocatable :: compressed(:) !! 1 where bonds break in compression too
   end type model_type
 
@@ -57,6 +58,7 @@ contains
       & any(.not. zone .and. body%point > 0)
     if (.not. model%breaking) return
     model%critical = materials(body%material)%critical_stretch
+    model%least_critical = minval(model%critical, mask=body%point > 0)
     where (zone) model%critical = no_fail
     model%compression = any(used .and. materials%break_in_compression)
     if (model%compression) then

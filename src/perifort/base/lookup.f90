@@ -1,0 +1,82 @@
+!> A table from 64-bit keys to numbers 1, 2, 3, ... in the order of their first appearance, and the
+!> mixing of values into such keys.
+module pd_base_lookup
+  use pd_base_kinds, only: i4, i8
+  implicit none (type, external)
+  private
+  public :: lookup_type, mix
+
+  type :: lookup_type
+    integer :: count = 0
+    integer(i8), allocatable :: keys(:)     !! open addressing; the size is a power of two
+    integer(i4), allocatable :: numbers(:)  !! 0: the place is empty
+  contains
+    procedure :: number_of
+  end type lookup_type
+
+contains
+
+  !> `key` with one more value mixed in. Rotation and exclusive or cannot overflow; a small factor
+  !> spreads the value over the bits.
+  elemental integer(i8) function mix(key, value)
+    integer(i8), intent(in) :: key, value
+    integer(i8), parameter :: spread = 2654435761_i8  ! 2^32 over the golden ratio
+    mix = ieor(ishftc(key, 23), iand(value, 1073741823_i8)*spread)
+    mix = ieor(mix, ishftc(iand(ishft(value, -30), 1073741823_i8)*spread, 11))
+    mix = ieor(mix, ishftc(iand(mix, 1073741823_i8)*spread, 29))
+  end function mix
+
+  !> The number of `key`; a new key gets the next one.
+  subroutine number_of(table, key, number, is_new)
+    class(lookup_type), intent(inout) :: table
+    integer(i8), intent(in) :: key
+    integer, intent(out) :: number
+    logical, intent(out) :: is_new
+    integer :: at
+
+    if (.not. allocated(table%keys)) then
+      allocate (table%keys(1024), table%numbers(1024))
+      table%numbers = 0_i4
+    end if
+    if (2*table%count >= size(table%keys)) call grow(table)
+    at = place(table, key)
+    is_new = table%numbers(at) == 0_i4
+    if (is_new) then
+      table%count = table%count + 1
+      table%keys(at) = key
+      table%numbers(at) = int(table%count, i4)
+    end if
+    number = table%numbers(at)
+  end subroutine number_of
+
+  !> Where `key` stands or would stand.
+  pure integer function place(table, key) result(at)
+    type(lookup_type), intent(in) :: table
+    integer(i8), intent(in) :: key
+
+    at = int(iand(ieor(key, ishft(key, -32)), int(size(table%keys) - 1, i8))) + 1
+    do while (table%numbers(at) /= 0_i4)
+      if (table%keys(at) == key) return
+      at = iand(at, size(table%keys) - 1) + 1
+    end do
+  end function place
+
+  !> Twice the room.
+  pure subroutine grow(table)
+    type(lookup_type), intent(inout) :: table
+    type(lookup_type) :: larger
+    integer :: i, at
+
+    allocate (larger%keys(2*size(table%keys)), larger%numbers(2*size(table%keys)))
+    larger%numbers = 0_i4
+    do i = 1, size(table%keys)
+      if (table%numbers(i) == 0_i4) cycle
+      at = place(larger, table%keys(i))
+      larger%keys(at) = table%keys(i)
+      larger%numbers(at) = table%numbers(i)
+    end do
+    call move_alloc(larger%keys, table%keys)
+    call move_alloc(larger%numbers, table%numbers)
+  end subroutine grow
+
+end module pd_base_lookup

@@ -1,0 +1,561 @@
+!> The force loops of lattice families, `lanes` slots at a time: for each offset, the bonds of the
+!> lanes to the slots that far away. A block's sums stay in registers through all its offsets.
+!>
+!> With e = (2 xi.eta + eta.eta)/|xi|^2, the deformed length is |xi| sqrt(1 + e), the stretch
+!> s = sqrt(1 + e) - 1 and |xi|/|xi+eta| = r = 1/sqrt(1 + e). The force needs s r = 1 - r, which for
+!> |e| <= 0.02 is e h(e) with a polynomial h (relative error 3e-16): no root, no division, and no
+!> cancellation. A block that is strained further takes the formulas with root and division.
+module pd_force_lattice
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_family_lattice, only: lattice_family_type, weights_type, lanes, word_bits
+  use pd_force_model, only: model_type
+  use pd_force_weights, only: block_weights, allocate_weights
+  implicit none (type, external)
+  private
+  public :: lattice_dilatation, lattice_force, lattice_energy
+
+  !> Coefficients of h: (1 - 1/sqrt(1 + e))/e = 1/2 - 3/8 e + e^2 (Chebyshev interpolation of the rest).
+  real(wp), parameter :: small_strain = 0.02_wp
+  real(wp), parameter :: h(0:7) = [0.5_wp, -0.375_wp, 0.31250000000037114_wp, -0.27343750000352559_wp, &
+    & 0.24609373329889834_wp, -0.22558592163388049_wp, 0.20958398402647260_wp, -0.19648637700069084_wp]
+  !> Lets the force of a bond crushed to a point vanish instead of being NaN.
+  real(wp), parameter :: crushed = 1.0e-30_wp
+
+  !> Switches of the general formulas.
+  type :: terms_type
+    logical :: dilatation = .false.
+    logical :: projected = .true.
+    logical :: thermal = .false.
+    logical :: breaking = .false.
+    real(wp) :: fast_limit = 0.0_wp      !! the fast formula serves blocks with |e| below; 0: none
+  end type terms_type
+
+contains
+
+  !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps in
+  !> `family%large` which blocks the fast formula doesn't serve.
+  subroutine lattice_dilatation(family, model, u, p, strained)
+    type(lattice_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: p(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    type(weights_type) :: scratch
+    type(terms_type) :: terms
+    integer :: b
+
+    terms = terms_of(model)
+    !$omp parallel default(none) shared(family, model, u, p, strained, terms) private(scratch, b)
+    call allocate_weights(family, model, scratch)
+    !$omp do schedule(static)
+    do b = 1, size(family%block)
+      if (shared_weights(family, b)) then
+        call dilatation_of_block(family, model, terms, b, family%table(family%weights(b)), u, p, strained)
+      else
+        call weights_now(family, model, b, scratch)
+        call dilatation_of_block(family, model, terms, b, scratch, u, p, strained)
+      end if
+    end do
+    !$omp end parallel
+  end subroutine lattice_dilatation
+
+  !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
+  !> `lattice_dilatation` at the same displacements.
+  subroutine lattice_force(family, model, u, p, force, strained)
+    type(lattice_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(in), contiguous :: p(:)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    type(weights_type) :: scratch
+    type(terms_type) :: terms
+    integer :: b
+
+    terms = terms_of(model)
+    !$omp parallel default(none) shared(family, model, u, p, force, strained, terms) &
+    !$omp private(scratch, b)
+    call allocate_weights(family, model, scratch)
+    !$omp do schedule(static)
+    do b = 1, size(family%block)
+      if (shared_weights(family, b)) then
+        call force_of_block(family, model, terms, b, family%table(family%weights(b)), u, p, force, strained)
+      else
+        call weights_now(family, model, b, scratch)
+        call force_of_block(family, model, terms, b, scratch, u, p, force, strained)
+      end if
+    end do
+    !$omp end parallel
+  end subroutine lattice_force
+
+  !> Strain energy density of all slots [J/m3].
+  subroutine lattice_energy(family, model, u, energy)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(out), contiguous :: energy(:)
+    type(weights_type) :: scratch
+    type(terms_type) :: terms
+    integer :: b
+
+    terms = terms_of(model)
+    energy = 0.0_wp
+    !$omp parallel default(none) shared(family, model, u, energy, terms) private(scratch, b)
+    call allocate_weights(family, model, scratch)
+    !$omp do schedule(static)
+    do b = 1, size(family%block)
+      if (shared_weights(family, b)) then
+        call energy_of_block(family, model, terms, b, family%table(family%weights(b)), u, energy)
+      else
+        call weights_now(family, model, b, scratch)
+        call energy_of_block(family, model, terms, b, scratch, u, energy)
+      end if
+    end do
+    !$omp end parallel
+  end subroutine lattice_energy
+
+  pure type(terms_type) function terms_of(model) result(terms)
+    type(model_type), intent(in) :: model
+
+    terms%dilatation = model%dilatation
+    terms%projected = model%projected
+    terms%thermal = model%thermal
+    terms%breaking = model%breaking
+    ! with the tensile limit s, |e| reaches (1 + s)^2 - 1; in compression 1 - (1 - s)^2 is less
+    terms%fast_limit = small_strain
+    if (model%breaking) terms%fast_limit = min(small_strain, &
+      & model%least_critical*(2 - model%least_critical)*(1 - 1.0e-9_wp))
+    if (model%thermal .or. (model%dilatation .and. .not. model%projected)) terms%fast_limit = 0.0_wp
+  end function terms_of
+
+  !> Whether the block can take the weights it shares with others: it has some, and no broken bond.
+  pure logical function shared_weights(family, b)
+    type(lattice_family_type), intent(in) :: family
+    integer, intent(in) :: b
+    integer :: w
+    integer(i8) :: first, any_broken
+
+    shared_weights = family%weights(b) > 0
+    if (.not. (shared_weights .and. allocated(family%broken))) return
+    first = family%block(b)
+    any_broken = 0_i8
+    do w = 1, family%words
+      any_broken = ior(any_broken, iany(family%broken(first:first + lanes - 1, w)))
+    end do
+    shared_weights = any_broken == 0_i8
+  end function shared_weights
+
+  !> The weights of a block as its bonds are now, those of broken bonds 0.
+  pure subroutine weights_now(family, model, b, weights)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: b
+    type(weights_type), intent(inout) :: weights
+    integer :: m, o, w, l, n
+    integer(i8) :: first
+    real(wp) :: intact(lanes)
+
+    first = family%block(b)
+    if (family%weights(b) > 0) then
+      associate (shared => family%table(family%weights(b)))
+        n = shared%n
+        weights%n = n
+        weights%whole = shared%whole
+        weights%offset(:n) = shared%offset
+        weights%stretch(:, :n) = shared%stretch
+        if (model%dilatation) weights%dilatation(:, :n) = shared%dilatation
+      end associate
+    else
+      call block_weights(family, model, first, weights)
+    end if
+    if (.not. allocated(family%broken)) return
+    weights%whole = .false.
+    do m = 1, weights%n
+      o = weights%offset(m)
+      w = (o - 1)/word_bits + 1
+      do l = 1, lanes
+        intact(l) = real(1_i8 - iand(ishft(family%broken(first + l - 1, w), -mod(o - 1, word_bits)), 1_i8), wp)
+      end do
+      weights%stretch(:, m) = weights%stretch(:, m)*intact
+      if (model%dilatation) weights%dilatation(:, m) = weights%dilatation(:, m)*intact
+    end do
+  end subroutine weights_now
+
+  !> p of one block.
+  subroutine dilatation_of_block(family, model, terms, b, weights, u, p, strained)
+    type(lattice_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    type(terms_type), intent(in) :: terms
+    integer, intent(in) :: b
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: p(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp) :: theta(lanes), largest
+    integer(i8) :: first
+    integer :: l
+
+    first = family%block(b)
+    largest = huge(largest)
+    if (terms%fast_limit > 0.0_wp) then
+      ! constant dimensions, so that each has code of its own
+      select case (family%dim)
+      case (3)
+        call fast_dilatation(3, weights%n, weights%offset, weights%dilatation, weights%whole, &
+          & family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, theta, largest)
+      case (2)
+        call fast_dilatation(2, weights%n, weights%offset, weights%dilatation, weights%whole, &
+          & family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, theta, largest)
+      case default
+        call fast_dilatation(1, weights%n, weights%offset, weights%dilatation, weights%whole, &
+          & family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, theta, largest)
+      end select
+    end if
+    family%large(b) = merge(0_i1, 1_i1, largest < terms%fast_limit)
+    if (family%large(b) == 1_i1) then
+      call general_dilatation(family, model, terms, first, weights, u, theta, strained)
+    else if (terms%breaking) then
+      strained(first:first + lanes - 1) = 0_i1
+    end if
+    if (size(model%materials) == 1) then
+      p(first:first + lanes - 1) = model%materials(1)%p*model%materials(1)%t*theta
+    else
+      do l = 1, lanes
+        associate (m => model%materials(model%material(first + l - 1)))
+          p(first + l - 1) = m%p*m%t*theta(l)
+        end associate
+      end do
+    end if
+  end subroutine dilatation_of_block
+
+  !> Force density of one block.
+  subroutine force_of_block(family, model, terms, b, weights, u, p, force, strained)
+    type(lattice_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    type(terms_type), intent(in) :: terms
+    integer, intent(in) :: b
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in), contiguous :: u(:, :), p(:)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp) :: f(lanes, 3), largest
+    integer(i8) :: first
+    integer :: c
+
+    first = family%block(b)
+    largest = huge(largest)
+    if (terms%dilatation) then
+      if (family%large(b) == 0_i1) largest = 0.0_wp
+    end if
+    if (terms%fast_limit > 0.0_wp .and. (.not. terms%dilatation .or. largest <= 0.0_wp)) then
+      select case (family%dim)
+      case (3)
+        call fast_force(3, terms%dilatation, weights%n, weights%offset, weights%dilatation, weights%stretch, &
+          & weights%whole, family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, p, &
+          & f, largest)
+      case (2)
+        call fast_force(2, terms%dilatation, weights%n, weights%offset, weights%dilatation, weights%stretch, &
+          & weights%whole, family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, p, &
+          & f, largest)
+      case default
+        call fast_force(1, terms%dilatation, weights%n, weights%offset, weights%dilatation, weights%stretch, &
+          & weights%whole, family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, p, &
+          & f, largest)
+      end select
+    end if
+    if (largest >= terms%fast_limit) then
+      call general_force(family, model, terms, first, weights, u, p, f, strained)
+    else if (terms%breaking) then
+      strained(first:first + lanes - 1) = 0_i1
+    end if
+    do c = 1, family%dim
+      force(first:first + lanes - 1, c) = f(:, c)
+    end do
+  end subroutine force_of_block
+
+  !> sum of Gd s Lambda vc V over the bonds of each lane by the fast formula; `largest` is the
+  !> greatest |e| of all bonds that are there.
+  subroutine fast_dilatation(dim, n, offset, weight, whole, n_offsets, shift, geometry, first, n_slots, &
+    & u, theta, largest)
+    integer, intent(in) :: dim, n, n_offsets, n_slots
+    integer(i4), intent(in) :: offset(n)
+    real(wp), intent(in) :: weight(lanes, n)
+    logical, intent(in) :: whole
+    integer(i8), intent(in) :: shift(n_offsets), first
+    real(wp), intent(in) :: geometry(4, n_offsets), u(n_slots, dim)
+    real(wp), intent(out) :: theta(lanes), largest
+    real(wp) :: own(lanes, 3), most(lanes), eta(3), x, e, g(4)
+    integer :: m, l, c
+    integer(i8) :: j
+
+    do c = 1, dim
+      own(:, c) = u(first:first + lanes - 1, c)
+    end do
+    theta = 0.0_wp
+    most = 0.0_wp
+    do m = 1, n
+      j = first - 1 + shift(offset(m))
+      g = geometry(:, offset(m))
+      !$omp simd private(eta, x, e, c)
+      do l = 1, lanes
+        eta(1) = u(j + l, 1) - own(l, 1)
+        x = g(1)*eta(1)
+        e = eta(1)**2
+        do c = 2, dim
+          eta(c) = u(j + l, c) - own(l, c)
+          x = x + g(c)*eta(c)
+          e = e + eta(c)**2
+        end do
+        e = 2*x + g(4)*e
+        if (whole) then
+          most(l) = max(most(l), abs(e))
+        else
+          most(l) = max(most(l), merge(abs(e), 0.0_wp, weight(l, m) > 0.0_wp))
+        end if
+        e = e*(h(0) + e*(h(1) + e*(h(2) + e*(h(3) + e*(h(4) + e*(h(5) + e*(h(6) + e*h(7))))))))
+        theta(l) = theta(l) + weight(l, m)*(e + x*e)
+      end do
+    end do
+    largest = maxval(most)
+  end subroutine fast_dilatation
+
+  !> Force density of each lane by the fast formula. Without a dilatation the strain is looked at here.
+  subroutine fast_force(dim, dilatation, n, offset, weight, stretch, whole, n_offsets, shift, geometry, &
+    & first, n_slots, u, p, force, largest)
+    integer, intent(in) :: dim, n, n_offsets, n_slots
+    logical, intent(in) :: dilatation, whole
+    integer(i4), intent(in) :: offset(n)
+    real(wp), intent(in) :: weight(lanes, *), stretch(lanes, n)
+    integer(i8), intent(in) :: shift(n_offsets), first
+    real(wp), intent(in) :: geometry(4, n_offsets), u(n_slots, dim), p(*)
+    real(wp), intent(out) :: force(lanes, 3)
+    real(wp), intent(inout) :: largest
+    real(wp) :: own(lanes, 3), own_p(lanes), most(lanes), eta(3), x, e, r, magnitude, g(4)
+    integer :: m, l, c
+    integer(i8) :: j
+
+    do c = 1, dim
+      own(:, c) = u(first:first + lanes - 1, c)
+    end do
+    force = 0.0_wp
+    if (dilatation) then
+      own_p = p(first:first + lanes - 1)
+      do m = 1, n
+        j = first - 1 + shift(offset(m))
+        g = geometry(:, offset(m))
+        !$omp simd private(eta, x, e, r, magnitude, c)
+        do l = 1, lanes
+          eta(1) = u(j + l, 1) - own(l, 1)
+          x = g(1)*eta(1)
+          e = eta(1)**2
+          do c = 2, dim
+            eta(c) = u(j + l, c) - own(l, c)
+            x = x + g(c)*eta(c)
+            e = e + eta(c)**2
+          end do
+          e = 2*x + g(4)*e
+          e = e*(h(0) + e*(h(1) + e*(h(2) + e*(h(3) + e*(h(4) + e*(h(5) + e*(h(6) + e*h(7))))))))
+          r = 1 - e
+          magnitude = stretch(l, m)*e + (own_p(l) + p(j + l))*weight(l, m)*((1 + x)*(r*r))
+          do c = 1, dim
+            force(l, c) = force(l, c) + magnitude*(g(c) + g(4)*eta(c))
+          end do
+        end do
+      end do
+    else
+      most = 0.0_wp
+      do m = 1, n
+        j = first - 1 + shift(offset(m))
+        g = geometry(:, offset(m))
+        !$omp simd private(eta, x, e, magnitude, c)
+        do l = 1, lanes
+          eta(1) = u(j + l, 1) - own(l, 1)
+          x = g(1)*eta(1)
+          e = eta(1)**2
+          do c = 2, dim
+            eta(c) = u(j + l, c) - own(l, c)
+            x = x + g(c)*eta(c)
+            e = e + eta(c)**2
+          end do
+          e = 2*x + g(4)*e
+          if (whole) then
+            most(l) = max(most(l), abs(e))
+          else
+            most(l) = max(most(l), merge(abs(e), 0.0_wp, stretch(l, m) > 0.0_wp))
+          end if
+          magnitude = stretch(l, m)*(e*(h(0) + e*(h(1) + e*(h(2) + e*(h(3) + e*(h(4) + e*(h(5) + e*(h(6) &
+            & + e*h(7)))))))))
+          do c = 1, dim
+            force(l, c) = force(l, c) + magnitude*(g(c) + g(4)*eta(c))
+          end do
+        end do
+      end do
+      largest = maxval(most)
+    end if
+  end subroutine fast_force
+
+  !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda, r = |xi|/|y|
+  !> and the bond's direction over |xi|.
+  pure subroutine deform(family, model, terms, first, offset, u, s, lambda, r, along)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(terms_type), intent(in) :: terms
+    integer(i8), intent(in) :: first
+    integer, intent(in) :: offset
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), along(lanes, 3)
+    real(wp) :: x(lanes), e(lanes), y(lanes), eta(lanes)
+    integer(i8) :: j
+    integer :: c
+
+    j = first + family%shift(offset)
+    x = 0.0_wp
+    e = 0.0_wp
+    y = crushed
+    associate (g => family%geometry(:, offset))
+      do c = 1, family%dim
+        eta = u(j:j + lanes - 1, c) - u(first:first + lanes - 1, c)
+        x = x + g(c)*eta
+        e = e + eta**2
+        along(:, c) = g(c) + g(4)*eta
+        y = y + along(:, c)**2/g(4)
+      end do
+      e = 2*x + g(4)*e
+    end associate
+    r = 1/sqrt(y)
+    s = e/(1 + y*r)
+    lambda = (1 + x)*r
+    if (.not. terms%projected) lambda = 1.0_wp
+    if (terms%thermal) s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
+  end subroutine deform
+
+  !> The sums of `fast_dilatation` for any strain and with every term; marks strained slots.
+  subroutine general_dilatation(family, model, terms, first, weights, u, theta, strained)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(terms_type), intent(in) :: terms
+    integer(i8), intent(in) :: first
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(out) :: theta(lanes)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp), dimension(lanes) :: s, lambda, r, most, least
+    real(wp) :: along(lanes, 3)
+    integer :: m
+
+    theta = 0.0_wp
+    most = 0.0_wp
+    least = 0.0_wp
+    do m = 1, weights%n
+      call deform(family, model, terms, first, int(weights%offset(m)), u, s, lambda, r, along)
+      theta = theta + weights%dilatation(:, m)*s*lambda
+      if (terms%breaking) call widen(s, weights%stretch(:, m), most, least)
+    end do
+    if (terms%breaking) call mark(model, first, most, least, strained)
+  end subroutine general_dilatation
+
+  !> The sums of `fast_force` for any strain and with every term; marks strained slots.
+  subroutine general_force(family, model, terms, first, weights, u, p, force, strained)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(terms_type), intent(in) :: terms
+    integer(i8), intent(in) :: first
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in), contiguous :: u(:, :), p(:)
+    real(wp), intent(out) :: force(lanes, 3)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp), dimension(lanes) :: s, lambda, r, most, least, magnitude
+    real(wp) :: along(lanes, 3)
+    integer(i8) :: j
+    integer :: m, c
+
+    force = 0.0_wp
+    most = 0.0_wp
+    least = 0.0_wp
+    do m = 1, weights%n
+      call deform(family, model, terms, first, int(weights%offset(m)), u, s, lambda, r, along)
+      magnitude = weights%stretch(:, m)*s
+      if (terms%dilatation) then
+        j = first + family%shift(weights%offset(m))
+        magnitude = magnitude + (p(first:first + lanes - 1) + p(j:j + lanes - 1)) &
+          & *weights%dilatation(:, m)*lambda
+      end if
+      magnitude = magnitude*r
+      do c = 1, family%dim
+        force(:, c) = force(:, c) + magnitude*along(:, c)
+      end do
+      if (terms%breaking) call widen(s, weights%stretch(:, m), most, least)
+    end do
+    if (terms%breaking) call mark(model, first, most, least, strained)
+  end subroutine general_force
+
+  !> Strain energy density of one block, by the general formulas.
+  subroutine energy_of_block(family, model, terms, b, weights, u, energy)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(terms_type), intent(in) :: terms
+    integer, intent(in) :: b
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    real(wp), dimension(lanes) :: s, lambda, r, theta, stretches
+    real(wp) :: along(lanes, 3)
+    integer(i8) :: first, j
+    integer :: m, l
+
+    first = family%block(b)
+    theta = 0.0_wp
+    stretches = 0.0_wp
+    do m = 1, weights%n
+      call deform(family, model, terms, first, int(weights%offset(m)), u, s, lambda, r, along)
+      if (terms%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
+      if (size(model%materials) > 1) then
+        ! the weights hold q_k + q_j, the energy takes q_k/2 of the slot's own material
+        j = first + family%shift(weights%offset(m))
+        do l = 1, lanes
+          associate (q => model%materials(model%material(first + l - 1))%q)
+            s(l) = s(l)*sqrt(2*q/(q + model%materials(model%material(j + l - 1))%q))
+          end associate
+        end do
+      end if
+      stretches = stretches + weights%stretch(:, m)*s**2
+    end do
+    do l = 1, lanes
+      associate (mat => model%materials(model%material(first + l - 1)))
+        energy(first + l - 1) = stretches(l)/4 + mat%a*(mat%t*theta(l))**2
+      end associate
+    end do
+  end subroutine energy_of_block
+
+  !> Largest and least stretch of each lane's bonds that are there.
+  pure subroutine widen(s, weight, most, least)
+    real(wp), intent(in) :: s(lanes), weight(lanes)
+    real(wp), intent(inout) :: most(lanes), least(lanes)
+    where (weight > 0.0_wp)
+      most = max(most, s)
+      least = min(least, s)
+    end where
+  end subroutine widen
+
+  !> Mark the slots with a bond at its limit, a hair's breadth early: what breaks is decided elsewhere.
+  subroutine mark(model, first, most, least, strained)
+    type(model_type), intent(in) :: model
+    integer(i8), intent(in) :: first
+    real(wp), intent(in) :: most(lanes), least(lanes)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp) :: limit
+    integer(i8) :: k
+    integer :: l
+
+    limit = model%least_critical*(1 - 1.0e-9_wp)
+    do l = 1, lanes
+      k = first + l - 1
+      strained(k) = 0_i1
+      if (model%critical(k) < 0.0_wp) cycle
+      if (most(l) > limit) strained(k) = 1_i1
+      if (.not. model%compression) cycle
+      if (model%compressed(k) == 1_i1 .and. -least(l) > limit) strained(k) = 1_i1
+    end do
+  end subroutine mark
+
+end module pd_force_lattice

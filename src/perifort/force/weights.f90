@@ -1,0 +1,155 @@
+!> Weights of lattice blocks: volume correction, surface factors and stiffness of every bond of
+!> `lanes` neighbouring slots. Blocks whose surroundings are alike share them, so that surface
+!> correction costs nothing in a step and next to no memory.
+module pd_force_weights
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lookup, only: lookup_type, mix
+  use pd_family_lattice, only: lattice_family_type, weights_type, lanes, word_bits
+  use pd_family_surface, only: bond_factor
+  use pd_force_model, only: model_type
+  implicit none (type, external)
+  private
+  public :: build_weights, block_weights, allocate_weights
+
+  integer(i8), parameter :: free_bytes = 64_i8*1024_i8**2  !! tables may always take this much,
+  integer(i8), parameter :: bytes_per_slot = 100_i8        !! and this much per slot
+
+contains
+
+  !> Find the blocks that are alike and make the weights of each kind. When the kinds become too many
+  !> (a lattice full of random holes), the rest make theirs in every pass.
+  subroutine build_weights(family, model)
+    type(lattice_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    type(lookup_type) :: kinds
+    type(weights_type), allocatable :: table(:), longer(:)
+    integer(i8), allocatable :: column(:)
+    integer(i8) :: key, bytes
+    integer :: b, i, number
+    logical :: is_new
+
+    call column_keys(family, column)
+    allocate (table(256))
+    bytes = 0_i8
+    do b = 1, size(family%block)
+      key = 0_i8
+      do i = -family%reach_cells, lanes - 1 + family%reach_cells
+        key = mix(key, column(family%block(b) + i))
+      end do
+      call kinds%number_of(key, number, is_new)
+      family%weights(b) = int(number, i4)
+      if (.not. is_new) cycle
+      bytes = bytes + family%n_offsets*(16_i8*lanes + 4)
+      if (bytes > free_bytes + bytes_per_slot*family%n_slots) exit
+      if (number > size(table)) then
+        allocate (longer(2*size(table)))
+        longer(:size(table)) = table
+        call move_alloc(longer, table)
+      end if
+      call allocate_weights(family, model, table(number))
+      call block_weights(family, model, family%block(b), table(number))
+      call trim_weights(table(number))
+    end do
+    if (b <= size(family%block)) then
+      kinds%count = kinds%count - 1
+      family%weights(b:) = 0_i4
+    end if
+    family%table = table(:kinds%count)
+  end subroutine build_weights
+
+  !> A key for each slot that says what its cross-section of rows looks like: a block's surroundings
+  !> are the columns from its first slot less the reach to its last slot plus the reach.
+  subroutine column_keys(family, column)
+    type(lattice_family_type), intent(in) :: family
+    integer(i8), allocatable, intent(out) :: column(:)
+    integer :: m, my, mz, j, k
+    integer(i8) :: first, last, s, row
+
+    m = family%reach_cells
+    my = merge(m, 0, family%dim > 1)
+    mz = merge(m, 0, family%dim > 2)
+    first = family%block(1) - m
+    last = family%block(size(family%block)) + lanes - 1 + m
+    allocate (column(first:last), source=0_i8)
+    do k = -mz, mz
+      do j = -my, my
+        row = j*int(family%stride(2), i8) + k*int(family%stride(3), i8)
+        !$omp parallel do simd schedule(static) default(none) shared(family, column, row, first, last) private(s)
+        do s = first, last
+          column(s) = mix(column(s), int(family%class_of(s + row), i8))
+        end do
+      end do
+    end do
+  end subroutine column_keys
+
+  !> Room for the weights of any block.
+  pure subroutine allocate_weights(family, model, weights)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(weights_type), intent(out) :: weights
+    integer :: n
+
+    n = family%n_offsets
+    allocate (weights%offset(n), weights%stretch(lanes, n))
+    allocate (weights%dilatation(lanes, merge(n, 0, model%dilatation)))
+  end subroutine allocate_weights
+
+  !> Weights of the block that begins at slot `first`, as if no bond were broken. Offsets that no
+  !> lane has are left out.
+  pure subroutine block_weights(family, model, first, weights)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer(i8), intent(in) :: first
+    type(weights_type), intent(inout) :: weights
+    real(wp) :: weight, n(family%dim)
+    integer(i8) :: k, j
+    integer :: o, l, m
+
+    m = 0
+    weights%whole = .true.
+    do o = 1, family%n_offsets
+      if (.not. any_bond(o)) cycle
+      m = m + 1
+      weights%offset(m) = int(o, i4)
+      n = family%xi(o, :)/family%length(o)
+      do l = 1, lanes
+        k = first + l - 1
+        j = k + family%shift(o)
+        weights%stretch(l, m) = 0.0_wp
+        if (model%dilatation) weights%dilatation(l, m) = 0.0_wp
+        if (family%alive(k) == 0_i1 .or. family%alive(j) == 0_i1) then
+          weights%whole = .false.
+          cycle
+        end if
+        weight = family%fraction(o)*family%cell_volume
+        weights%stretch(l, m) = weight*family%length(o)*(model%materials(model%material(k))%q &
+          & + model%materials(model%material(j))%q)
+        if (model%dilatation) weights%dilatation(l, m) = weight
+        if (.not. model%surface) cycle
+        weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
+        if (model%dilatation) weights%dilatation(l, m) = weight*bond_factor(n, model%D(k, :), model%D(j, :))
+      end do
+    end do
+    weights%n = m
+
+  contains
+
+    pure logical function any_bond(o)
+      integer, intent(in) :: o
+      any_bond = any(family%alive(first:first + lanes - 1) == 1_i1 .and. &
+        & family%alive(first + family%shift(o):first + family%shift(o) + lanes - 1) == 1_i1)
+    end function any_bond
+  end subroutine block_weights
+
+  !> Give back the room of offsets that were left out.
+  pure subroutine trim_weights(weights)
+    type(weights_type), intent(inout) :: weights
+    integer :: n
+
+    n = weights%n
+    weights%offset = weights%offset(:n)
+    weights%stretch = weights%stretch(:, :n)
+    if (size(weights%dilatation) > 0) weights%dilatation = weights%dilatation(:, :n)
+  end subroutine trim_weights
+
+end module pd_force_weights
