@@ -288,12 +288,15 @@ contains
     character(*), intent(in) :: name
     integer, intent(out) :: field
     type(error_type), allocatable, intent(out) :: error
+    character(label_length), allocatable :: names(:)
 
+    allocate (names(size(self%fields)))
     do field = 1, size(self%fields)
-      if (self%fields(field)%name == name) return
+      names(field) = self%fields(field)%name
+      if (names(field) == name) return
     end do
     call fail(error, 'these results have no field '''//trim(name)//''': '// &
-      & join(self%fields%name, ', '))
+      & join(names, ', '))
   end subroutine find_field
 
   !> Whether a field can be written now, with values of this shape.
