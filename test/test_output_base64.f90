@@ -21,19 +21,17 @@ contains
 
   !> The text of `bytes`, given to the encoder `piece` bytes at a time.
   function encoded(bytes, piece) result(text)
-    integer(i1), intent(in) :: bytes(:)
+    integer(i1), contiguous, intent(in) :: bytes(:)
     integer, intent(in) :: piece
     character(:), allocatable :: text
     type(base64_encoder) :: encoder
     character(:), allocatable :: buffer
-    integer(i1), allocatable :: part(:)
     integer :: first, length
 
     allocate (character(base64_length(piece)) :: buffer)
     text = ''
     do first = 1, size(bytes), piece
-      part = bytes(first:min(size(bytes), first + piece - 1))
-      call encoder%put(part, buffer, length)
+      call encoder%put(bytes(first:min(size(bytes), first + piece - 1)), buffer, length)
       text = text//buffer(:length)
     end do
     call encoder%finish(buffer, length)
@@ -66,7 +64,8 @@ contains
     character(:), allocatable :: whole
     integer :: i, piece
 
-    bytes = [(int(mod(37*i, 256) - 128, i1), i=1, 100)]
+    allocate (bytes(100))
+    bytes(:) = [(int(mod(37*i, 256) - 128, i1), i=1, 100)]
     whole = encoded(bytes, 100)
     call check(error, len(whole), 136)
     do piece = 1, 99

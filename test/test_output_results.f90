@@ -86,13 +86,16 @@ contains
     real(wp), allocatable :: u(:, :), d(:)
     integer :: k, i, c
 
+    allocate (u(n, 3), d(n))
     do k = first, last
       do i = 1, rows
         call results%add_row([real(k*rows + i, wp), -real(k*rows + i, wp)], failure)
         if (allocated(failure)) return
       end do
-      u = reshape([((value(k, i, c), i=1, n), c=1, 3)], [n, 3])
-      d = [(value(k, i, 0), i=1, n)]
+      do i = 1, n
+        u(i, :) = [(value(k, i, c), c=1, 3)]
+        d(i) = value(k, i, 0)
+      end do
       call results%begin_output(0.125_wp*k, failure)
       if (.not. allocated(failure)) call results%put_field('displacement', u, failure)
       if (.not. allocated(failure)) call results%put_field(2, d, failure)
