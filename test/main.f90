@@ -12,6 +12,10 @@ program main
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
   use test_command_line, only: collect_command_line
+  use test_output_base64, only: collect_output_base64
+  use test_output_files, only: collect_output_files
+  use test_output_layout, only: collect_output_layout
+  use test_output_results, only: collect_output_results
   use test_scene_check, only: collect_scene_check
   use test_scene_elements, only: collect_scene_elements
   use test_scene_file, only: collect_scene_file
@@ -34,6 +38,10 @@ program main
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)
   call register('command_line', collect_command_line)
+  call register('output_base64', collect_output_base64)
+  call register('output_files', collect_output_files)
+  call register('output_layout', collect_output_layout)
+  call register('output_results', collect_output_results)
   call register('scene_check', collect_scene_check)
   call register('scene_elements', collect_scene_elements)
   call register('scene_file', collect_scene_file)

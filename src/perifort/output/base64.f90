@@ -32,7 +32,7 @@ contains
   subroutine put(self, bytes, text, length)
     class(base64_encoder), intent(inout) :: self
     integer(i1), contiguous, intent(in) :: bytes(:)
-    character(*), intent(inout) :: text
+    character(:), allocatable, intent(inout) :: text
     integer, intent(out) :: length
     integer :: i, first, bits
 
@@ -66,7 +66,7 @@ contains
   !> Encode what is left into `text(:length)`, padded with `=`, and be ready for another run.
   subroutine finish(self, text, length)
     class(base64_encoder), intent(inout) :: self
-    character(*), intent(inout) :: text
+    character(:), allocatable, intent(inout) :: text
     integer, intent(out) :: length
     integer :: bits
 

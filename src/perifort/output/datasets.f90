@@ -4,7 +4,13 @@
 !> readers in C's order. Rows count from 0.
 module pd_output_datasets
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t, c_loc, c_ptr
-  use hdf5
+  use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5P_DATASET_CREATE_F, &
+    & H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_I32LE, &
+    & H5T_STD_I64LE, H5T_STD_I8LE, h5dclose_f, h5dcreate_f, h5dget_space_f, h5dopen_f, &
+    & h5dread_f, h5dset_extent_f, h5dwrite_f, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
+    & h5pset_chunk_f, h5pset_fill_time_f, h5sclose_f, h5screate_simple_f, &
+    & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, &
+    & hsize_t
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_output_hdf5, only: explain, hdf5_file

@@ -5,10 +5,11 @@ module pd_output_files
   use pd_base_kinds, only: i8
   implicit none (type, external)
   private
-  public :: make_directory, rename_file, remove_file, cut_file, file_exists, directory_exists, file_bytes, &
-    & set_environment, in_directory
+  public :: make_directory, rename_file, remove_file, cut_file, file_exists, directory_exists, &
+    & file_bytes, set_environment, in_directory
 
-  interface
+  ! allow(C071)
+  interface  ! C's texts have no other form
     integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
       import :: c_char, c_int
       implicit none (type, external)
@@ -74,6 +75,7 @@ contains
     message = ''
     open (newunit=unit, file=path, status='new', action='write', iostat=status, iomsg=message)
     if (status == 0) close (unit, status='delete', iostat=status)
+    if (status == 0) message = ''
     reason = trim(message)
     if (reason == '') reason = 'the system gives no reason'
     if (index(reason, ': ', back=.true.) > 0) reason = reason(index(reason, ': ', back=.true.) + 2:)

@@ -6,7 +6,14 @@
 module pd_output_hdf5
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, &
     & c_int64_t, c_loc, c_ptr, c_size_t
-  use hdf5
+  use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, &
+    & H5P_FILE_ACCESS_F, H5S_SCALAR_F, H5T_CSET_UTF8_F, H5T_FORTRAN_S1, H5T_STD_I64LE, &
+    & h5aclose_f, h5acreate_f, h5aopen_by_name_f, h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, &
+    & h5dcreate_f, h5dont_atexit_f, h5dwrite_f, h5eset_auto_f, h5fclose_f, h5fcreate_f, &
+    & h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, h5lexists_f, &
+    & h5oclose_f, h5ocopy_f, h5oopen_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, &
+    & h5pset_sieve_buf_size_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, &
+    & h5tcopy_f, h5tset_cset_f, h5tset_size_f, hid_t, hsize_t, size_t
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   use pd_base_text, only: to_text

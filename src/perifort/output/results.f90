@@ -148,6 +148,7 @@ contains
     type(column_type), intent(in) :: columns(:)
     character(*), intent(in) :: precision, format
     type(error_type), allocatable, intent(out) :: error
+    character(label_length), allocatable :: names(:)
     integer :: i
 
     if (size(positions, 1) < 1) then
@@ -159,15 +160,18 @@ contains
     else if (all(lower_case(trim(format)) /= ['vtkhdf', 'vtu   ', 'both  '])) then
       call fail(error, 'unknown format '''//trim(format)//''': vtkhdf, vtu, both')
     end if
+    allocate (names(max(size(fields), size(columns))))
     do i = 1, size(fields)
       if (allocated(error)) return
-      call check_name(fields(i)%name, fields(:i - 1)%name, error)
+      names(i) = fields(i)%name
+      call check_name(names(i), names(:i - 1), error)
       if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3])) &
         & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1 nor 3 components')
     end do
     do i = 1, size(columns)
       if (allocated(error)) return
-      call check_name(columns(i)%name, columns(:i - 1)%name, error)
+      names(i) = columns(i)%name
+      call check_name(names(i), names(:i - 1), error)
     end do
   end subroutine check_description
 
@@ -284,12 +288,15 @@ contains
     character(*), intent(in) :: name
     integer, intent(out) :: field
     type(error_type), allocatable, intent(out) :: error
+    character(label_length), allocatable :: names(:)
 
+    allocate (names(size(self%fields)))
     do field = 1, size(self%fields)
-      if (self%fields(field)%name == name) return
+      names(field) = self%fields(field)%name
+      if (names(field) == name) return
     end do
     call fail(error, 'these results have no field '''//trim(name)//''': '// &
-      & join(self%fields%name, ', '))
+      & join(names, ', '))
   end subroutine find_field
 
   !> Whether a field can be written now, with values of this shape.

@@ -30,7 +30,8 @@ module pd_output_sink
     procedure :: is_open
   end type sink_type
 
-  interface
+  ! allow(C071)
+  interface  ! C's texts have no other form
     type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
       import :: c_char, c_ptr
       implicit none (type, external)
@@ -135,7 +136,7 @@ contains
     character(:), allocatable :: reason
     character(:), allocatable :: block
     character(512) :: message
-    integer :: unit, status, ignored
+    integer :: unit, status, closed
 
     message = ''
     open (newunit=unit, file=path//suffix, access='stream', form='unformatted', action='write', &
@@ -144,9 +145,10 @@ contains
       allocate (character(524288) :: block)  ! more than the runtime library would keep back
       block(:) = ' '
       write (unit, iostat=status, iomsg=message) block
-      close (unit, status='delete', iostat=ignored)
+      close (unit, status='delete', iostat=closed)
+      if (status == 0) status = closed
     else if (status == 0) then
-      close (unit, iostat=ignored)
+      close (unit, iostat=status)
     end if
     reason = 'the system gives no reason (is the disk full?)'
     if (status == 0) return

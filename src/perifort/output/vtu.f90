@@ -103,7 +103,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(array_type) :: array
     integer(i8), allocatable, target :: numbers(:)
-    integer(i1), pointer :: bytes(:)
+    integer(i1), pointer, contiguous :: bytes(:)
     integer(i1), allocatable :: kinds(:)
     integer :: pass, first, count, i
 
@@ -168,11 +168,10 @@ contains
     type(sink_type), intent(inout) :: sink
     type(array_type), intent(inout) :: array
     type(error_type), allocatable, intent(out) :: error
-    character(4) :: text
     integer :: length
 
-    call array%encoder%finish(text, length)
-    call sink%line(text(:length)//'</DataArray>', error)
+    call array%encoder%finish(array%text, length)
+    call sink%line(array%text(:length)//'</DataArray>', error)
   end subroutine end_array
 
   !> Write `values(n, 3)` as an array of vectors, block by block.
@@ -210,7 +209,7 @@ contains
     logical, intent(in) :: single
     type(error_type), allocatable, intent(out) :: error
     real(sp), allocatable, target :: short(:)
-    integer(i1), pointer :: bytes(:)
+    integer(i1), pointer, contiguous :: bytes(:)
 
     if (single) then
       allocate (short, source=to_single(values))
