@@ -26,8 +26,9 @@ module pd_family_lattice
   !> Weights of the bonds of one block, or of many that are alike.
   type :: weights_type
     integer :: n = 0                           !! offsets that any lane has
-    logical :: whole = .true.                  !! every lane has every one of them
     integer(i4), allocatable :: offset(:)      !! their numbers (n)
+    integer(i8), allocatable :: shift(:)       !! their shifts (n)
+    real(wp), allocatable :: geometry(:, :)    !! their geometry (4, n)
     real(wp), allocatable :: dilatation(:, :)  !! Gd v_c V_j (lanes, n)
     real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (lanes, n)
   end type weights_type
@@ -338,7 +339,7 @@ contains
     if (allocated(family%weights)) bytes = bytes + 4_i8*size(family%weights)
     if (.not. allocated(family%table)) return
     do t = 1, size(family%table)
-      bytes = bytes + family%table(t)%n*(16_i8*lanes + 4)
+      bytes = bytes + family%table(t)%n*(16_i8*lanes + 44)
     end do
   end function bytes
 

@@ -14,10 +14,11 @@ module pd_force_lattice
   private
   public :: lattice_dilatation, lattice_force, lattice_energy
 
-  !> Coefficients of h: (1 - 1/sqrt(1 + e))/e = 1/2 - 3/8 e + e^2 (Chebyshev interpolation of the rest).
+  !> Limit and coefficients of h: (1 - 1/sqrt(1 + e))/e = 1/2 - 3/8 e + e^2 (Chebyshev interpolation of the rest).
   real(wp), parameter :: small_strain = 0.02_wp
-  real(wp), parameter :: h(0:7) = [0.5_wp, -0.375_wp, 0.31250000000037114_wp, -0.27343750000352559_wp, &
-    & 0.24609373329889834_wp, -0.22558592163388049_wp, 0.20958398402647260_wp, -0.19648637700069084_wp]
+  real(wp), parameter :: h0 = 0.5_wp, h1 = -0.375_wp, h2 = 0.31250000000037114_wp, &
+    & h3 = -0.27343750000352559_wp, h4 = 0.24609373329889834_wp, h5 = -0.22558592163388049_wp, &
+    & h6 = 0.20958398402647260_wp, h7 = -0.19648637700069084_wp
   !> Lets the force of a bond crushed to a point vanish instead of being NaN.
   real(wp), parameter :: crushed = 1.0e-30_wp
 
@@ -160,8 +161,9 @@ contains
       associate (shared => family%table(family%weights(b)))
         n = shared%n
         weights%n = n
-        weights%whole = shared%whole
         weights%offset(:n) = shared%offset
+        weights%shift(:n) = shared%shift
+        weights%geometry(:, :n) = shared%geometry
         weights%stretch(:, :n) = shared%stretch
         if (model%dilatation) weights%dilatation(:, :n) = shared%dilatation
       end associate
@@ -169,7 +171,6 @@ contains
       call block_weights(family, model, first, weights)
     end if
     if (.not. allocated(family%broken)) return
-    weights%whole = .false.
     do m = 1, weights%n
       o = weights%offset(m)
       w = (o - 1)/word_bits + 1
@@ -201,14 +202,14 @@ contains
       ! constant dimensions, so that each has code of its own
       select case (family%dim)
       case (3)
-        call fast_dilatation(3, weights%n, weights%offset, weights%dilatation, weights%whole, &
-          & family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, theta, largest)
+        call fast_dilatation_3(weights%n, weights%dilatation, weights%shift, weights%geometry, &
+          & first, family%n_slots, u, theta, largest)
       case (2)
-        call fast_dilatation(2, weights%n, weights%offset, weights%dilatation, weights%whole, &
-          & family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, theta, largest)
+        call fast_dilatation_2(weights%n, weights%dilatation, weights%shift, weights%geometry, &
+          & first, family%n_slots, u, theta, largest)
       case default
-        call fast_dilatation(1, weights%n, weights%offset, weights%dilatation, weights%whole, &
-          & family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, theta, largest)
+        call fast_dilatation_1(weights%n, weights%dilatation, weights%shift, weights%geometry, &
+          & first, family%n_slots, u, theta, largest)
       end select
     end if
     family%large(b) = merge(0_i1, 1_i1, largest < terms%fast_limit)
@@ -250,16 +251,16 @@ contains
     if (terms%fast_limit > 0.0_wp .and. (.not. terms%dilatation .or. largest <= 0.0_wp)) then
       select case (family%dim)
       case (3)
-        call fast_force(3, terms%dilatation, weights%n, weights%offset, weights%dilatation, weights%stretch, &
-          & weights%whole, family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, p, &
+        call fast_force_3(terms%dilatation, weights%n, weights%dilatation, weights%stretch, &
+          & weights%shift, weights%geometry, first, family%n_slots, u, p, &
           & f, largest)
       case (2)
-        call fast_force(2, terms%dilatation, weights%n, weights%offset, weights%dilatation, weights%stretch, &
-          & weights%whole, family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, p, &
+        call fast_force_2(terms%dilatation, weights%n, weights%dilatation, weights%stretch, &
+          & weights%shift, weights%geometry, first, family%n_slots, u, p, &
           & f, largest)
       case default
-        call fast_force(1, terms%dilatation, weights%n, weights%offset, weights%dilatation, weights%stretch, &
-          & weights%whole, family%n_offsets, family%shift, family%geometry, first, family%n_slots, u, p, &
+        call fast_force_1(terms%dilatation, weights%n, weights%dilatation, weights%stretch, &
+          & weights%shift, weights%geometry, first, family%n_slots, u, p, &
           & f, largest)
       end select
     end if
@@ -273,126 +274,44 @@ contains
     end do
   end subroutine force_of_block
 
-  !> sum of Gd s Lambda vc V over the bonds of each lane by the fast formula; `largest` is the
-  !> greatest |e| of all bonds that are there.
-  subroutine fast_dilatation(dim, n, offset, weight, whole, n_offsets, shift, geometry, first, n_slots, &
-    & u, theta, largest)
-    integer, intent(in) :: dim, n, n_offsets, n_slots
-    integer(i4), intent(in) :: offset(n)
-    real(wp), intent(in) :: weight(lanes, n)
-    logical, intent(in) :: whole
-    integer(i8), intent(in) :: shift(n_offsets), first
-    real(wp), intent(in) :: geometry(4, n_offsets), u(n_slots, dim)
-    real(wp), intent(out) :: theta(lanes), largest
-    real(wp) :: own(lanes, 3), most(lanes), eta(3), x, e, g(4)
-    integer :: m, l, c
-    integer(i8) :: j
+  ! The fast loops have one text for all dimensions, and each dimension its own code: the dimension
+  ! must be a constant where the loops are compiled.
 
-    do c = 1, dim
-      own(:, c) = u(first:first + lanes - 1, c)
-    end do
-    theta = 0.0_wp
-    most = 0.0_wp
-    do m = 1, n
-      j = first - 1 + shift(offset(m))
-      g = geometry(:, offset(m))
-      !$omp simd private(eta, x, e, c)
-      do l = 1, lanes
-        eta(1) = u(j + l, 1) - own(l, 1)
-        x = g(1)*eta(1)
-        e = eta(1)**2
-        do c = 2, dim
-          eta(c) = u(j + l, c) - own(l, c)
-          x = x + g(c)*eta(c)
-          e = e + eta(c)**2
-        end do
-        e = 2*x + g(4)*e
-        if (whole) then
-          most(l) = max(most(l), abs(e))
-        else
-          most(l) = max(most(l), merge(abs(e), 0.0_wp, weight(l, m) > 0.0_wp))
-        end if
-        e = e*(h(0) + e*(h(1) + e*(h(2) + e*(h(3) + e*(h(4) + e*(h(5) + e*(h(6) + e*h(7))))))))
-        theta(l) = theta(l) + weight(l, m)*(e + x*e)
-      end do
-    end do
-    largest = maxval(most)
-  end subroutine fast_dilatation
+  subroutine fast_dilatation_1(n, weight, shift, geometry, first, n_slots, u, &
+    & theta, largest)
+    integer, parameter :: dim = 1
+    include 'fast_dilatation.inc'
+  end subroutine fast_dilatation_1
 
-  !> Force density of each lane by the fast formula. Without a dilatation the strain is looked at here.
-  subroutine fast_force(dim, dilatation, n, offset, weight, stretch, whole, n_offsets, shift, geometry, &
-    & first, n_slots, u, p, force, largest)
-    integer, intent(in) :: dim, n, n_offsets, n_slots
-    logical, intent(in) :: dilatation, whole
-    integer(i4), intent(in) :: offset(n)
-    real(wp), intent(in) :: weight(lanes, *), stretch(lanes, n)
-    integer(i8), intent(in) :: shift(n_offsets), first
-    real(wp), intent(in) :: geometry(4, n_offsets), u(n_slots, dim), p(*)
-    real(wp), intent(out) :: force(lanes, 3)
-    real(wp), intent(inout) :: largest
-    real(wp) :: own(lanes, 3), own_p(lanes), most(lanes), eta(3), x, e, r, magnitude, g(4)
-    integer :: m, l, c
-    integer(i8) :: j
+  subroutine fast_dilatation_2(n, weight, shift, geometry, first, n_slots, u, &
+    & theta, largest)
+    integer, parameter :: dim = 2
+    include 'fast_dilatation.inc'
+  end subroutine fast_dilatation_2
 
-    do c = 1, dim
-      own(:, c) = u(first:first + lanes - 1, c)
-    end do
-    force = 0.0_wp
-    if (dilatation) then
-      own_p = p(first:first + lanes - 1)
-      do m = 1, n
-        j = first - 1 + shift(offset(m))
-        g = geometry(:, offset(m))
-        !$omp simd private(eta, x, e, r, magnitude, c)
-        do l = 1, lanes
-          eta(1) = u(j + l, 1) - own(l, 1)
-          x = g(1)*eta(1)
-          e = eta(1)**2
-          do c = 2, dim
-            eta(c) = u(j + l, c) - own(l, c)
-            x = x + g(c)*eta(c)
-            e = e + eta(c)**2
-          end do
-          e = 2*x + g(4)*e
-          e = e*(h(0) + e*(h(1) + e*(h(2) + e*(h(3) + e*(h(4) + e*(h(5) + e*(h(6) + e*h(7))))))))
-          r = 1 - e
-          magnitude = stretch(l, m)*e + (own_p(l) + p(j + l))*weight(l, m)*((1 + x)*(r*r))
-          do c = 1, dim
-            force(l, c) = force(l, c) + magnitude*(g(c) + g(4)*eta(c))
-          end do
-        end do
-      end do
-    else
-      most = 0.0_wp
-      do m = 1, n
-        j = first - 1 + shift(offset(m))
-        g = geometry(:, offset(m))
-        !$omp simd private(eta, x, e, magnitude, c)
-        do l = 1, lanes
-          eta(1) = u(j + l, 1) - own(l, 1)
-          x = g(1)*eta(1)
-          e = eta(1)**2
-          do c = 2, dim
-            eta(c) = u(j + l, c) - own(l, c)
-            x = x + g(c)*eta(c)
-            e = e + eta(c)**2
-          end do
-          e = 2*x + g(4)*e
-          if (whole) then
-            most(l) = max(most(l), abs(e))
-          else
-            most(l) = max(most(l), merge(abs(e), 0.0_wp, stretch(l, m) > 0.0_wp))
-          end if
-          magnitude = stretch(l, m)*(e*(h(0) + e*(h(1) + e*(h(2) + e*(h(3) + e*(h(4) + e*(h(5) + e*(h(6) &
-            & + e*h(7)))))))))
-          do c = 1, dim
-            force(l, c) = force(l, c) + magnitude*(g(c) + g(4)*eta(c))
-          end do
-        end do
-      end do
-      largest = maxval(most)
-    end if
-  end subroutine fast_force
+  subroutine fast_dilatation_3(n, weight, shift, geometry, first, n_slots, u, &
+    & theta, largest)
+    integer, parameter :: dim = 3
+    include 'fast_dilatation.inc'
+  end subroutine fast_dilatation_3
+
+  subroutine fast_force_1(dilatation, n, weight, stretch, shift, geometry, first, &
+    & n_slots, u, p, force, largest)
+    integer, parameter :: dim = 1
+    include 'fast_force.inc'
+  end subroutine fast_force_1
+
+  subroutine fast_force_2(dilatation, n, weight, stretch, shift, geometry, first, &
+    & n_slots, u, p, force, largest)
+    integer, parameter :: dim = 2
+    include 'fast_force.inc'
+  end subroutine fast_force_2
+
+  subroutine fast_force_3(dilatation, n, weight, stretch, shift, geometry, first, &
+    & n_slots, u, p, force, largest)
+    integer, parameter :: dim = 3
+    include 'fast_force.inc'
+  end subroutine fast_force_3
 
   !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda, r = |xi|/|y|
   !> and the bond's direction over |xi|.

@@ -39,7 +39,7 @@ contains
       call kinds%number_of(key, number, is_new)
       family%weights(b) = int(number, i4)
       if (.not. is_new) cycle
-      bytes = bytes + family%n_offsets*(16_i8*lanes + 4)
+      bytes = bytes + family%n_offsets*(16_i8*lanes + 44)
       if (bytes > free_bytes + bytes_per_slot*family%n_slots) exit
       if (number > size(table)) then
         allocate (longer(2*size(table)))
@@ -90,7 +90,7 @@ contains
     integer :: n
 
     n = family%n_offsets
-    allocate (weights%offset(n), weights%stretch(lanes, n))
+    allocate (weights%offset(n), weights%shift(n), weights%geometry(4, n), weights%stretch(lanes, n))
     allocate (weights%dilatation(lanes, merge(n, 0, model%dilatation)))
   end subroutine allocate_weights
 
@@ -106,21 +106,19 @@ contains
     integer :: o, l, m
 
     m = 0
-    weights%whole = .true.
     do o = 1, family%n_offsets
       if (.not. any_bond(o)) cycle
       m = m + 1
       weights%offset(m) = int(o, i4)
+      weights%shift(m) = family%shift(o)
+      weights%geometry(:, m) = family%geometry(:, o)
       n = family%xi(o, :)/family%length(o)
       do l = 1, lanes
         k = first + l - 1
         j = k + family%shift(o)
         weights%stretch(l, m) = 0.0_wp
         if (model%dilatation) weights%dilatation(l, m) = 0.0_wp
-        if (family%alive(k) == 0_i1 .or. family%alive(j) == 0_i1) then
-          weights%whole = .false.
-          cycle
-        end if
+        if (family%alive(k) == 0_i1 .or. family%alive(j) == 0_i1) cycle
         weight = family%fraction(o)*family%cell_volume
         weights%stretch(l, m) = weight*family%length(o)*(model%materials(model%material(k))%q &
           & + model%materials(model%material(j))%q)
@@ -148,6 +146,8 @@ contains
 
     n = weights%n
     weights%offset = weights%offset(:n)
+    weights%shift = weights%shift(:n)
+    weights%geometry = weights%geometry(:, :n)
     weights%stretch = weights%stretch(:, :n)
     if (size(weights%dilatation) > 0) weights%dilatation = weights%dilatation(:, :n)
   end subroutine trim_weights
