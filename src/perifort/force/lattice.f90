@@ -47,7 +47,6 @@ contains
 
     terms = terms_of(model)
     !$omp parallel default(none) shared(family, model, u, p, strained, terms) private(scratch, b)
-    call allocate_weights(family, model, scratch)
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, b)) then
@@ -76,7 +75,6 @@ contains
     terms = terms_of(model)
     !$omp parallel default(none) shared(family, model, u, p, force, strained, terms) &
     !$omp private(scratch, b)
-    call allocate_weights(family, model, scratch)
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, b)) then
@@ -102,7 +100,6 @@ contains
     terms = terms_of(model)
     energy = 0.0_wp
     !$omp parallel default(none) shared(family, model, u, energy, terms) private(scratch, b)
-    call allocate_weights(family, model, scratch)
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, b)) then
@@ -157,6 +154,7 @@ contains
     real(wp) :: intact(lanes)
 
     first = family%block(b)
+    if (.not. allocated(weights%offset)) call allocate_weights(family, model, weights)
     if (family%weights(b) > 0) then
       associate (shared => family%table(family%weights(b)))
         n = shared%n

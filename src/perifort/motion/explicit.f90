@@ -4,10 +4,12 @@
 !> Every integrator is the same loop: at t_n the forces are brought up to date (which imposes the
 !> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
 module pd_motion_explicit
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, evaluate, account, add_loads, inverse_density, check_motion
+  use pd_motion_system, only: system_type, evaluate, account, add_loads, inverse_density, &
+    & explain_fault, faulty_slot
   implicit none (type, external)
   private
   public :: run_explicit
@@ -33,6 +35,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(memory_type) :: memory
     type(instant_type) :: instant
+    logical :: sound
     integer :: n
 
     instant%dt = dt
@@ -48,9 +51,16 @@ contains
       call account(system, instant%time)
       call observer%observe(system, instant, error)
       if (allocated(error) .or. n == steps) return
-      call advance(system, integrator, instant%time, dt, n == 0, memory)
-      call check_motion(system, instant%time + dt, dt, error)
-      if (allocated(error)) return
+      if (at_half_steps(integrator)) then
+        ! the first velocity gets only half its kick: the scheme as printed is of first order
+        call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, sound)
+      else
+        call advance(system, integrator, instant%time, dt, memory)
+        sound = faulty_slot(system, system%state%v, dt) == 0
+      end if
+      if (sound) cycle
+      call explain_fault(system, instant%time + dt, dt, error)
+      return
     end do
   end subroutine run_explicit
 
@@ -74,11 +84,10 @@ contains
   end subroutine allocate_memory
 
   !> One step from t to t + dt; the forces are those at t.
-  subroutine advance(system, integrator, t, dt, first, memory)
+  subroutine advance(system, integrator, t, dt, memory)
     type(system_type), intent(inout) :: system
     character(*), intent(in) :: integrator
     real(wp), intent(in) :: t, dt
-    logical, intent(in) :: first
     type(memory_type), intent(inout) :: memory
 
     select case (integrator)
@@ -100,64 +109,71 @@ contains
         call correct(system, t, dt, memory)
       end if
       call shift(memory)
-    case ('runge_kutta')
+    case default
       call remember_instant(system, t, memory)
       call runge_kutta(system, t, dt, memory)
-    case default
-      ! the first velocity gets only half its kick: the scheme as printed is of first order
-      call kick(system, t, merge(dt/2, dt, first), system%state%v)
-      call drift(system, dt)
     end select
   end subroutine advance
 
-  !> v = v + dt (f + b)/rho (7.8).
-  subroutine kick(system, t, dt, v)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t, dt
-    real(wp), intent(inout) :: v(:, :)
-    real(wp) :: scale
-    integer :: k, c
-
-    if (size(system%model%materials) == 1) then
-      scale = dt/system%model%materials(1)%density
-      do c = 1, size(v, 2)
-        !$omp parallel do simd schedule(static) default(none) shared(system, v, scale, c) private(k)
-        do k = 1, size(v, 1)
-          v(k, c) = v(k, c) + scale*system%state%force(k, c)
-        end do
-      end do
-    else
-      do c = 1, size(v, 2)
-        !$omp parallel do schedule(static) default(none) shared(system, v, dt, c) private(k)
-        do k = 1, size(v, 1)
-          v(k, c) = v(k, c) + dt*inverse_density(system%model, k)*system%state%force(k, c)
-        end do
-      end do
-    end if
-    call add_loads(system, t, dt, .true., v)
-  end subroutine kick
-
-  !> u = u + dt v (7.9).
-  subroutine drift(system, dt)
+  !> 7.8 and 7.9 in one pass: v = v + kick (f + b)/rho, u = u + dt v. `sound` is false if that is no
+  !> motion any more: a velocity that isn't finite, or a point that crosses its horizon in the step.
+  subroutine leap(system, t, kick, dt, sound)
     type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: dt
+    real(wp), intent(in) :: t, kick, dt
+    logical, intent(out) :: sound
+    real(wp) :: scale, largest, sum_of_squares
+    logical :: one_material
     integer :: k, c
 
-    do c = 1, size(system%state%u, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(system, dt, c) private(k)
-      do k = 1, size(system%state%u, 1)
-        system%state%u(k, c) = system%state%u(k, c) + dt*system%state%v(k, c)
+    call add_loads(system, t, kick, .true., system%state%v)
+    one_material = size(system%model%materials) == 1
+    scale = kick/system%model%materials(1)%density
+    largest = 0.0_wp
+    sum_of_squares = 0.0_wp
+    !$omp parallel default(none) shared(system, kick, dt, one_material) private(k, c) &
+    !$omp firstprivate(scale) reduction(max:largest) reduction(+:sum_of_squares)
+    associate (u => system%state%u, v => system%state%v, f => system%state%force)
+      do c = 1, size(u, 2)
+        if (one_material) then
+          !$omp do simd schedule(static)
+          do k = 1, size(u, 1)
+            v(k, c) = v(k, c) + scale*f(k, c)
+            u(k, c) = u(k, c) + dt*v(k, c)
+            largest = max(largest, abs(v(k, c)))
+            sum_of_squares = sum_of_squares + v(k, c)**2
+          end do
+          !$omp end do simd nowait
+        else
+          !$omp do schedule(static)
+          do k = 1, size(u, 1)
+            scale = kick*inverse_density(system%model, k)
+            v(k, c) = v(k, c) + scale*f(k, c)
+            u(k, c) = u(k, c) + dt*v(k, c)
+            largest = max(largest, abs(v(k, c)))
+            sum_of_squares = sum_of_squares + v(k, c)**2
+          end do
+          !$omp end do nowait
+        end if
       end do
-    end do
-  end subroutine drift
+    end associate
+    !$omp end parallel
+    sound = ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta
+  end subroutine leap
 
   !> Accelerations at `t` from the forces, 0 for constrained components.
   subroutine accelerations(system, t, a)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: t
     real(wp), intent(inout) :: a(:, :)
-    a = 0.0_wp
-    call kick(system, t, 1.0_wp, a)
+    integer :: k, c
+
+    do c = 1, size(a, 2)
+      !$omp parallel do schedule(static) default(none) shared(system, a, c) private(k)
+      do k = 1, size(a, 1)
+        a(k, c) = inverse_density(system%model, k)*system%state%force(k, c)
+      end do
+    end do
+    call add_loads(system, t, 1.0_wp, .true., a)
     where (system%held == 1) a = 0.0_wp
   end subroutine accelerations
 
