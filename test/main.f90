@@ -15,6 +15,8 @@ program main
   use test_body_material, only: collect_body_material
   use test_command_line, only: collect_command_line
   use test_family_cells, only: collect_family_cells
+  use test_family_cracks, only: collect_family_cracks
+  use test_family_surface, only: collect_family_surface
   use test_family_volume, only: collect_family_volume
   use test_force_contract, only: collect_force_contract
   use test_output_base64, only: collect_output_base64
@@ -46,6 +48,8 @@ program main
   call register('body_material', collect_body_material)
   call register('command_line', collect_command_line)
   call register('family_cells', collect_family_cells)
+  call register('family_cracks', collect_family_cracks)
+  call register('family_surface', collect_family_surface)
   call register('family_volume', collect_family_volume)
   call register('force_contract', collect_force_contract)
   call register('output_base64', collect_output_base64)

@@ -51,7 +51,8 @@ contains
             n = n + 1
             associate (place => 7 + ([i, j, k] - 0.5_wp)*0.25_wp)
               ! sums of small binary fractions are exact
-              call expect(error, maxval(abs(body%x(n, :) - place(:dim))), 0.0_wp, 0.0_wp, 'position')
+              call expect(error, maxval(abs(body%x(n, :) - place(:dim))), 0.0_wp, 0.0_wp, &
+                & 'position')
             end associate
           end do
         end do
@@ -59,7 +60,8 @@ contains
       depth = 1.0_wp
       if (dim == 1) depth = scene%header%area
       if (dim == 2) depth = scene%header%thickness
-      call expect(error, sum(body%volume), depth*product(last)*0.25_wp**dim, 1.0e-14_wp*product(last), 'volume')
+      call expect(error, sum(body%volume), depth*product(last)*0.25_wp**dim, &
+        & 1.0e-14_wp*product(last), 'volume')
       call expect(error, delta, 3.015_wp*0.25_wp, 1.0e-15_wp, 'horizon')
     end do
   end subroutine test_order
@@ -81,19 +83,22 @@ contains
     ! integer triples with a sum of squares up to 5: 1 + 6 + 12 + 8 + 6 + 24; sqrt(5) is not exact
     scene%removed(1)%radius = sqrt(5.0_wp)
     call generate_body(scene, body, delta, fault)
-    call expect(error, real(body%n_points, wp), real(343 - 57, wp), 0.0_wp, 'points around a sphere')
+    call expect(error, real(body%n_points, wp), real(343 - 57, wp), 0.0_wp, &
+      & 'points around a sphere')
     scene%removed(1)%shape = 'cylinder'
     scene%removed(1)%axis = 'y'
     scene%removed(1)%radius = 2.0_wp
     scene%removed(1)%lower(2) = 1.5_wp
     ! 13 integer pairs with a sum of squares up to 4, in the rows from y = 1.5 to 6.5
     call generate_body(scene, body, delta, fault)
-    call expect(error, real(body%n_points, wp), real(343 - 13*6, wp), 0.0_wp, 'points around a cylinder')
+    call expect(error, real(body%n_points, wp), real(343 - 13*6, wp), 0.0_wp, &
+      & 'points around a cylinder')
     scene%removed(1)%shape = 'box'
     scene%removed(1)%lower = [0.5_wp, 2.5_wp, 4.0_wp]
     scene%removed(1)%upper = [2.5_wp, 3.5_wp, 5.0_wp]
     call generate_body(scene, body, delta, fault)
-    call expect(error, real(body%n_points, wp), real(343 - 3*2*1, wp), 0.0_wp, 'points around a box')
+    call expect(error, real(body%n_points, wp), real(343 - 3*2*1, wp), 0.0_wp, &
+      & 'points around a box')
     ! order is kept: the first point left of the first row is the fourth of its kind
     scene%removed(1)%lower = 0.0_wp
     call generate_body(scene, body, delta, fault)
@@ -183,7 +188,8 @@ contains
     call generate_body(scene, body, delta, fault)
     call expect_true(error, allocated(fault), 'a bad cloud was accepted; expected: '//word)
     if (allocated(error)) return
-    call expect_true(error, index(fault%message, word) > 0, 'expected '//word//' in: '//fault%message)
+    call expect_true(error, index(fault%message, word) > 0, 'expected '//word//' in: ' &
+      & //fault%message)
   end subroutine expect_refused
 
   subroutine cloud_scene(scene)
@@ -229,10 +235,14 @@ contains
     if (allocated(error)) return
     call expect_true(error, all(body%layer(:20) == 0) .and. all(body%layer(21:35) == 1) &
       & .and. all(body%layer(36:) == 3), 'layers are numbered by their groups')
-    call expect(error, maxval(abs(body%x(21, :) - [0.5_wp, 4.5_wp])), 0.0_wp, 0.0_wp, 'first of the top')
-    call expect(error, maxval(abs(body%x(35, :) - [4.5_wp, 6.5_wp])), 0.0_wp, 0.0_wp, 'last of the top')
-    call expect(error, maxval(abs(body%x(36, :) - [-2.5_wp, 0.5_wp])), 0.0_wp, 0.0_wp, 'first at the left')
-    call expect(error, maxval(abs(body%x(47, :) - [-0.5_wp, 3.5_wp])), 0.0_wp, 0.0_wp, 'last at the left')
+    call expect(error, maxval(abs(body%x(21, :) - [0.5_wp, 4.5_wp])), 0.0_wp, 0.0_wp, &
+      & 'first of the top')
+    call expect(error, maxval(abs(body%x(35, :) - [4.5_wp, 6.5_wp])), 0.0_wp, 0.0_wp, &
+      & 'last of the top')
+    call expect(error, maxval(abs(body%x(36, :) - [-2.5_wp, 0.5_wp])), 0.0_wp, 0.0_wp, &
+      & 'first at the left')
+    call expect(error, maxval(abs(body%x(47, :) - [-0.5_wp, 3.5_wp])), 0.0_wp, 0.0_wp, &
+      & 'last at the left')
     call expect_true(error, all(body%material == 1) .and. all(body%body == 1) .and. &
       & all(body%grid == body%grid(1)), 'a layer continues its body')
   end subroutine test_layers
@@ -294,7 +304,8 @@ contains
     do i = 1, 200
       spacing = 0.1_wp/i
       call expect_true(error, layer_rows(3*spacing, spacing) == 3, 'exactly three')
-      call expect_true(error, layer_rows(nearest(3*spacing, -1.0_wp), spacing) == 3, 'three less rounding')
+      call expect_true(error, layer_rows(nearest(3*spacing, -1.0_wp), spacing) == 3, &
+        & 'three less rounding')
       call expect_true(error, layer_rows(3.015_wp*spacing, spacing) == 3, 'the usual ratio')
       call expect_true(error, layer_rows(2.99_wp*spacing, spacing) == 2, 'just below')
     end do

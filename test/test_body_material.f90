@@ -18,7 +18,8 @@ contains
   subroutine collect_body_material(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('isotropic expansion has the classical energy and dilatation', test_expansion), &
+      & new_unittest('isotropic expansion has the classical energy and dilatation', &
+      & test_expansion), &
       & new_unittest('pure shear has the classical energy', test_shear), &
       & new_unittest('bars have E/2 strain^2', test_bar), &
       & new_unittest('a vanishes at the special ratio, and there alone', test_special), &
@@ -55,8 +56,10 @@ contains
         sum_of_directions = sum_of_directions + 2*pi/angles*dot_product(n, matmul(strain, n))**m
       case (3)
         do j = 1, size(node)
-          n = [sqrt(1 - node(j)**2)*cos(2*pi*i/angles), sqrt(1 - node(j)**2)*sin(2*pi*i/angles), node(j)]
-          sum_of_directions = sum_of_directions + share(j)*2*pi/angles*dot_product(n, matmul(strain, n))**m
+          n = [sqrt(1 - node(j)**2)*cos(2*pi*i/angles), sqrt(1 - node(j)**2)*sin(2*pi*i/angles), &
+            & node(j)]
+          sum_of_directions = sum_of_directions + share(j)*2*pi/angles*dot_product(n, &
+            & matmul(strain, n))**m
         end do
       end select
     end do
@@ -90,7 +93,8 @@ contains
           theta = m%d*delta*horizon_moment(dim, 0, strain, 1)
           energy = m%a*theta**2 + m%b*delta*horizon_integral(dim, 1, strain)
           call expect(error, theta, dim*zeta, 1.0e-13_wp*dim*zeta, 'dilatation')
-          call expect(error, energy, kappa*theta**2/2, 1.0e-12_wp*kappa*theta**2, 'energy of expansion')
+          call expect(error, energy, kappa*theta**2/2, 1.0e-12_wp*kappa*theta**2, &
+            & 'energy of expansion')
         end associate
       end do
     end do
@@ -127,7 +131,8 @@ contains
     type(material_type) :: m
 
     m = new_material(youngs_modulus, 0.3_wp, 1.0_wp, 1, .false., h, A, delta, .false.)
-    call expect(error, m%b*A*delta**3, youngs_modulus/2, 1.0e-14_wp*youngs_modulus, 'energy of a bar')
+    call expect(error, m%b*A*delta**3, youngs_modulus/2, 1.0e-14_wp*youngs_modulus, &
+      & 'energy of a bar')
     call expect(error, m%d*delta*2*A*delta, 1.0_wp, 1.0e-14_wp, 'dilatation of a bar')
     call expect(error, m%a, 0.0_wp, 0.0_wp, 'a of a bar')
   end subroutine test_bar
@@ -191,7 +196,8 @@ contains
     m = new_material(youngs_modulus, 1.0_wp/3, 1.0_wp, 2, .false., h, A, delta, .true.)
     s = critical_stretch_from_energy(m, Gc, 2, delta)
     call expect(error, 2*m%q*s**2*h*delta**4/4, Gc, 1.0e-13_wp*Gc, 'released energy in the plane')
-    call expect(error, s, sqrt(4*pi*Gc/(9*youngs_modulus*delta)), 1.0e-13_wp*s, 'known value in plane stress')
+    call expect(error, s, sqrt(4*pi*Gc/(9*youngs_modulus*delta)), 1.0e-13_wp*s, &
+      & 'known value in plane stress')
     m = new_material(youngs_modulus, 0.25_wp, 1.0_wp, 1, .false., h, A, delta, .true.)
     s = critical_stretch_from_energy(m, Gc, 1, delta)
     call expect(error, 2*m%q*s**2*A*delta**3/6, Gc, 1.0e-13_wp*Gc, 'released energy in a bar')
@@ -199,7 +205,8 @@ contains
     m = new_material(youngs_modulus, 0.4_wp, 1.0_wp, 3, .false., h, A, delta, .false.)
     s = critical_stretch_from_energy(m, Gc, 3, delta)
     associate (mu => youngs_modulus/2.8_wp, kappa => youngs_modulus/0.6_wp)
-      call expect(error, s**2*delta*(3*mu + 81*(kappa - 5*mu/3)/256), Gc, 1.0e-13_wp*Gc, 'state-based, 3D')
+      call expect(error, s**2*delta*(3*mu + 81*(kappa - 5*mu/3)/256), Gc, 1.0e-13_wp*Gc, &
+        & 'state-based, 3D')
     end associate
   end subroutine test_critical_stretch
 

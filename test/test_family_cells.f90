@@ -19,7 +19,8 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('lattices: the same families as brute force', test_lattices), &
-      & new_unittest('random clouds of varying spacing: the same families as brute force', test_clouds), &
+      & new_unittest('random clouds of varying spacing: the same families as brute force', &
+      & test_clouds), &
       & new_unittest('whole families have the known numbers of members', test_counts), &
       & new_unittest('membership at the edge is free of rounding', test_edge), &
       & new_unittest('far-flung points cost no memory', test_far_flung), &
@@ -79,9 +80,11 @@ contains
       mine = .false.
       theirs = .false.
       do b = 1, bonds%n
-        call expect_true(error, .not. mine(sorted%point(bonds%j(b))), what//': a member stands twice')
+        call expect_true(error, .not. mine(sorted%point(bonds%j(b))), what &
+          & //': a member stands twice')
         mine(sorted%point(bonds%j(b))) = .true.
-        if (b > 1) call expect_true(error, bonds%j(b) > bonds%j(b - 1), what//': members are not in order')
+        if (b > 1) call expect_true(error, bonds%j(b) > bonds%j(b - 1), what &
+          & //': members are not in order')
       end do
       theirs(truth) = .true.
       call expect_true(error, all(mine .eqv. theirs), what//': another family than by brute force')
@@ -174,7 +177,8 @@ contains
             call lattice(count(:dim), spacings(i), shifts(s), body)
             call new_list_family(body, volume_rule_type(kind, 3*spacings(i)), family)
             call expect_true(error, family%n_bonds == expected, 'bonds of a shifted lattice')
-            call new_list_family(body, volume_rule_type(kind, 3*spacings(i)*(1 - 4*epsilon(1.0_wp))), family)
+            call new_list_family(body, volume_rule_type(kind, &
+              & 3*spacings(i)*(1 - 4*epsilon(1.0_wp))), family)
             call expect_true(error, family%n_bonds == expected, 'bonds of a horizon rounded down')
           end do
         end do
@@ -205,7 +209,8 @@ contains
 
     do n = 8, 40, 8
       call lattice([n, n, n], 0.1_wp, 0.0_wp, body)
-      call expect_true(error, pairs_per_point(body, 0.3015_wp) <= (3*2*3.015_wp + 3)**3, 'pairs looked at')
+      call expect_true(error, pairs_per_point(body, 0.3015_wp) <= (3*2*3.015_wp + 3)**3, &
+        & 'pairs looked at')
     end do
     call lattice([100000], 0.1_wp, 0.0_wp, body)
     call expect_true(error, pairs_per_point(body, 0.3015_wp) < 12.0_wp, 'pairs looked at in a bar')
@@ -267,7 +272,8 @@ contains
     call sort_into_cells(body%x, 3.015e-3_wp, cells)
     call count_neighbours(body%x, half_reach, cells, number)
     call expect_true(error, sum(int(number, i8)) == expected, 'bonds of a million points')
-    call expect_true(error, pairs_per_point(body, 3.015e-3_wp) <= (3*3.2_wp + 1)**3, 'pairs of a million points')
+    call expect_true(error, pairs_per_point(body, 3.015e-3_wp) <= (3*3.2_wp + 1)**3, &
+      & 'pairs of a million points')
   end subroutine test_million
 
 end module test_family_cells

@@ -53,8 +53,10 @@ contains
     type(volume_rule_type) :: rule
 
     rule = volume_rule_type(volume_linear_extended, 3.0_wp)
-    call expect(error, volume_correction(rule, [3.25_wp], 3.25_wp, 1.0_wp), 0.25_wp, 1.0e-15_wp, 'beyond delta')
-    call expect(error, volume_correction(rule, [3.5_wp], 3.5_wp, 1.0_wp), 0.0_wp, 1.0e-15_wp, 'at delta + r')
+    call expect(error, volume_correction(rule, [3.25_wp], 3.25_wp, 1.0_wp), 0.25_wp, 1.0e-15_wp, &
+      & 'beyond delta')
+    call expect(error, volume_correction(rule, [3.5_wp], 3.5_wp, 1.0_wp), 0.0_wp, 1.0e-15_wp, &
+      & 'at delta + r')
     call expect(error, reach(rule, 1.0_wp, 1), 3.5_wp, 1.0e-8_wp, 'reach')
     ! the linear rule is the true one in a bar
     call expect(error, volume_correction(rule, [2.9_wp], 2.9_wp, 1.0_wp), &
@@ -67,9 +69,11 @@ contains
     integer :: i
 
     call expect(error, covered_fraction([2.0_wp], 1.0_wp, 3.0_wp), 1.0_wp, 0.0_wp, 'inside')
-    call expect(error, covered_fraction([-3.2_wp], 1.0_wp, 3.0_wp), 0.3_wp, 1.0e-15_wp, 'across the edge')
+    call expect(error, covered_fraction([-3.2_wp], 1.0_wp, 3.0_wp), 0.3_wp, 1.0e-15_wp, &
+      & 'across the edge')
     call expect(error, covered_fraction([3.6_wp], 1.0_wp, 3.0_wp), 0.0_wp, 0.0_wp, 'outside')
-    call expect(error, covered_fraction([0.1_wp], 1.0_wp, 0.2_wp), 0.4_wp, 1.0e-15_wp, 'horizon inside the cell')
+    call expect(error, covered_fraction([0.1_wp], 1.0_wp, 0.2_wp), 0.4_wp, 1.0e-15_wp, &
+      & 'horizon inside the cell')
     total = 0.0_wp
     do i = -4, 4
       total = total + covered_fraction([real(i, wp)], 1.0_wp, 3.2_wp)
@@ -94,7 +98,8 @@ contains
         total = 0.0_wp
         do j = -n, n
           do i = -n, n
-            total = total + covered_fraction([real(i, wp), real(j, wp)] + offset(:2), 1.0_wp, ratios(r))
+            total = total + covered_fraction([real(i, wp), real(j, wp)] + offset(:2), 1.0_wp, &
+              & ratios(r))
           end do
         end do
         call expect(error, total, pi*ratios(r)**2, 1.0e-13_wp*total, 'disc')
@@ -102,7 +107,8 @@ contains
         do k = -n, n
           do j = -n, n
             do i = -n, n
-              total = total + covered_fraction([real(i, wp), real(j, wp), real(k, wp)] + offset, 1.0_wp, ratios(r))
+              total = total + covered_fraction([real(i, wp), real(j, wp), real(k, wp)] + offset, &
+                & 1.0_wp, ratios(r))
             end do
           end do
         end do
@@ -118,14 +124,17 @@ contains
     real(wp), parameter :: far = 1.0e3_wp
     real(wp) :: middle(3)
 
-    call expect(error, covered_fraction([0.5_wp, 0.5_wp], 1.0_wp, 0.8_wp), pi*0.64_wp/4, 1.0e-14_wp, 'quarter disc')
+    call expect(error, covered_fraction([0.5_wp, 0.5_wp], 1.0_wp, 0.8_wp), pi*0.64_wp/4, &
+      & 1.0e-14_wp, 'quarter disc')
     call expect(error, covered_fraction([0.5_wp, 0.5_wp, 0.5_wp], 1.0_wp, 0.8_wp), pi*0.512_wp/6, &
       & 1.0e-5_wp, 'eighth of a ball')
     middle = far/sqrt(3.0_wp)
     ! the edge is not quite plane: a cell's corner is up to 3/(8 far) off it
-    call expect(error, covered_fraction(middle, 1.0_wp, far), 0.5_wp, 4.0e-4_wp, 'plane through the middle')
+    call expect(error, covered_fraction(middle, 1.0_wp, far), 0.5_wp, 4.0e-4_wp, &
+      & 'plane through the middle')
     middle = [far + 0.25_wp, 0.0_wp, 0.0_wp]
-    call expect(error, covered_fraction(middle(:2), 1.0_wp, far), 0.25_wp, 1.0e-4_wp, 'straight, 2D')
+    call expect(error, covered_fraction(middle(:2), 1.0_wp, far), 0.25_wp, 1.0e-4_wp, &
+      & 'straight, 2D')
     call expect(error, covered_fraction(middle, 1.0_wp, far), 0.25_wp, 2.0e-4_wp, 'straight, 3D')
     ! a corner alone inside: the triangle below x + y = t has area t^2/2, with t = 0.4
     middle(:2) = far/sqrt(2.0_wp) + 0.5_wp - 0.2_wp
@@ -143,13 +152,17 @@ contains
     do i = 1, 200
       x = [noise(state), noise(state), noise(state)]*3.4_wp
       base = covered_fraction(x(:2), 1.0_wp, 3.0_wp)
-      call expect_true(error, base >= -1.0e-14_wp .and. base <= 1 + 1.0e-14_wp, 'a fraction is between 0 and 1')
+      call expect_true(error, base >= -1.0e-14_wp .and. base <= 1 + 1.0e-14_wp, &
+        & 'a fraction is between 0 and 1')
       call expect(error, covered_fraction(-x(:2), 1.0_wp, 3.0_wp), base, 0.0_wp, 'opposite, 2D')
-      call expect(error, covered_fraction([x(2), -x(1)], 1.0_wp, 3.0_wp), base, 1.0e-13_wp, 'turned, 2D')
+      call expect(error, covered_fraction([x(2), -x(1)], 1.0_wp, 3.0_wp), base, 1.0e-13_wp, &
+        & 'turned, 2D')
       base = covered_fraction(x, 1.0_wp, 3.0_wp)
       call expect(error, covered_fraction(-x, 1.0_wp, 3.0_wp), base, 0.0_wp, 'opposite, 3D')
-      call expect(error, covered_fraction([x(2), x(1), -x(3)], 1.0_wp, 3.0_wp), base, 1.0e-13_wp, 'turned, 3D')
-      call expect(error, covered_fraction(cshift(x, 1), 1.0_wp, 3.0_wp), base, 1.0e-4_wp, 'axes changed, 3D')
+      call expect(error, covered_fraction([x(2), x(1), -x(3)], 1.0_wp, 3.0_wp), base, &
+        & 1.0e-13_wp, 'turned, 3D')
+      call expect(error, covered_fraction(cshift(x, 1), 1.0_wp, 3.0_wp), base, 1.0e-4_wp, &
+        & 'axes changed, 3D')
     end do
   end subroutine test_symmetry
 
@@ -168,7 +181,8 @@ contains
           parts = parts + covered_fraction(x(:2) + 0.25_wp*[i, j], 0.5_wp, 2.5_wp)/4
         end do
       end do
-      call expect(error, covered_fraction(x(:2), 1.0_wp, 2.5_wp), parts, 1.0e-13_wp, 'four quarters')
+      call expect(error, covered_fraction(x(:2), 1.0_wp, 2.5_wp), parts, 1.0e-13_wp, &
+        & 'four quarters')
       parts = 0.0_wp
       do k = -1, 1, 2
         do j = -1, 1, 2

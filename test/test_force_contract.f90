@@ -13,7 +13,8 @@ module test_force_contract
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
-  use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, volume_linear_extended, &
+  use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
+    & volume_linear_extended, &
     & volume_exact
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
   use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
@@ -121,7 +122,8 @@ contains
       body%material = 1_i2
       if (subject%two_materials) where (body%x(:, 1) > 5.2_wp*spacing) body%material = 2_i2
       do i = 1, size(materials)
-        materials(i) = new_material(i*youngs_modulus, subject%poissons_ratio/i, 7850.0_wp, subject%dim, &
+        materials(i) = new_material(i*youngs_modulus, subject%poissons_ratio/i, 7850.0_wp, &
+          & subject%dim, &
           & subject%plane_strain, depth(2), depth(1), delta, subject%bond_based)
         materials(i)%expansion = 1.2e-5_wp*i
         if (subject%breaking) materials(i)%critical_stretch = 0.01_wp*i
@@ -131,7 +133,8 @@ contains
         allocate (keep(body%n_points), source=.true.)
         if (subject%dim > 1) then
           do i = 1, body%n_points
-            keep(i) = norm2(body%x(i, :) - (count(:subject%dim)/2 + 0.5_wp)*spacing) > 1.2_wp*spacing
+            keep(i) = norm2(body%x(i, &
+              & :) - (count(:subject%dim)/2 + 0.5_wp)*spacing) > 1.2_wp*spacing
           end do
         else
           keep(6) = .false.
@@ -244,7 +247,8 @@ contains
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
     allocate (strained(size(u, 1)), source=0_i1)
-    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, strained)
+    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
+      & strained)
     call force_pass(subject%family, subject%model, u, p, force, strained)
   end subroutine fast_force
 
@@ -252,7 +256,8 @@ contains
   pure function some_gradient(size_of_it) result(H)
     real(wp), intent(in) :: size_of_it
     real(wp) :: H(3, 3)
-    H = size_of_it*reshape([1.0_wp, 0.3_wp, -0.2_wp, 0.7_wp, -0.5_wp, 0.4_wp, 0.1_wp, 0.6_wp, 0.8_wp], [3, 3])
+    H = size_of_it*reshape([1.0_wp, 0.3_wp, -0.2_wp, 0.7_wp, -0.5_wp, 0.4_wp, 0.1_wp, 0.6_wp, &
+      & 0.8_wp], [3, 3])
   end function some_gradient
 
   !> Force, dilatation and energy by both ways. Each is a sum of some 100 terms, with different
@@ -274,7 +279,8 @@ contains
         if (.not. there) exit
         associate (n => subject%body%n_slots)
           if (allocated(u)) deallocate (u, f_ref, theta, w, w_ref, strained)
-          allocate (u(n, subject%dim), f_ref(n, subject%dim), theta(n), w(n), w_ref(n), source=0.0_wp)
+          allocate (u(n, subject%dim), f_ref(n, subject%dim), theta(n), w(n), w_ref(n), &
+            & source=0.0_wp)
           allocate (strained(n), source=0_i1)
         end associate
         call shake(subject%body, some_gradient(0.03_wp), 0.02_wp*spacing, 3 + number, u)
@@ -347,7 +353,8 @@ contains
   !> summed over the family. Forces at unit stretch come from a uniform expansion.
   subroutine test_rigid(error)
     type(error_type), allocatable, intent(out) :: error
-    real(wp), parameter :: degrees(*) = [1.0e-6_wp, 1.0_wp, 30.0_wp, 77.0_wp, 90.0_wp, 180.0_wp, 271.0_wp]
+    real(wp), parameter :: degrees(*) = [1.0e-6_wp, 1.0_wp, 30.0_wp, 77.0_wp, 90.0_wp, 180.0_wp, &
+      & 271.0_wp]
     real(wp), parameter :: far(3) = [1.0_wp, -0.5_wp, 0.25_wp]
     type(subject_type) :: subject
     real(wp), allocatable :: u(:, :), force(:, :), p(:)
@@ -374,7 +381,8 @@ contains
           if (subject%body%point(k) > 0) u(k, :) = far(:subject%dim)
         end do
         call fast_force(subject, u, force, p)
-        call expect(error, maxval(abs(force)), 0.0_wp, 0.0_wp, 'translation, '//name_of(subject, number))
+        call expect(error, maxval(abs(force)), 0.0_wp, 0.0_wp, 'translation, '//name_of(subject, &
+          & number))
         do a = 1, size(degrees)
           if (subject%dim == 1) exit
           axis = [0.0_wp, 0.0_wp, 1.0_wp]
@@ -382,7 +390,8 @@ contains
           R = rotation_matrix(axis, degrees(a)*pi/180)
           do k = 1, subject%body%n_slots
             if (subject%body%point(k) == 0) cycle
-            u(k, :) = matmul(R(:subject%dim, :subject%dim), subject%body%x(k, :)) - subject%body%x(k, :)
+            u(k, :) = matmul(R(:subject%dim, :subject%dim), subject%body%x(k, &
+              & :)) - subject%body%x(k, :)
           end do
           call fast_force(subject, u, force, p)
           call expect(error, maxval(abs(force)), 0.0_wp, 300*epsilon(1.0_wp)*unit_force, &
@@ -528,7 +537,8 @@ contains
           found = dot_product(force(k, :), real((xi + eta)/norm2(xi + eta), wp))/weight
           allowed = 8*epsilon(1.0_wp)*(abs(real(exact, wp)) + real(norm2(eta)/length, wp)) &
             & + epsilon(1.0_wp)*(norm2(u(k, :)) + norm2(u(j, :)))/real(length, wp)
-          call expect(error, found, real(exact, wp), allowed, 'stretch, '//trim(kinds(kind))//', size 1e'// &
+          call expect(error, found, real(exact, wp), allowed, 'stretch, '//trim(kinds(kind)) &
+            & //', size 1e'// &
             & text_of(real(exponent, wp))//', angle '//text_of(angles(a)))
         end do
       end do
@@ -552,9 +562,11 @@ contains
     call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
       & subject%family)
     zero = 0.0_wp
-    call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., depth(2), &
+    call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
+      & depth(2), &
       & depth(1), 2*spacing, subject%bond_based)], subject%projected, &
-      & spread(.false., 1, subject%body%n_slots), spread(0.0_wp, 1, subject%body%n_slots), subject%model)
+      & spread(.false., 1, subject%body%n_slots), spread(0.0_wp, 1, subject%body%n_slots), &
+      & subject%model)
   end subroutine two_points
 
   !> All points at one place, and some exactly on top of others: no NaN, no infinity, in fast loops
@@ -626,7 +638,8 @@ contains
         before = total_energy(subject, u)
         call force_pass(subject%family, subject%model, u, p, force, strained)
         call strained_slots(strained, slots)
-        call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, dissipated)
+        call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
+          & dissipated)
         call expect_true(error, broken > 0_i8, 'no bond broke, '//name_of(subject, 0))
         call expect_true(error, broken < subject%family%n_bonds/2, 'every bond broke')
         call expect(error, dissipated, before - total_energy(subject, u), 1.0e-12_wp*before, &
@@ -634,11 +647,13 @@ contains
         call expect(error, real(broken, wp), real(broken_by_definition(subject, u), wp), 0.0_wp, &
           & 'broken bonds, '//name_of(subject, 0))
         call damage_of(subject%body, subject%family, again)
-        call expect(error, maxval(abs(damage - again)), 0.0_wp, 0.0_wp, 'damage, '//name_of(subject, 0))
+        call expect(error, maxval(abs(damage - again)), 0.0_wp, 0.0_wp, 'damage, ' &
+          & //name_of(subject, 0))
         ! a second look at the same state finds nothing more
         call force_pass(subject%family, subject%model, u, p, force, strained)
         call strained_slots(strained, slots)
-        call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, dissipated)
+        call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
+          & dissipated)
         call expect(error, real(broken, wp), 0.0_wp, 0.0_wp, 'broken a second time')
         if (allocated(error)) return
       end do
@@ -693,8 +708,10 @@ contains
             p_first = p
           end if
           ! differences of equal bits are exactly zero
-          call expect(error, maxval(abs(force - first)), 0.0_wp, 0.0_wp, 'force, '//name_of(subject, threads(t)))
-          call expect(error, maxval(abs(p - p_first)), 0.0_wp, 0.0_wp, 'dilatation, '//name_of(subject, threads(t)))
+          call expect(error, maxval(abs(force - first)), 0.0_wp, 0.0_wp, 'force, ' &
+            & //name_of(subject, threads(t)))
+          call expect(error, maxval(abs(p - p_first)), 0.0_wp, 0.0_wp, 'dilatation, ' &
+            & //name_of(subject, threads(t)))
         end do
       end do
     end do
