@@ -20,7 +20,9 @@ program main
   use test_family_volume, only: collect_family_volume
   use test_force_contract, only: collect_force_contract
   use test_motion_conditions, only: collect_motion_conditions
+  use test_motion_explicit, only: collect_motion_explicit
   use test_motion_system, only: collect_motion_system
+  use test_motion_time_step, only: collect_motion_time_step
   use test_output_base64, only: collect_output_base64
   use test_output_files, only: collect_output_files
   use test_output_layout, only: collect_output_layout
@@ -55,7 +57,9 @@ program main
   call register('family_volume', collect_family_volume)
   call register('force_contract', collect_force_contract)
   call register('motion_conditions', collect_motion_conditions)
+  call register('motion_explicit', collect_motion_explicit)
   call register('motion_system', collect_motion_system)
+  call register('motion_time_step', collect_motion_time_step)
   call register('output_base64', collect_output_base64)
   call register('output_files', collect_output_files)
   call register('output_layout', collect_output_layout)
