@@ -21,6 +21,7 @@ program main
   use test_force_contract, only: collect_force_contract
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_explicit, only: collect_motion_explicit
+  use test_motion_relaxation, only: collect_motion_relaxation
   use test_motion_system, only: collect_motion_system
   use test_motion_time_step, only: collect_motion_time_step
   use test_output_base64, only: collect_output_base64
@@ -58,6 +59,7 @@ program main
   call register('force_contract', collect_force_contract)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_explicit', collect_motion_explicit)
+  call register('motion_relaxation', collect_motion_relaxation)
   call register('motion_system', collect_motion_system)
   call register('motion_time_step', collect_motion_time_step)
   call register('output_base64', collect_output_base64)
