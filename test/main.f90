@@ -18,6 +18,7 @@ program main
   use test_family_cracks, only: collect_family_cracks
   use test_family_surface, only: collect_family_surface
   use test_family_volume, only: collect_family_volume
+  use test_force_breaking, only: collect_force_breaking
   use test_force_contract, only: collect_force_contract
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_explicit, only: collect_motion_explicit
@@ -56,6 +57,7 @@ program main
   call register('family_cracks', collect_family_cracks)
   call register('family_surface', collect_family_surface)
   call register('family_volume', collect_family_volume)
+  call register('force_breaking', collect_force_breaking)
   call register('force_contract', collect_force_contract)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_explicit', collect_motion_explicit)
