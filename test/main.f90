@@ -11,7 +11,20 @@ program main
   use test_base_clock, only: collect_base_clock
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
+  use test_body_generate, only: collect_body_generate
+  use test_body_material, only: collect_body_material
   use test_command_line, only: collect_command_line
+  use test_family_cells, only: collect_family_cells
+  use test_family_cracks, only: collect_family_cracks
+  use test_family_surface, only: collect_family_surface
+  use test_family_volume, only: collect_family_volume
+  use test_force_breaking, only: collect_force_breaking
+  use test_force_contract, only: collect_force_contract
+  use test_motion_conditions, only: collect_motion_conditions
+  use test_motion_explicit, only: collect_motion_explicit
+  use test_motion_relaxation, only: collect_motion_relaxation
+  use test_motion_system, only: collect_motion_system
+  use test_motion_time_step, only: collect_motion_time_step
   use test_output_base64, only: collect_output_base64
   use test_output_files, only: collect_output_files
   use test_output_layout, only: collect_output_layout
@@ -37,7 +50,20 @@ program main
   call register('base_clock', collect_base_clock)
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)
+  call register('body_generate', collect_body_generate)
+  call register('body_material', collect_body_material)
   call register('command_line', collect_command_line)
+  call register('family_cells', collect_family_cells)
+  call register('family_cracks', collect_family_cracks)
+  call register('family_surface', collect_family_surface)
+  call register('family_volume', collect_family_volume)
+  call register('force_breaking', collect_force_breaking)
+  call register('force_contract', collect_force_contract)
+  call register('motion_conditions', collect_motion_conditions)
+  call register('motion_explicit', collect_motion_explicit)
+  call register('motion_relaxation', collect_motion_relaxation)
+  call register('motion_system', collect_motion_system)
+  call register('motion_time_step', collect_motion_time_step)
   call register('output_base64', collect_output_base64)
   call register('output_files', collect_output_files)
   call register('output_layout', collect_output_layout)

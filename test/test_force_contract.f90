@@ -1,0 +1,721 @@
+!> What every force loop must do, whatever the family it works on: agree with the theory written
+!> point by point, keep momentum, ignore rigid motions, be the gradient of the energy, and give the
+!> same bits on any number of threads. A new kind of family joins by one line in `build_family` and
+!> one in `kinds`.
+module test_force_contract
+  use, intrinsic :: iso_fortran_env, only: real128
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_kinds, only: wp, i1, i2, i4, i8
+  use pd_base_numbers, only: pi
+  use pd_body_body, only: body_type, allocate_points, keep_points
+  use pd_body_material, only: material_type, new_material
+  use pd_family_cracks, only: cut_bonds
+  use pd_family_family, only: family_type
+  use pd_family_list, only: list_family_type, new_list_family
+  use pd_family_surface, only: surface_factors
+  use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
+    & volume_linear_extended, &
+    & volume_exact
+  use pd_force_breaking, only: break_bonds, damage_of, strained_slots
+  use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
+  use pd_force_model, only: model_type, new_model
+  use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
+  use pd_scene_types, only: crack_group
+  use testdrive, only: error_type, new_unittest, unittest_type
+  use bodies, only: expect, expect_true, noise, rotation_matrix, shake, text_of, youngs_modulus
+  implicit none (type, external)
+  private
+  public :: collect_force_contract
+
+  !> The kinds of families that must keep the contract.
+  character(8), parameter :: kinds(*) = [character(8) :: 'list']
+
+  real(wp), parameter :: spacing = 1.0e-3_wp  !! of every body here [m]
+
+  !> One body under test, and which terms its force has.
+  type :: subject_type
+    character(8) :: kind = 'list'
+    integer :: dim = 1
+    real(wp) :: poissons_ratio = 0.2_wp
+    logical :: bond_based = .false.
+    logical :: plane_strain = .false.
+    logical :: projected = .true.
+    logical :: surface = .false.
+    logical :: thermal = .false.
+    logical :: two_materials = .false.
+    logical :: hole = .false.
+    logical :: crack = .false.
+    logical :: breaking = .false.
+    integer :: rule = volume_linear
+    type(body_type) :: body
+    class(family_type), allocatable :: family
+    type(model_type) :: model
+  end type subject_type
+
+contains
+
+  subroutine collect_force_contract(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('fast loops agree with the theory point by point', test_reference), &
+      & new_unittest('net force and moment vanish', test_balance), &
+      & new_unittest('rigid motions give no force', test_rigid), &
+      & new_unittest('the force is the gradient of the energy', test_gradient), &
+      & new_unittest('bonds keep no memory of the order of their ends', test_mirror), &
+      & new_unittest('stretch keeps its digits from 1e-16 to 10', test_stretch), &
+      & new_unittest('crushed bonds give finite forces', test_crushed), &
+      & new_unittest('breaking is the same from both ends', test_breaking), &
+      & new_unittest('the same bits on 1, 2 and 4 threads', test_threads)]
+  end subroutine collect_force_contract
+
+  !> The one place that knows the kinds of families.
+  subroutine build_family(kind, body, rule, family)
+    character(*), intent(in) :: kind
+    type(body_type), intent(inout) :: body
+    type(volume_rule_type), intent(in) :: rule
+    class(family_type), allocatable, intent(out) :: family
+    type(list_family_type) :: list
+
+    select case (kind)
+    case ('list')
+      call new_list_family(body, rule, list)
+      allocate (family, source=list)
+    end select
+  end subroutine build_family
+
+  !> Lay out body, family and model of a subject.
+  subroutine build(subject)
+    type(subject_type), intent(inout) :: subject
+    type(material_type), allocatable :: materials(:)
+    type(crack_group) :: crack
+    real(wp), allocatable :: temperature_change(:)
+    logical, allocatable :: keep(:)
+    integer :: count(3), i, j, k, n
+    integer(i8) :: cut
+    real(wp) :: delta
+
+    delta = 3.015_wp*spacing
+    count = 1
+    select case (subject%dim)
+    case (1); count(1) = 17
+    case (2); count(:2) = [11, 9]
+    case (3); count = [8, 7, 6]
+    end select
+    call allocate_points(subject%body, subject%dim, product(count))
+    associate (body => subject%body)
+      n = 0
+      do k = 1, count(3)
+        do j = 1, count(2)
+          do i = 1, count(1)
+            n = n + 1
+            body%x(n, 1) = (i - 0.5_wp)*spacing
+            if (subject%dim > 1) body%x(n, 2) = (j - 0.5_wp)*spacing
+            if (subject%dim > 2) body%x(n, 3) = (k - 0.5_wp)*spacing
+          end do
+        end do
+      end do
+      body%volume = spacing**subject%dim*depth(subject%dim)
+      body%spacing = spacing
+      body%body = 1_i2
+      body%grid = 1_i2
+      allocate (materials(merge(2, 1, subject%two_materials)))
+      body%material = 1_i2
+      if (subject%two_materials) where (body%x(:, 1) > 5.2_wp*spacing) body%material = 2_i2
+      do i = 1, size(materials)
+        materials(i) = new_material(i*youngs_modulus, subject%poissons_ratio/i, 7850.0_wp, &
+          & subject%dim, &
+          & subject%plane_strain, depth(2), depth(1), delta, subject%bond_based)
+        materials(i)%expansion = 1.2e-5_wp*i
+        if (subject%breaking) materials(i)%critical_stretch = 0.01_wp*i
+        if (subject%breaking) materials(i)%break_in_compression = .true.
+      end do
+      if (subject%hole) then
+        allocate (keep(body%n_points), source=.true.)
+        if (subject%dim > 1) then
+          do i = 1, body%n_points
+            keep(i) = norm2(body%x(i, &
+              & :) - (count(:subject%dim)/2 + 0.5_wp)*spacing) > 1.2_wp*spacing
+          end do
+        else
+          keep(6) = .false.
+        end if
+        call keep_points(body, keep)
+      end if
+      call build_family(subject%kind, body, volume_rule_type(subject%rule, delta), subject%family)
+      allocate (temperature_change(body%n_slots), source=0.0_wp)
+      if (subject%thermal) then
+        do i = 1, body%n_slots
+          temperature_change(i) = 100*sin(real(7*body%point(i), wp))
+        end do
+      end if
+      call new_model(body, materials, subject%projected, spread(.false., 1, body%n_slots), &
+        & temperature_change, subject%model)
+      subject%model%surface = subject%surface
+      if (subject%surface) call surface_factors(body, subject%family, materials, subject%model%D, &
+        & subject%model%S)
+      if (subject%crack .and. subject%dim == 2) then
+        crack%from(:2) = [-1.0_wp, 4.0_wp]*spacing
+        crack%to(:2) = [4.0_wp, 4.1_wp]*spacing
+        call cut_bonds([crack], body, subject%family, cut)
+      else if (subject%crack .and. subject%dim == 3) then
+        crack%centre = [0.0_wp, 3.1_wp, 3.0_wp]*spacing
+        crack%normal = [0.0_wp, 0.3_wp, 1.0_wp]
+        crack%radius = 3.0_wp*spacing
+        call cut_bonds([crack], body, subject%family, cut)
+      end if
+    end associate
+  end subroutine build
+
+  !> Thickness in 2D, area in 1D.
+  pure real(wp) function depth(dim)
+    integer, intent(in) :: dim
+    depth = 1.0_wp
+    if (dim == 2) depth = 2.0e-3_wp
+    if (dim == 1) depth = 3.0e-4_wp
+  end function depth
+
+  !> The subjects: every dimension with every term alone and with all of them. `number` counts on
+  !> until `there` is false.
+  subroutine subject_number(kind, number, subject, there)
+    character(*), intent(in) :: kind
+    integer, intent(in) :: number
+    type(subject_type), intent(out) :: subject
+    logical, intent(out) :: there
+    integer, parameter :: variants = 14
+
+    there = number <= 3*variants
+    if (.not. there) return
+    subject%kind = kind
+    subject%dim = 1 + (number - 1)/variants
+    select case (mod(number - 1, variants) + 1)
+    case (1); subject%bond_based = .true.
+    case (2); subject%projected = .false.
+    case (3); subject%surface = .true.
+    case (4); subject%thermal = .true.
+    case (5); subject%two_materials = .true.
+    case (6); subject%crack = .true.
+    case (7); subject%hole = .true.
+    case (8); subject%rule = volume_none
+    case (9); subject%rule = volume_linear_extended
+    case (10); subject%rule = volume_exact
+    case (11)
+      subject%bond_based = .true.
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+    case (12)
+      subject%poissons_ratio = 0.4_wp
+      subject%plane_strain = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+    case (13)
+      subject%projected = .false.
+      subject%poissons_ratio = 0.4_wp
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+      subject%breaking = .true.
+    case (14)
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+      subject%rule = volume_exact
+    end select
+    call build(subject)
+  end subroutine subject_number
+
+  !> What a subject is, for messages.
+  function name_of(subject, number) result(name)
+    type(subject_type), intent(in) :: subject
+    integer, intent(in) :: number
+    character(:), allocatable :: name
+    character(40) :: buffer
+    write (buffer, '(2a, i0, a, i0)') trim(subject%kind), ', ', subject%dim, 'D, subject ', number
+    name = trim(buffer)
+  end function name_of
+
+  !> Forces and dilatation coefficients by the fast loops.
+  subroutine fast_force(subject, u, force, p)
+    type(subject_type), intent(in) :: subject
+    real(wp), intent(in) :: u(:, :)
+    real(wp), allocatable, intent(out) :: force(:, :), p(:)
+    integer(i1), allocatable :: strained(:)
+
+    allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
+    allocate (strained(size(u, 1)), source=0_i1)
+    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
+      & strained)
+    call force_pass(subject%family, subject%model, u, p, force, strained)
+  end subroutine fast_force
+
+  !> A gradient with all components, also where the dimension has no use for them.
+  pure function some_gradient(size_of_it) result(H)
+    real(wp), intent(in) :: size_of_it
+    real(wp) :: H(3, 3)
+    H = size_of_it*reshape([1.0_wp, 0.3_wp, -0.2_wp, 0.7_wp, -0.5_wp, 0.4_wp, 0.1_wp, 0.6_wp, &
+      & 0.8_wp], [3, 3])
+  end function some_gradient
+
+  !> Force, dilatation and energy by both ways. Each is a sum of some 100 terms, with different
+  !> order and forms of the same formula: a few hundred rounding errors of its largest term.
+  subroutine test_reference(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), theta(:), w(:), w_ref(:)
+    integer(i1), allocatable :: strained(:)
+    real(wp) :: largest
+    integer :: kind, number
+    logical :: there
+
+    do kind = 1, size(kinds)
+      number = 0
+      do
+        number = number + 1
+        call subject_number(kinds(kind), number, subject, there)
+        if (.not. there) exit
+        associate (n => subject%body%n_slots)
+          if (allocated(u)) deallocate (u, f_ref, theta, w, w_ref, strained)
+          allocate (u(n, subject%dim), f_ref(n, subject%dim), theta(n), w(n), w_ref(n), &
+            & source=0.0_wp)
+          allocate (strained(n), source=0_i1)
+        end associate
+        call shake(subject%body, some_gradient(0.03_wp), 0.02_wp*spacing, 3 + number, u)
+        call fast_force(subject, u, force, p)
+        call reference_force(subject%family, subject%model, u, f_ref)
+        largest = maxval(abs(f_ref))
+        call expect_true(error, largest > 0.0_wp, 'no force: '//name_of(subject, number))
+        call expect(error, maxval(abs(force - f_ref)), 0.0_wp, 1.0e-12_wp*largest, &
+          & 'force, '//name_of(subject, number))
+        if (subject%model%dilatation) then
+          call reference_dilatation(subject%family, subject%model, u, theta)
+          theta = theta*subject%model%materials(subject%model%material)%p
+          call expect(error, maxval(abs(p - theta)), 0.0_wp, 1.0e-12_wp*maxval(abs(theta)), &
+            & 'dilatation, '//name_of(subject, number))
+        end if
+        call energy_pass(subject%family, subject%model, u, w, strained)
+        call reference_energy(subject%family, subject%model, u, w_ref)
+        call expect(error, maxval(abs(w - w_ref)), 0.0_wp, 1.0e-12_wp*maxval(abs(w_ref)), &
+          & 'energy, '//name_of(subject, number))
+        if (allocated(error)) return
+      end do
+      call expect_true(error, number > 40, 'too few subjects')
+    end do
+  end subroutine test_reference
+
+  !> sum V f = 0 and sum y x V f = 0: action and reaction are equal along the deformed bond. The sum
+  !> of |V f| over all points has an error of one rounding per term; 1e-13 of it leaves some hundred.
+  subroutine test_balance(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), p(:)
+    real(wp) :: net(3), moment(3), applied, y(3), f(3), arm
+    integer :: kind, number, k
+    logical :: there
+
+    do kind = 1, size(kinds)
+      number = 0
+      do
+        number = number + 1
+        call subject_number(kinds(kind), number, subject, there)
+        if (.not. there) exit
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, subject%dim))
+        call shake(subject%body, some_gradient(0.1_wp), 0.1_wp*spacing, 11 + number, u)
+        call fast_force(subject, u, force, p)
+        net = 0.0_wp
+        moment = 0.0_wp
+        applied = 0.0_wp
+        do k = 1, subject%body%n_slots
+          y = 0.0_wp
+          f = 0.0_wp
+          y(:subject%dim) = subject%body%x(k, :) + u(k, :)
+          f(:subject%dim) = force(k, :)*subject%body%volume(k)
+          net = net + f
+          moment = moment + [y(2)*f(3) - y(3)*f(2), y(3)*f(1) - y(1)*f(3), y(1)*f(2) - y(2)*f(1)]
+          applied = applied + sum(abs(f))
+        end do
+        arm = 20*spacing
+        call expect(error, maxval(abs(net)), 0.0_wp, 1.0e-13_wp*applied, &
+          & 'net force, '//name_of(subject, number))
+        call expect(error, maxval(abs(moment)), 0.0_wp, 1.0e-13_wp*applied*arm, &
+          & 'net moment, '//name_of(subject, number))
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_balance
+
+  !> A translation by many body lengths and rotations by any angle. Stretch comes from differences of
+  !> displacements, each rounded to eps |u|: the force may reach eps |u|/|xi| of that of a unit stretch,
+  !> summed over the family. Forces at unit stretch come from a uniform expansion.
+  subroutine test_rigid(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: degrees(*) = [1.0e-6_wp, 1.0_wp, 30.0_wp, 77.0_wp, 90.0_wp, 180.0_wp, &
+      & 271.0_wp]
+    real(wp), parameter :: far(3) = [1.0_wp, -0.5_wp, 0.25_wp]
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), p(:)
+    real(wp) :: R(3, 3), axis(3), unit_force
+    integer :: kind, number, a, k
+    logical :: there
+
+    do kind = 1, size(kinds)
+      number = 0
+      do
+        number = number + 1
+        call subject_number(kinds(kind), number, subject, there)
+        if (.not. there) exit
+        if (subject%thermal) cycle
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, subject%dim), source=0.0_wp)
+        do k = 1, subject%body%n_slots
+          u(k, :) = subject%body%x(k, :)*merge(1.0_wp, 0.0_wp, subject%body%point(k) > 0)
+        end do
+        call fast_force(subject, u, force, p)
+        unit_force = maxval(abs(force))
+        u = 0.0_wp
+        do k = 1, subject%body%n_slots
+          if (subject%body%point(k) > 0) u(k, :) = far(:subject%dim)
+        end do
+        call fast_force(subject, u, force, p)
+        call expect(error, maxval(abs(force)), 0.0_wp, 0.0_wp, 'translation, '//name_of(subject, &
+          & number))
+        do a = 1, size(degrees)
+          if (subject%dim == 1) exit
+          axis = [0.0_wp, 0.0_wp, 1.0_wp]
+          if (subject%dim == 3) axis = [2.0_wp, -3.0_wp, 6.0_wp]/7.0_wp
+          R = rotation_matrix(axis, degrees(a)*pi/180)
+          do k = 1, subject%body%n_slots
+            if (subject%body%point(k) == 0) cycle
+            u(k, :) = matmul(R(:subject%dim, :subject%dim), subject%body%x(k, &
+              & :)) - subject%body%x(k, :)
+          end do
+          call fast_force(subject, u, force, p)
+          call expect(error, maxval(abs(force)), 0.0_wp, 300*epsilon(1.0_wp)*unit_force, &
+            & 'rotation, '//name_of(subject, number)//', degrees '//text_of(degrees(a)))
+        end do
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_rigid
+
+  !> -dE/du = V f with Lambda = 1 (unprojected). Central differences of step h have an error of h^2
+  !> times the third derivative and eps/h times the energy: 1e-7 of the largest force at
+  !> h = 1e-5 spacings. Surface factors and several materials included, breaking not.
+  subroutine test_gradient(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), p(:)
+    real(wp) :: h, slope, largest
+    integer :: kind, dim, k, c, i
+    integer, parameter :: chosen(*) = [1, 3, 4, 8, 12, 15]
+
+    do kind = 1, size(kinds)
+      do dim = 1, 3
+        subject = subject_type(kind=kinds(kind), dim=dim, projected=.false., surface=.true., &
+          & thermal=.true., two_materials=.true., crack=.true., hole=.true., poissons_ratio=0.4_wp)
+        call build(subject)
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, dim))
+        call shake(subject%body, some_gradient(0.05_wp), 0.05_wp*spacing, 21, u)
+        call fast_force(subject, u, force, p)
+        largest = maxval(abs(force))*spacing**dim*depth(dim)
+        h = 1.0e-5_wp*spacing
+        do i = 1, size(chosen)
+          k = subject%body%slot(chosen(i))
+          do c = 1, dim
+            u(k, c) = u(k, c) + h
+            slope = total_energy(subject, u)
+            u(k, c) = u(k, c) - 2*h
+            slope = (slope - total_energy(subject, u))/(2*h)
+            u(k, c) = u(k, c) + h
+            call expect(error, subject%body%volume(k)*force(k, c), -slope, 1.0e-7_wp*largest, &
+              & 'gradient, '//name_of(subject, chosen(i)))
+          end do
+        end do
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_gradient
+
+  !> Strain energy of the whole body [J].
+  real(wp) function total_energy(subject, u) result(energy)
+    type(subject_type), intent(in) :: subject
+    real(wp), intent(in) :: u(:, :)
+    real(wp), allocatable :: density(:)
+    integer(i1), allocatable :: strained(:)
+
+    allocate (density(size(u, 1)), source=0.0_wp)
+    allocate (strained(size(u, 1)), source=0_i1)
+    call energy_pass(subject%family, subject%model, u, density, strained)
+    energy = sum(density*subject%body%volume)
+  end function total_energy
+
+  !> A body and its mirror image have mirrored forces: no direction is preferred. To rounding, since
+  !> sums run the other way round.
+  subroutine test_mirror(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), image(:, :), force(:, :), mirrored(:, :), p(:)
+    real(wp) :: middle(3)
+    integer :: kind, dim, i, k, c, j
+    integer, allocatable :: partner(:)
+
+    do kind = 1, size(kinds)
+      do dim = 1, 3
+        subject = subject_type(kind=kinds(kind), dim=dim, surface=.true.)
+        call build(subject)
+        associate (body => subject%body)
+          if (allocated(u)) deallocate (u, image, partner)
+          allocate (u(body%n_slots, dim), image(body%n_slots, dim), partner(body%n_slots))
+          middle = 0.0_wp
+          do c = 1, dim
+            middle(c) = sum(body%x(body%slot, c))/body%n_points
+          end do
+          partner = 0
+          do i = 1, body%n_points
+            do j = 1, body%n_points
+              if (norm2(body%x(body%slot(i), :) + body%x(body%slot(j), :) - 2*middle(:dim)) &
+                & < 0.1_wp*spacing) partner(body%slot(i)) = body%slot(j)
+            end do
+          end do
+          call shake(body, some_gradient(0.05_wp), 0.05_wp*spacing, 31, u)
+          image = 0.0_wp
+          do i = 1, body%n_points
+            k = body%slot(i)
+            image(partner(k), :) = -u(k, :)
+          end do
+          call fast_force(subject, u, force, p)
+          call fast_force(subject, image, mirrored, p)
+          do i = 1, body%n_points
+            k = body%slot(i)
+            call expect(error, maxval(abs(mirrored(partner(k), :) + force(k, :))), 0.0_wp, &
+              & 1.0e-12_wp*maxval(abs(force)), 'mirror image, '//name_of(subject, i))
+          end do
+        end associate
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_mirror
+
+  !> Two points in a plane: the force of their one bond is 2 q s v_c V, so it shows the stretch. The
+  !> truth is the definition in quadruple precision from the same displacements. Allowed is what the
+  !> conventions page says: 8 eps (|s| + |eta|/|xi|), and eps (|u_k| + |u_j|)/|xi| from forming eta.
+  subroutine test_stretch(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: angles(*) = [0.0_wp, 0.4_wp, 1.5707963267948966_wp, 2.5_wp, 3.1_wp]
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), p(:)
+    real(real128) :: xi(2), eta(2), length, exact
+    real(wp) :: found, allowed, weight, scale
+    integer :: kind, exponent, a, k, j
+    logical :: drifting
+
+    do kind = 1, size(kinds)
+      subject = subject_type(kind=kinds(kind), dim=2, bond_based=.true., rule=volume_none)
+      call two_points(subject)
+      k = subject%body%slot(1)
+      j = subject%body%slot(2)
+      allocate (u(subject%body%n_slots, 2))
+      weight = 2*subject%model%materials(1)%q*subject%body%volume(j)
+      xi = real(subject%body%x(j, :), real128) - real(subject%body%x(k, :), real128)
+      length = norm2(xi)
+      do exponent = -16, 1
+        do a = 1, size(angles)
+          drifting = mod(exponent + a, 2) == 0
+          u = 0.0_wp
+          scale = 10.0_wp**exponent*real(length, wp)
+          if (drifting) u(k, :) = 0.3_wp*scale*[0.2_wp, -0.9_wp]
+          u(j, :) = u(k, :) + scale*[cos(angles(a) + 0.7_wp), sin(angles(a) + 0.7_wp)]
+          call fast_force(subject, u, force, p)
+          eta = real(u(j, :), real128) - real(u(k, :), real128)
+          exact = (norm2(xi + eta) - length)/length
+          ! the force points along the deformed bond
+          found = dot_product(force(k, :), real((xi + eta)/norm2(xi + eta), wp))/weight
+          allowed = 8*epsilon(1.0_wp)*(abs(real(exact, wp)) + real(norm2(eta)/length, wp)) &
+            & + epsilon(1.0_wp)*(norm2(u(k, :)) + norm2(u(j, :)))/real(length, wp)
+          call expect(error, found, real(exact, wp), allowed, 'stretch, '//trim(kinds(kind)) &
+            & //', size 1e'// &
+            & text_of(real(exponent, wp))//', angle '//text_of(angles(a)))
+        end do
+      end do
+      deallocate (u)
+    end do
+  end subroutine test_stretch
+
+  !> Two points one spacing and a bit apart, aslant.
+  subroutine two_points(subject)
+    type(subject_type), intent(inout) :: subject
+    real(wp) :: zero(2)
+
+    call allocate_points(subject%body, 2, 2)
+    subject%body%x(1, :) = [0.5_wp, 0.5_wp]*spacing
+    subject%body%x(2, :) = [1.5_wp, 0.5_wp]*spacing
+    subject%body%volume = spacing**2*depth(2)
+    subject%body%spacing = spacing
+    subject%body%body = 1_i2
+    subject%body%material = 1_i2
+    subject%body%grid = 1_i2
+    call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
+      & subject%family)
+    zero = 0.0_wp
+    call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
+      & depth(2), &
+      & depth(1), 2*spacing, subject%bond_based)], subject%projected, &
+      & spread(.false., 1, subject%body%n_slots), spread(0.0_wp, 1, subject%body%n_slots), &
+      & subject%model)
+  end subroutine two_points
+
+  !> All points at one place, and some exactly on top of others: no NaN, no infinity, in fast loops
+  !> and reference, in force and energy. The checked build also traps what would make one.
+  subroutine test_crushed(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), w(:)
+    integer(i1), allocatable :: strained(:)
+    integer :: kind, dim, k, way
+
+    do kind = 1, size(kinds)
+      do dim = 1, 3
+        subject = subject_type(kind=kinds(kind), dim=dim, surface=.true.)
+        call build(subject)
+        associate (n => subject%body%n_slots)
+          if (allocated(u)) deallocate (u, f_ref, w, strained)
+          allocate (u(n, dim), f_ref(n, dim), w(n), source=0.0_wp)
+          allocate (strained(n), source=0_i1)
+        end associate
+        do way = 1, 2
+          u = 0.0_wp
+          do k = 1, subject%body%n_slots
+            if (subject%body%point(k) == 0) cycle
+            if (way == 1) u(k, :) = -subject%body%x(k, :)
+            ! pairs of neighbours meet in the middle between them
+            if (way == 2) u(k, 1) = merge(0.5_wp, -0.5_wp, &
+              & mod(nint(subject%body%x(k, 1)/spacing + 0.5_wp), 2) == 1)*spacing
+          end do
+          call fast_force(subject, u, force, p)
+          call reference_force(subject%family, subject%model, u, f_ref)
+          call energy_pass(subject%family, subject%model, u, w, strained)
+          call expect_true(error, all(abs(force) < 1.0e30_wp) .and. all(abs(p) < 1.0e30_wp), &
+            & 'force of crushed bonds, '//name_of(subject, way))
+          call expect_true(error, all(abs(f_ref) < 1.0e30_wp), 'reference of crushed bonds, ' &
+            & //name_of(subject, way))
+          call expect_true(error, all(abs(w) < 1.0e30_wp) .and. sum(w) > 0.0_wp, &
+            & 'energy of crushed bonds, '//name_of(subject, way))
+          if (way == 1) call expect(error, maxval(abs(force)), 0.0_wp, 0.0_wp, &
+            & 'bonds without direction pull nowhere, '//name_of(subject, way))
+        end do
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_crushed
+
+  !> Strained slots are found by the passes, and every broken bond is broken from both its ends: damage
+  !> weighted by family volumes balances, and the energy that is gone is what was dissipated.
+  subroutine test_breaking(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), p(:), force(:, :), damage(:), again(:)
+    integer(i1), allocatable :: strained(:)
+    integer(i4), allocatable :: slots(:)
+    integer(i8) :: broken
+    real(wp) :: before, dissipated
+    integer :: kind, dim
+
+    do kind = 1, size(kinds)
+      do dim = 1, 3
+        subject = subject_type(kind=kinds(kind), dim=dim, breaking=.true., two_materials=.true.)
+        call build(subject)
+        associate (n => subject%body%n_slots)
+          if (allocated(u)) deallocate (u, p, force, damage, again, strained)
+          allocate (u(n, dim), p(n), force(n, dim), damage(n), again(n), source=0.0_wp)
+          allocate (strained(n), source=0_i1)
+        end associate
+        call shake(subject%body, some_gradient(0.0_wp), 0.012_wp*spacing, 41, u)
+        before = total_energy(subject, u)
+        call force_pass(subject%family, subject%model, u, p, force, strained)
+        call strained_slots(strained, slots)
+        call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
+          & dissipated)
+        call expect_true(error, broken > 0_i8, 'no bond broke, '//name_of(subject, 0))
+        call expect_true(error, broken < subject%family%n_bonds/2, 'every bond broke')
+        call expect(error, dissipated, before - total_energy(subject, u), 1.0e-12_wp*before, &
+          & 'dissipated energy, '//name_of(subject, 0))
+        call expect(error, real(broken, wp), real(broken_by_definition(subject, u), wp), 0.0_wp, &
+          & 'broken bonds, '//name_of(subject, 0))
+        call damage_of(subject%body, subject%family, again)
+        call expect(error, maxval(abs(damage - again)), 0.0_wp, 0.0_wp, 'damage, ' &
+          & //name_of(subject, 0))
+        ! a second look at the same state finds nothing more
+        call force_pass(subject%family, subject%model, u, p, force, strained)
+        call strained_slots(strained, slots)
+        call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
+          & dissipated)
+        call expect(error, real(broken, wp), 0.0_wp, 0.0_wp, 'broken a second time')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_breaking
+
+  !> Pairs within the horizon whose stretch |y|/|xi| - 1 is beyond the smaller of the ends' limits,
+  !> counted over all pairs of points.
+  integer function broken_by_definition(subject, u) result(number)
+    type(subject_type), intent(in) :: subject
+    real(wp), intent(in) :: u(:, :)
+    real(wp) :: xi(subject%dim), length, stretch, limit
+    integer :: i, j, k, l
+
+    number = 0
+    do i = 1, subject%body%n_points
+      do j = i + 1, subject%body%n_points
+        k = subject%body%slot(i)
+        l = subject%body%slot(j)
+        xi = subject%body%x(l, :) - subject%body%x(k, :)
+        length = norm2(xi)
+        if (length > 3.015_wp*spacing) cycle
+        stretch = norm2(xi + u(l, :) - u(k, :))/length - 1
+        limit = 0.01_wp*min(subject%body%material(k), subject%body%material(l))
+        if (abs(stretch) > limit) number = number + 1
+      end do
+    end do
+  end function broken_by_definition
+
+  !> Every term on, bits compared.
+  subroutine test_threads(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), first(:, :), p(:), p_first(:)
+    integer, parameter :: threads(*) = [1, 2, 4]
+    integer :: kind, dim, t, before
+
+    before = omp_get_max_threads()
+    do kind = 1, size(kinds)
+      do dim = 1, 3
+        subject = subject_type(kind=kinds(kind), dim=dim, surface=.true., two_materials=.true., &
+          & thermal=.true., hole=.true.)
+        call build(subject)
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, dim))
+        call shake(subject%body, some_gradient(0.05_wp), 0.05_wp*spacing, 51, u)
+        do t = 1, size(threads)
+          call omp_set_num_threads(threads(t))
+          call fast_force(subject, u, force, p)
+          if (t == 1) then
+            first = force
+            p_first = p
+          end if
+          ! differences of equal bits are exactly zero
+          call expect(error, maxval(abs(force - first)), 0.0_wp, 0.0_wp, 'force, ' &
+            & //name_of(subject, threads(t)))
+          call expect(error, maxval(abs(p - p_first)), 0.0_wp, 0.0_wp, 'dilatation, ' &
+            & //name_of(subject, threads(t)))
+        end do
+      end do
+    end do
+    call omp_set_num_threads(before)
+  end subroutine test_threads
+
+end module test_force_contract
