@@ -113,8 +113,15 @@ def draw(figure, place, results, name, output, title, magnify, window=None, limi
         # More points than a picture can show only make it slow
         shown = slice(None, None, max(1, len(positions) // 60000))
         drawn = axis.scatter(*positions[shown].T, c=values[shown], s=4, linewidths=0, depthshade=False, **colours)
-        axis.set_box_aspect(np.maximum(np.ptp(positions, axis=0), 0.05 * np.ptp(positions, axis=0).max()))
-        axis.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        extent = np.ptp(positions, axis=0)
+        axis.set_box_aspect(np.maximum(extent, 0.05 * extent.max()), zoom=1.3)
+        # Labels of short sides would lie on top of one another
+        for side, length, ticks in zip("xyz", extent, (axis.xaxis, axis.yaxis, axis.zaxis)):
+            if length > 0.3 * extent.max():
+                ticks.set_label_text(f"{side} [m]")
+            else:
+                ticks.set_ticks([])
+                ticks.set_label_text(side)
         axis.tick_params(labelsize=6)
     else:
         axis = figure.add_subplot(*place)
