@@ -1,0 +1,270 @@
+"""Pictures of the results in a folder.
+
+    ./pf plot DIR [--field NAME ...] [--step N | all] [--magnify FACTOR] [--to FOLDER]
+
+writes a picture of every field (1D: a curve over x; 2D: coloured points; 3D: all points and a cut
+through the middle) and the curves of the history: energies with their balance, probes, reactions.
+DIR is the folder of the results or the .vtkhdf file.
+"""
+import argparse
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+from common import Results  # noqa: E402
+
+UNITS = {"displacement": "m", "velocity": "m/s", "force_density": "N/m$^3$", "energy_density": "J/m$^3$"}
+ENERGIES = ("kinetic_energy", "strain_energy", "dissipated_energy", "external_work")
+NOT_OF_PROBES = {"step", "time", "broken_bonds", "maximum_damage", "step_size", "residual", "load_step", *ENERGIES}
+
+
+def values_of(results, name, output=-1):
+    """Values (n) of a field, of a component of it ('displacement_x'), or a vector's magnitude; and a label."""
+    if name in results.fields:
+        values = results.field(name, output)
+        label = name.replace("_", " ")
+        if values.ndim == 2:
+            values, label = np.linalg.norm(values, axis=1), f"|{label}|"
+        base = name
+    elif len(name) > 2 and name[-2] == "_" and name[-1] in "xyz" and name[:-2] in results.fields:
+        base = name[:-2]
+        values = results.field(base, output)[:, "xyz".index(name[-1])]
+        label = f"{base.replace('_', ' ')} {name[-1]}"
+    else:
+        raise KeyError(f"{results.path.name} has no field '{name}'; it has {', '.join(results.fields)} "
+                       "(a vector's component: displacement_x)")
+    return values, label + (f" [{UNITS[base]}]" if base in UNITS else "")
+
+
+def dimension_of(points):
+    """1, 2 or 3: directions in which the points differ."""
+    extent = np.ptp(points, axis=0)
+    used = extent > 1e-9 * extent.max()
+    return 3 if used[2] else 2 if used[1] else 1
+
+
+def spacing_of(results, dim):
+    """A typical distance between neighbours: exact on a lattice that fills its box."""
+    sample = results.points[:: max(1, len(results.points) // 2000)]
+    best = np.inf
+    # Sorted along x, then y, neighbours of a lattice are next to one another
+    for axis in range(dim):
+        steps = np.diff(np.unique(np.round(results.points[:, axis], 12)))
+        steps = steps[steps > 1e-6 * np.ptp(results.points[:, axis])]
+        if len(steps):
+            best = min(best, np.median(steps))
+    extent = np.ptp(results.points, axis=0)[:dim]
+    mean = (np.prod(np.maximum(extent, best)) / len(results.points))**(1 / dim)
+    # In a cloud coordinates hardly repeat, and the steps between them say nothing
+    return best if best > 0.2 * mean and len(sample) > 1 else mean
+
+
+def colours_of(values):
+    """Colour map and limits: blue to red about zero if both signs matter, else light to dark."""
+    low, high = float(values.min()), float(values.max())
+    if low < -0.05 * high < 0:
+        bound = max(-low, high)
+        return {"cmap": "RdBu_r", "vmin": -bound, "vmax": bound}
+    return {"cmap": "viridis", "vmin": min(low, 0.0) if high > 0 else low, "vmax": high if high > low else low + 1}
+
+
+def positions_of(results, output, magnify):
+    """Positions moved by the displacement times a factor; reference positions without displacement."""
+    if magnify == 0.0 or "displacement" not in results.fields:
+        return results.points
+    return results.points + magnify * results.field("displacement", output)
+
+
+def draw_points(axis, positions, values, spacing, colours, size):
+    """Squares of a spacing's width in the plane; `size` (width, height) of the picture's axis in inches."""
+    low, high = positions.min(axis=0) - spacing / 2, positions.max(axis=0) + spacing / 2
+    inches = min(size[0] / (high[0] - low[0]), size[1] / (high[1] - low[1]))
+    side = max(72 * inches * spacing * 1.1, 0.8)
+    drawn = axis.scatter(positions[:, 0], positions[:, 1], c=values, s=side**2, marker="s", linewidths=0,
+                         rasterized=True, **colours)
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    return drawn
+
+
+def draw(figure, place, results, name, output, title, magnify, window=None, limits=None):
+    """One panel: a field at an output. `place`: rows, columns, number; `window`: x and y limits [m]."""
+    values, label = values_of(results, name, output)
+    dim = dimension_of(results.points)
+    positions = positions_of(results, output, magnify)
+    if dim == 1:
+        axis = figure.add_subplot(*place)
+        order = np.argsort(results.points[:, 0])
+        axis.plot(results.points[order, 0], values[order], linewidth=1)
+        axis.set(xlabel="x [m]", ylabel=label, title=title)
+        axis.grid(alpha=0.3)
+        return
+    spacing = spacing_of(results, dim)
+    width, height = figure.get_size_inches() / np.array([place[1], place[0]])
+    colours = colours_of(values)
+    if limits:
+        colours.update(vmin=limits[0], vmax=limits[1])
+    if dim == 3:
+        axis = figure.add_subplot(*place, projection="3d")
+        # More points than a picture can show only make it slow
+        shown = slice(None, None, max(1, len(positions) // 60000))
+        drawn = axis.scatter(*positions[shown].T, c=values[shown], s=4, linewidths=0, depthshade=False, **colours)
+        extent = np.ptp(positions, axis=0)
+        axis.set_box_aspect(np.maximum(extent, 0.05 * extent.max()), zoom=1.3)
+        # Labels of short sides would lie on top of one another
+        for side, length, ticks in zip("xyz", extent, (axis.xaxis, axis.yaxis, axis.zaxis)):
+            if length > 0.3 * extent.max():
+                ticks.set_label_text(f"{side} [m]")
+            else:
+                ticks.set_ticks([])
+                ticks.set_label_text(side)
+        axis.tick_params(labelsize=6)
+    else:
+        axis = figure.add_subplot(*place)
+        if window:
+            inside = np.all([(positions[:, c] >= window[c][0]) & (positions[:, c] <= window[c][1]) for c in (0, 1)],
+                            axis=0)
+            positions, values = positions[inside], values[inside]
+        drawn = draw_points(axis, positions, values, spacing, colours, (0.7 * width, 0.75 * height))
+        axis.set(xlabel="x [m]", ylabel="y [m]")
+        axis.ticklabel_format(scilimits=(-2, 3))
+    axis.set_title(title, fontsize=10)
+    figure.colorbar(drawn, ax=axis, shrink=0.75 if dim == 2 else 0.5, label=label)
+
+
+def figure_of_fields(items, path, columns=1, magnify=0.0, panel=(5.0, 3.6), window=None, limits=None, dpi=80):
+    """One picture of several panels, each (results, field, title) or (results, field, title, output)."""
+    rows = -(-len(items) // columns)
+    figure = plt.figure(figsize=(panel[0] * columns, panel[1] * rows))
+    for number, (results, name, title, *output) in enumerate(items, 1):
+        draw(figure, (rows, columns, number), results, name, output[0] if output else -1, title, magnify, window,
+             limits)
+    save(figure, path, dpi)
+
+
+def save(figure, path, dpi=90):
+    """Write a picture and say so."""
+    figure.tight_layout()
+    figure.savefig(path, dpi=dpi)
+    plt.close(figure)
+    print(f"  wrote {path}")
+
+
+def field_picture(results, name, output, magnify, path):
+    """The picture of one field at one output."""
+    dim = dimension_of(results.points)
+    title = f"{results.path.stem}, t = {results.times[output]:.6g} s"
+    if dim == 1:
+        figure_of_fields([(results, name, title, output)], path, panel=(7.0, 3.6))
+        return
+    extent = np.ptp(results.points, axis=0)
+    if dim == 2:
+        height = np.clip(5.5 * extent[1] / extent[0], 2.5, 9.0)
+        figure_of_fields([(results, name, title, output)], path, magnify=magnify, panel=(7.5, height + 1.0))
+        return
+    figure = plt.figure(figsize=(11, 4.5))
+    draw(figure, (1, 2, 1), results, name, output, title, magnify)
+    cut, values, plane, label = middle_cut(results, name, output)
+    axis = figure.add_subplot(1, 2, 2)
+    drawn = draw_points(axis, cut, values, spacing_of(results, 3), colours_of(values), (3.5, 3.2))
+    axis.set(xlabel=f"{plane[0]} [m]", ylabel=f"{plane[1]} [m]")
+    axis.set_title(f"the layer next to the middle of {plane[2]}", fontsize=10)
+    figure.colorbar(drawn, ax=axis, shrink=0.6, label=label)
+    save(figure, path)
+
+
+def middle_cut(results, name, output):
+    """Points and values of the layer next to the middle of the thinnest direction, and the names of the axes."""
+    values, label = values_of(results, name, output)
+    extent = np.ptp(results.points, axis=0)
+    thin = 2 if extent[2] <= extent[1] else int(np.argmin(extent))
+    across = results.points[:, thin]
+    middle = 0.5 * (across.min() + across.max())
+    near = np.abs(across - middle)
+    layer = near <= near.min() + 0.25 * spacing_of(results, 3)
+    kept = [c for c in range(3) if c != thin]
+    return results.points[layer][:, kept], values[layer], ["xyz"[c] for c in (*kept, thin)], label
+
+
+def history_pictures(results, folder):
+    """Energies with their balance, one picture for probes and one for reactions."""
+    h = results.history
+    # In relaxation time stands still while the body comes to rest
+    if "residual" in h:
+        across, label = h["step"], "iteration"
+    else:
+        across, label = h["time"], "time [s]"
+    figure, axes = plt.subplots(2, 1, figsize=(7.5, 6), sharex=True, height_ratios=(3, 1))
+    for name in ENERGIES:
+        axes[0].plot(across, h[name], label=name.replace("_", " "))
+    axes[0].set(ylabel="energy [J]")
+    axes[0].legend(fontsize=8)
+    if "residual" in h:
+        positive = h["residual"] > 0
+        axes[1].semilogy(across[positive], h["residual"][positive])
+        axes[1].set(xlabel=label, ylabel="residual")
+    else:
+        stored = h["kinetic_energy"] + h["strain_energy"] + h["dissipated_energy"]
+        axes[1].plot(across, stored - stored[0] - h["external_work"] + h["external_work"][0])
+        axes[1].set(xlabel=label, ylabel="balance [J]")
+    for axis in axes:
+        axis.grid(alpha=0.3)
+    save(figure, folder / "energies.png")
+
+    reactions = [name for name in h if "_reaction_" in name]
+    probes = [name for name in h if name not in NOT_OF_PROBES and name not in reactions]
+    units = {}
+    for name in probes:
+        units.setdefault(results.units.get(name, ""), []).append(name)
+    groups = [("reactions", [("N", reactions)])] if reactions else []
+    if probes:
+        groups.append(("probes", list(units.items())))
+    for title, panels in groups:
+        figure, axes = plt.subplots(len(panels), 1, figsize=(7.5, 2.8 * len(panels) + 0.6), sharex=True, squeeze=False)
+        for axis, (unit, names) in zip(axes[:, 0], panels):
+            for name in names:
+                axis.plot(across, h[name], linewidth=1, label=name.replace("_", " "))
+            axis.set(ylabel=f"[{unit}]")
+            axis.grid(alpha=0.3)
+            axis.legend(fontsize=8)
+        axes[-1, 0].set(xlabel=label)
+        save(figure, folder / f"{title}.png")
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="./pf plot", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", metavar="DIR", type=Path)
+    parser.add_argument("--field", action="append", metavar="NAME",
+                        help="only this field, or component as displacement_x (may be repeated)")
+    parser.add_argument("--step", default="-1", metavar="N", help="output number from 0, or 'all' (default: the last)")
+    parser.add_argument("--magnify", type=float, default=0.0, metavar="FACTOR",
+                        help="draw points moved by so many times their displacement (default 0)")
+    parser.add_argument("--to", type=Path, metavar="FOLDER", help="where the pictures go (default: DIR)")
+    options = parser.parse_args()
+    try:
+        results = Results(options.folder)
+        if options.step == "all":
+            outputs = range(results.outputs)
+        else:
+            outputs = [range(results.outputs)[int(options.step)]]
+        folder = options.to or results.path.parent
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in options.field or results.fields:
+            for output in outputs:
+                field_picture(results, name, output, options.magnify, folder / f"{name}_{output:04d}.png")
+        if not options.field:
+            history_pictures(results, folder)
+    except (OSError, KeyError) as fault:
+        sys.exit(f"error: {fault.args[-1] if isinstance(fault, KeyError) else fault}")
+    except (ValueError, IndexError):
+        sys.exit(f"error: --step {options.step} is no output's number: this file has "
+                 f"{results.outputs} outputs, numbered from 0")
+
+
+if __name__ == "__main__":
+    main()
