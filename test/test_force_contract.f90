@@ -6,11 +6,13 @@ module test_force_contract
   use, intrinsic :: iso_fortran_env, only: real128
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i2, i4, i8
+  use pd_base_error, only: fault_type => error_type
   use pd_base_numbers, only: pi
-  use pd_body_body, only: body_type, allocate_points, keep_points
+  use pd_body_body, only: body_type, grid_type, allocate_points, keep_points
   use pd_body_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
   use pd_family_family, only: family_type
+  use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
@@ -19,6 +21,7 @@ module test_force_contract
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
   use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
   use pd_force_model, only: model_type, new_model
+  use pd_force_weights, only: build_weights
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use pd_scene_types, only: crack_group
   use testdrive, only: error_type, new_unittest, unittest_type
@@ -28,7 +31,7 @@ module test_force_contract
   public :: collect_force_contract
 
   !> The kinds of families that must keep the contract.
-  character(8), parameter :: kinds(*) = [character(8) :: 'list']
+  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'lattice']
 
   real(wp), parameter :: spacing = 1.0e-3_wp  !! of every body here [m]
 
@@ -75,11 +78,16 @@ contains
     type(volume_rule_type), intent(in) :: rule
     class(family_type), allocatable, intent(out) :: family
     type(list_family_type) :: list
+    type(lattice_family_type) :: lattice
+    type(fault_type), allocatable :: fault
 
     select case (kind)
     case ('list')
       call new_list_family(body, rule, list)
       allocate (family, source=list)
+    case ('lattice')
+      call new_lattice_family(body, rule, .true., lattice, fault)
+      if (.not. allocated(fault)) allocate (family, source=lattice)
     end select
   end subroutine build_family
 
@@ -118,6 +126,7 @@ contains
       body%spacing = spacing
       body%body = 1_i2
       body%grid = 1_i2
+      body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
       allocate (materials(merge(2, 1, subject%two_materials)))
       body%material = 1_i2
       if (subject%two_materials) where (body%x(:, 1) > 5.2_wp*spacing) body%material = 2_i2
@@ -153,6 +162,10 @@ contains
       subject%model%surface = subject%surface
       if (subject%surface) call surface_factors(body, subject%family, materials, subject%model%D, &
         & subject%model%S)
+      select type (family => subject%family)
+      type is (lattice_family_type)
+        call build_weights(family, subject%model)
+      end select
       if (subject%crack .and. subject%dim == 2) then
         crack%from(:2) = [-1.0_wp, 4.0_wp]*spacing
         crack%to(:2) = [4.0_wp, 4.1_wp]*spacing
@@ -240,7 +253,7 @@ contains
 
   !> Forces and dilatation coefficients by the fast loops.
   subroutine fast_force(subject, u, force, p)
-    type(subject_type), intent(in) :: subject
+    type(subject_type), intent(inout) :: subject
     real(wp), intent(in) :: u(:, :)
     real(wp), allocatable, intent(out) :: force(:, :), p(:)
     integer(i1), allocatable :: strained(:)
@@ -636,6 +649,8 @@ contains
         end associate
         call shake(subject%body, some_gradient(0.0_wp), 0.012_wp*spacing, 41, u)
         before = total_energy(subject, u)
+        if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
+          & strained)
         call force_pass(subject%family, subject%model, u, p, force, strained)
         call strained_slots(strained, slots)
         call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
@@ -650,6 +665,8 @@ contains
         call expect(error, maxval(abs(damage - again)), 0.0_wp, 0.0_wp, 'damage, ' &
           & //name_of(subject, 0))
         ! a second look at the same state finds nothing more
+        if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
+          & strained)
         call force_pass(subject%family, subject%model, u, p, force, strained)
         call strained_slots(strained, slots)
         call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &

@@ -19,8 +19,9 @@ module pd_force_lattice
   real(wp), parameter :: h0 = 0.5_wp, h1 = -0.375_wp, h2 = 0.31250000000037114_wp, &
     & h3 = -0.27343750000352559_wp, h4 = 0.24609373329889834_wp, h5 = -0.22558592163388049_wp, &
     & h6 = 0.20958398402647260_wp, h7 = -0.19648637700069084_wp
-  !> Lets the force of a bond crushed to a point vanish instead of being NaN.
-  real(wp), parameter :: crushed = 1.0e-30_wp
+  !> Squared length, over the undeformed one, below which a bond is crushed to a point and has no
+  !> direction but that of rounding: it pulls nowhere, rather than anywhere or NaN.
+  real(wp), parameter :: crushed = 1.0e-24_wp
 
   !> Switches of the general formulas.
   type :: terms_type
@@ -328,7 +329,7 @@ contains
     j = first + family%shift(offset)
     x = 0.0_wp
     e = 0.0_wp
-    y = crushed
+    y = 0.0_wp
     associate (g => family%geometry(:, offset))
       do c = 1, family%dim
         eta = u(j:j + lanes - 1, c) - u(first:first + lanes - 1, c)
@@ -339,8 +340,8 @@ contains
       end do
       e = 2*x + g(4)*e
     end associate
-    r = 1/sqrt(y)
-    s = e/(1 + y*r)
+    s = e/(1 + sqrt(y))
+    r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
     lambda = (1 + x)*r
     if (.not. terms%projected) lambda = 1.0_wp
     if (terms%thermal) s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
