@@ -5,7 +5,7 @@ module pd_driver
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_clock, only: duration_text, output_is_terminal, phase_timer_type, wall_time
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text, with_unit
   use pd_base_version, only: program_version
   use pd_scene_types, only: scene_type, is_set, material_group
@@ -211,7 +211,16 @@ contains
     character(:), allocatable :: reason
     logical :: suits
 
-    call lattice_suits(system%body, suits, reason)
+    if (scene%horizon%family == 'list') then
+      suits = .false.
+      reason = 'asked for'
+    else
+      call lattice_suits(system%body, rule, suits, reason)
+    end if
+    if (scene%horizon%family == 'lattice' .and. .not. suits) then
+      call fail(error, 'the scene cannot have lattice families, which &horizon family asks for: '//reason)
+      return
+    end if
     if (suits) then
       allocate (lattice)
       call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), lattice, &

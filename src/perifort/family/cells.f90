@@ -1,9 +1,10 @@
 !> Linked cells (7.11): the points within a distance of each point, in time linear in their number.
 module pd_family_cells
-  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_kinds, only: wp, i2, i4, i8
   implicit none (type, external)
   private
-  public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, brute_force_neighbours
+  public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, joins_labels, &
+    & brute_force_neighbours
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
   type :: cells_type
@@ -107,6 +108,29 @@ contains
       call sort(neighbour(start(k):start(k + 1) - 1))
     end do
   end subroutine collect_neighbours
+
+  !> Whether two points with different labels are neighbours.
+  logical function joins_labels(x, half_reach, cells, label) result(joins)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    type(cells_type), intent(in) :: cells
+    integer(i2), intent(in) :: label(:)
+    integer(i4), allocatable :: found(:)
+    integer(i4) :: number
+    integer :: k
+
+    joins = .false.
+    !$omp parallel default(none) shared(x, half_reach, cells, label) private(found, number, k) &
+    !$omp reduction(.or.:joins)
+    allocate (found(size(x, 1)))
+    !$omp do schedule(dynamic, 512)
+    do k = 1, size(x, 1)
+      if (joins) cycle
+      call visit(x, half_reach, cells, k, number, found, .true.)
+      if (any(label(found(:number)) /= label(k))) joins = .true.
+    end do
+    !$omp end parallel
+  end function joins_labels
 
   !> Look through the cells around point `k`; count its neighbours and, if asked, collect them.
   pure subroutine visit(x, half_reach, cells, k, number, found, collect)

@@ -1,8 +1,10 @@
-!> Lattice families: points on one uniform grid share a table of offsets, and a family is that table.
+!> Lattice families: points on a uniform grid share a table of offsets, and a family is that table.
 !>
 !> Slots are the cells of a padded box, x fastest, so that the family member at offset o of slot k is
 !> slot k + shift(o), for every k and without a test. Padding and cells that hold no point are dead
 !> slots. Nothing is stored per bond but a bit where bonds can break.
+!>
+!> Bodies on grids of their own, which no bond joins, lie in boxes of their own, one after another.
 !>
 !> The force loops work on blocks of `lanes` slots of one row. Blocks whose surroundings look the
 !> same (and most do) share one table of weights with the surface factors in it.
@@ -12,11 +14,13 @@ module pd_family_lattice
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
   use pd_body_body, only: body_type, arrange
+  use pd_family_cells, only: cells_type, sort_into_cells, joins_labels
   use pd_family_family, only: family_type, bonds_type
   use pd_family_volume, only: volume_rule_type, volume_correction, reach
   implicit none (type, external)
   private
-  public :: lattice_family_type, weights_type, new_lattice_family, lattice_suits, lanes, word_bits
+  public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, grid_at, &
+    & lanes, word_bits
 
   integer, parameter :: lanes = 8        !! slots of a block: one 512-bit register of reals
   integer, parameter :: word_bits = 64   !! bonds in one word of bits
@@ -33,18 +37,25 @@ module pd_family_lattice
     real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (lanes, n)
   end type weights_type
 
-  type, extends(family_type) :: lattice_family_type
-    real(wp) :: spacing = 0.0_wp
-    integer :: stride(3) = 0                   !! from one cell to the next along x, y, z [slots]
-    integer :: n_offsets = 0
-    integer :: words = 0                       !! words of bits of one slot
+  !> One grid: its box of slots and its table of offsets.
+  type :: offsets_type
+    integer :: n = 0                           !! offsets
     integer :: reach_cells = 0                 !! farthest offset along an axis
-    integer(i8), allocatable :: shift(:)       !! (n_offsets) [slots]
-    real(wp), allocatable :: xi(:, :)          !! bond vectors (n_offsets, dim) [m]
+    integer :: stride(3) = 0                   !! from one cell to the next along x, y, z [slots]
+    integer(i8) :: first = 0_i8                !! first slot of the box
+    integer(i8) :: last = 0_i8                 !! its last slot
+    real(wp) :: spacing = 0.0_wp               !! [m]
+    real(wp) :: cell_volume = 0.0_wp           !! of every point [m3]
+    integer(i8), allocatable :: shift(:)       !! from a slot to the member (n) [slots]
+    real(wp), allocatable :: xi(:, :)          !! bond vectors (n, dim) [m]
     real(wp), allocatable :: length(:)         !! |xi| [m]
     real(wp), allocatable :: fraction(:)       !! v_c
-    real(wp), allocatable :: geometry(:, :)    !! xi/|xi|^2 (rows 1:3) and 1/|xi|^2 (4, n_offsets)
-    real(wp) :: cell_volume = 0.0_wp           !! of every point [m3]
+    real(wp), allocatable :: geometry(:, :)    !! xi/|xi|^2 (rows 1:3) and 1/|xi|^2 (4, n)
+  end type offsets_type
+
+  type, extends(family_type) :: lattice_family_type
+    type(offsets_type), allocatable :: grids(:)
+    integer :: words = 0                       !! words of bits of one slot
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
     integer(i8), allocatable :: broken(:, :)   !! 1-bits are broken bonds (n_slots, words), if any can
@@ -62,142 +73,189 @@ module pd_family_lattice
 
 contains
 
-  !> Whether a lattice family can serve a body in point order: all points on one grid that they fill
-  !> reasonably. Otherwise `reason` says why not.
-  subroutine lattice_suits(body, suits, reason)
+  !> Whether lattice families can serve a body in point order: every point on a grid, grids that no
+  !> bond joins, and grids filled reasonably. Otherwise `reason` says why not.
+  subroutine lattice_suits(body, rule, suits, reason)
     type(body_type), intent(in) :: body
+    type(volume_rule_type), intent(in) :: rule
     logical, intent(out) :: suits
     character(:), allocatable, intent(out) :: reason
-    integer :: cells(3)
+    type(cells_type) :: cells
+    real(wp), allocatable :: half_reach(:)
+    real(wp) :: room
+    integer :: g, k
 
     suits = .false.
     reason = ''
     if (any(body%grid == 0)) then
       reason = 'some points are a cloud'
-    else if (any(body%grid /= body%grid(1))) then
-      reason = 'the bodies lie on different grids'
-    else
-      cells = extent(body)
-      suits = body%n_points >= least_filled*product(real(cells, wp))
-      if (.not. suits) reason = 'the points fill too little of their grid'
+      return
     end if
+    if (any(body%grid /= body%grid(1))) then
+      allocate (half_reach(body%n_points))
+      do k = 1, body%n_points
+        half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
+      end do
+      call sort_into_cells(body%x, 2*maxval(half_reach), cells)
+      if (joins_labels(body%x, half_reach, cells, body%grid)) then
+        reason = 'bonds join bodies on different grids'
+        return
+      end if
+    end if
+    room = 0.0_wp
+    do g = 1, size(body%grids)
+      if (any(body%grid == g)) room = room + product(real(extent(body, g), wp))
+    end do
+    suits = body%n_points >= least_filled*room
+    if (.not. suits) reason = 'the points fill too little of their grid'
   end subroutine lattice_suits
 
-  !> Cells along each axis of the box around all points, 1 for axes that are not used.
-  pure function extent(body) result(cells)
+  !> Cells along each axis of the box around the points of grid `g`, 1 for axes that are not used.
+  pure function extent(body, g) result(cells)
     type(body_type), intent(in) :: body
+    integer, intent(in) :: g
     integer :: cells(3), c
 
     cells = 1
     do c = 1, body%dim
-      cells(c) = nint((maxval(body%x(:, c)) - minval(body%x(:, c)))/body%spacing(1)) + 1
+      cells(c) = nint((maxval(body%x(:, c), mask=body%grid == g) - minval(body%x(:, c), &
+        & mask=body%grid == g))/body%grids(g)%spacing) + 1
     end do
   end function extent
 
-  !> Families of a body whose points all lie on one grid; the body is arranged in slots.
-  !> `breakable`: bonds may break or be cut, so each gets a bit.
+  !> Families of a body that `lattice_suits`; the body is arranged in slots. `breakable`: bonds may
+  !> break or be cut, so each gets a bit.
   subroutine new_lattice_family(body, rule, breakable, family, error)
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
     logical, intent(in) :: breakable
     type(lattice_family_type), intent(out) :: family
     type(error_type), allocatable, intent(out) :: error
+    integer :: g
 
     family%dim = body%dim
     family%rule = rule
-    family%spacing = body%spacing(1)
-    family%cell_volume = body%volume(1)
-    call make_offsets(family)
-    call lay_out(body, family, error)
+    allocate (family%grids(0))
+    do g = 1, size(body%grids)
+      if (any(body%grid == g)) call add_grid(body, g, family)
+    end do
+    family%most_bonds = maxval(family%grids%n)
+    family%words = (family%most_bonds + word_bits - 1)/word_bits
+    call place_points(body, family, error)
     if (allocated(error)) return
     call classify(body, family)
     call find_blocks(family)
     if (breakable) call family%allow_breaking()
   end subroutine new_lattice_family
 
-  !> The table of offsets, ascending in slots once `stride` is known.
-  subroutine make_offsets(family)
+  !> The table of offsets and the padded box of grid `g` of the body, behind the boxes that are there.
+  !> The padding at the end of one row serves the beginning of the next as well, and so for planes.
+  !> Rows are a multiple of `lanes` long, so that all of them are cut into blocks alike.
+  subroutine add_grid(body, g, family)
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: g
     type(lattice_family_type), intent(inout) :: family
-    real(wp) :: xi(3), farthest, vc
-    integer :: i, j, k, m, n, pass, high(3)
+    type(offsets_type) :: grid
+    integer :: cells(3), k, c, o
+    integer(i8) :: margin
 
-    farthest = reach(family%rule, family%spacing, family%dim)
-    m = floor(farthest/family%spacing)
-    family%reach_cells = m
+    k = findloc(body%grid == g, .true., dim=1)
+    grid%spacing = body%spacing(k)
+    grid%cell_volume = body%volume(k)
+    call make_offsets(family%rule, body%dim, grid)
+    associate (m => grid%reach_cells)
+      cells = extent(body, g)
+      grid%stride = [1, whole_blocks(cells(1) + m), 0]
+      grid%stride(3) = grid%stride(2)*(cells(2) + m)
+      if (body%dim < 3) grid%stride(3) = 0
+      if (body%dim < 2) grid%stride(2) = 0
+      margin = whole_blocks(int(min(m*sum(int(grid%stride, i8)), int(most_slots, i8))))
+    end associate
+    grid%first = 1_i8
+    if (size(family%grids) > 0) grid%first = family%grids(size(family%grids))%last + 1
+    grid%last = grid%first - 1 + 2*margin + whole_blocks(cells(1)) &
+      & + sum((cells(2:) - 1)*int(grid%stride(2:), i8))
+    do o = 1, grid%n
+      grid%shift(o) = 0_i8
+      do c = 1, body%dim
+        grid%shift(o) = grid%shift(o) + nint(grid%xi(o, c)/grid%spacing)*int(grid%stride(c), i8)
+      end do
+    end do
+    family%grids = [family%grids, grid]
+  end subroutine add_grid
+
+  !> The bond vectors of a grid: all offsets within the rule's reach, x fastest.
+  subroutine make_offsets(rule, dim, grid)
+    type(volume_rule_type), intent(in) :: rule
+    integer, intent(in) :: dim
+    type(offsets_type), intent(inout) :: grid
+    real(wp) :: xi(3), farthest
+    integer :: i, j, k, n, pass, high(3)
+
+    farthest = reach(rule, grid%spacing, dim)
+    grid%reach_cells = floor(farthest/grid%spacing)
     high = 0
-    high(:family%dim) = m
+    high(:dim) = grid%reach_cells
     do pass = 1, 2
       n = 0
       do k = -high(3), high(3)
         do j = -high(2), high(2)
           do i = -high(1), high(1)
             if (i == 0 .and. j == 0 .and. k == 0) cycle
-            xi = family%spacing*[i, j, k]
+            xi = grid%spacing*[i, j, k]
             if (norm2(xi) > farthest) cycle
-            vc = volume_correction(family%rule, xi(:family%dim), norm2(xi), family%spacing)
             n = n + 1
             if (pass == 1) cycle
-            family%xi(n, :) = xi(:family%dim)
-            family%length(n) = norm2(xi)
-            family%fraction(n) = vc
+            grid%xi(n, :) = xi(:dim)
+            grid%length(n) = norm2(xi)
+            grid%fraction(n) = volume_correction(rule, xi(:dim), norm2(xi), grid%spacing)
+            grid%geometry(:3, n) = xi/sum(xi**2)
+            grid%geometry(4, n) = 1/sum(xi**2)
           end do
         end do
       end do
-      if (pass == 1) allocate (family%xi(n, family%dim), family%length(n), family%fraction(n), &
-        & family%shift(n))
+      if (pass == 1) allocate (grid%xi(n, dim), grid%length(n), grid%fraction(n), grid%shift(n), &
+        & grid%geometry(4, n))
     end do
-    allocate (family%geometry(4, n), source=0.0_wp)
-    do i = 1, n
-      family%geometry(:family%dim, i) = family%xi(i, :)/sum(family%xi(i, :)**2)
-      family%geometry(4, i) = 1/sum(family%xi(i, :)**2)
-    end do
-    family%n_offsets = n
-    family%most_bonds = n
-    family%words = (n + word_bits - 1)/word_bits
+    grid%n = n
   end subroutine make_offsets
 
-  !> Put every point into its cell of the padded box. The padding at the end of one row serves the
-  !> beginning of the next as well, and so for planes. Rows are a multiple of `lanes` long, so that
-  !> all of them are cut into blocks alike.
-  subroutine lay_out(body, family, error)
+  !> Put every point into its cell.
+  subroutine place_points(body, family, error)
     type(body_type), intent(inout) :: body
     type(lattice_family_type), intent(inout) :: family
     type(error_type), allocatable, intent(out) :: error
     integer(i4), allocatable :: point(:)
-    integer(i8) :: n_slots, margin, first, at
-    integer :: cells(3), c, k, m, o
-    real(wp) :: lower(3)
+    real(wp), allocatable :: lower(:, :)
+    integer(i8) :: n_slots, at
+    integer :: c, k, n, g
+    integer, allocatable :: number(:)
 
-    m = family%reach_cells
-    cells = extent(body)
-    lower = 0.0_wp
-    do c = 1, body%dim
-      lower(c) = minval(body%x(:, c))
-    end do
-    family%stride = [1, whole_blocks(cells(1) + m), 0]
-    family%stride(3) = family%stride(2)*(cells(2) + m)
-    if (body%dim < 3) family%stride(3) = 0
-    if (body%dim < 2) family%stride(2) = 0
-    margin = whole_blocks(int(min(m*sum(int(family%stride, i8)), int(most_slots, i8))))
-    first = margin + 1
-    n_slots = 2*margin + whole_blocks(cells(1)) &
-      & + sum((cells(2:) - 1)*int(family%stride(2:), i8))
+    n_slots = family%grids(size(family%grids))%last
     if (n_slots > most_slots) then
       call fail(error, 'the lattice needs '//to_text(n_slots)//' slots, more than '//to_text(most_slots))
       return
     end if
-    do o = 1, family%n_offsets
-      family%shift(o) = 0_i8
+    allocate (number(size(body%grids)), lower(body%dim, size(body%grids)))
+    n = 0
+    do g = 1, size(body%grids)
+      if (.not. any(body%grid == g)) cycle
+      n = n + 1
+      number(g) = n
       do c = 1, body%dim
-        family%shift(o) = family%shift(o) + nint(family%xi(o, c)/family%spacing)*int(family%stride(c), i8)
+        lower(c, g) = minval(body%x(:, c), mask=body%grid == g)
       end do
     end do
     allocate (point(n_slots), source=0_i4)
     do k = 1, body%n_points
-      at = first
-      do c = 1, body%dim
-        at = at + nint((body%x(k, c) - lower(c))/family%spacing)*int(family%stride(c), i8)
-      end do
+      g = body%grid(k)
+      associate (grid => family%grids(number(g)))
+        ! as much room before the first point as the farthest offset reaches back
+        at = grid%first + whole_blocks(int(grid%reach_cells*sum(int(grid%stride, i8))))
+        do c = 1, body%dim
+          at = at + nint((body%x(k, c) - lower(c, g))/grid%spacing)*int(grid%stride(c), i8)
+        end do
+      end associate
       if (point(at) > 0_i4) then
         call fail(error, 'bodies '//to_text(int(body%body(point(at))))//' and '// &
           & to_text(int(body%body(k)))//' overlap: their points '//to_text(int(point(at)))//' and '// &
@@ -210,7 +268,16 @@ contains
     family%n_slots = body%n_slots
     allocate (family%alive(n_slots))
     family%alive = merge(1_i1, 0_i1, point > 0_i4)
-  end subroutine lay_out
+  end subroutine place_points
+
+  !> The number of the grid that holds slot `k`.
+  pure integer function grid_at(family, k) result(g)
+    class(lattice_family_type), intent(in) :: family
+    integer(i8), intent(in) :: k
+    do g = 1, size(family%grids) - 1
+      if (k <= family%grids(g)%last) exit
+    end do
+  end function grid_at
 
   !> The next multiple of `lanes`.
   pure integer function whole_blocks(slots)
@@ -218,41 +285,42 @@ contains
     whole_blocks = (slots + lanes - 1)/lanes*lanes
   end function whole_blocks
 
-  !> Number the kinds of surroundings: slots of the same material with the same members are alike.
-  !> Counts the bonds on the way.
+  !> Number the kinds of surroundings: slots of the same grid and material with the same members are
+  !> alike. Counts the bonds on the way.
   subroutine classify(body, family)
     type(body_type), intent(in) :: body
     type(lattice_family_type), intent(inout) :: family
     type(lookup_type) :: classes
-    integer(i8), allocatable :: key(:), bits(:)
-    integer(i8) :: count, first, last
-    integer :: o, w, number
-    integer(i8) :: k
+    integer(i8), allocatable :: key(:)
+    integer(i8) :: count, bits, k
+    integer :: o, w, g, number
     logical :: is_new
 
-    first = findloc(family%alive, 1_i1, dim=1, kind=i8)
-    last = findloc(family%alive, 1_i1, dim=1, kind=i8, back=.true.)
-    allocate (key(family%n_slots), bits(family%n_slots))
+    allocate (key(family%n_slots))
     count = 0_i8
-    key = int(body%material, i8)
-    do w = 1, family%words
-      !$omp parallel do schedule(static) default(none) shared(family, bits, key, first, last, w) &
-      !$omp private(k, o) reduction(+:count)
-      do k = first, last
-        bits(k) = 0_i8
-        if (family%alive(k) == 0_i1) cycle
-        do o = 1, min(word_bits, family%n_offsets - (w - 1)*word_bits)
-          bits(k) = ior(bits(k), ishft(int(family%alive(k + family%shift(o + (w - 1)*word_bits)), i8), o - 1))
+    do g = 1, size(family%grids)
+      associate (grid => family%grids(g), alive => family%alive)
+        !$omp parallel do schedule(static) default(none) shared(family, body, key, g) &
+        !$omp private(k, w, o, bits) reduction(+:count)
+        do k = grid%first, grid%last
+          if (alive(k) == 0_i1) cycle
+          key(k) = mix(int(g, i8), int(body%material(k), i8))
+          do w = 0, family%words - 1
+            bits = 0_i8
+            do o = 1, min(word_bits, grid%n - w*word_bits)
+              bits = ior(bits, ishft(int(alive(k + grid%shift(o + w*word_bits)), i8), o - 1))
+            end do
+            count = count + popcnt(bits)
+            key(k) = mix(key(k), bits)
+          end do
         end do
-        count = count + popcnt(bits(k))
-        key(k) = mix(key(k), bits(k))
-      end do
+      end associate
     end do
     family%n_bonds = count
     allocate (family%class_of(family%n_slots), source=0_i4)
-    do k = first, last
+    do k = 1, family%n_slots
       if (family%alive(k) == 0_i1) cycle
-      if (k > first) then
+      if (k > 1) then
         if (family%alive(k - 1) == 1_i1 .and. key(k) == key(k - 1)) then
           family%class_of(k) = family%class_of(k - 1)
           cycle
@@ -295,21 +363,23 @@ contains
     integer :: o, n
     integer(i8) :: j
 
-    n = 0
     bonds%n = 0
     if (family%alive(k) == 0_i1) return
-    do o = 1, family%n_offsets
-      j = k + family%shift(o)
-      if (family%alive(j) == 0_i1) cycle
-      n = n + 1
-      bonds%j(n) = int(j, i4)
-      bonds%xi(n, :) = family%xi(o, :)
-      bonds%length(n) = family%length(o)
-      bonds%weight(n) = family%fraction(o)*family%cell_volume
-      bonds%intact(n) = .true.
-      if (allocated(family%broken)) bonds%intact(n) = &
-        & .not. btest(family%broken(k, (o - 1)/word_bits + 1), mod(o - 1, word_bits))
-    end do
+    n = 0
+    associate (grid => family%grids(grid_at(family, int(k, i8))))
+      do o = 1, grid%n
+        j = k + grid%shift(o)
+        if (family%alive(j) == 0_i1) cycle
+        n = n + 1
+        bonds%j(n) = int(j, i4)
+        bonds%xi(n, :) = grid%xi(o, :)
+        bonds%length(n) = grid%length(o)
+        bonds%weight(n) = grid%fraction(o)*grid%cell_volume
+        bonds%intact(n) = .true.
+        if (allocated(family%broken)) bonds%intact(n) = &
+          & .not. btest(family%broken(k, (o - 1)/word_bits + 1), mod(o - 1, word_bits))
+      end do
+    end associate
     bonds%n = n
   end subroutine bonds_of
 
@@ -319,14 +389,16 @@ contains
     integer :: o, n, w
 
     n = 0
-    do o = 1, family%n_offsets
-      if (family%alive(k + family%shift(o)) == 0_i1) cycle
-      n = n + 1
-      if (n < i) cycle
-      w = (o - 1)/word_bits + 1
-      family%broken(k, w) = ibset(family%broken(k, w), mod(o - 1, word_bits))
-      return
-    end do
+    associate (grid => family%grids(grid_at(family, int(k, i8))))
+      do o = 1, grid%n
+        if (family%alive(k + grid%shift(o)) == 0_i1) cycle
+        n = n + 1
+        if (n < i) cycle
+        w = (o - 1)/word_bits + 1
+        family%broken(k, w) = ibset(family%broken(k, w), mod(o - 1, word_bits))
+        return
+      end do
+    end associate
   end subroutine break_bond
 
   pure integer(i8) function bytes(family)
@@ -346,8 +418,15 @@ contains
   function describe(family) result(text)
     class(lattice_family_type), intent(in) :: family
     character(:), allocatable :: text
-    text = 'lattice: all points on one grid of '//with_unit(family%spacing, 'm')//', '// &
-      & to_text(family%n_offsets)//' offsets'
+    integer :: g
+
+    text = 'lattice: all points on one grid of '
+    if (size(family%grids) > 1) text = 'lattices: '//to_text(size(family%grids))//' grids of '
+    do g = 1, size(family%grids)
+      if (g > 1) text = text//', '
+      text = text//with_unit(family%grids(g)%spacing, 'm')
+    end do
+    text = text//'; '//to_text(family%most_bonds)//' offsets'
     if (allocated(family%table)) text = text//', '//to_text(size(family%table))//' tables of weights'
   end function describe
 

@@ -314,32 +314,30 @@ contains
 
   !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda, r = |xi|/|y|
   !> and the bond's direction over |xi|.
-  pure subroutine deform(family, model, terms, first, offset, u, s, lambda, r, along)
-    type(lattice_family_type), intent(in) :: family
+  pure subroutine deform(dim, model, terms, first, shift, g, u, s, lambda, r, along)
+    integer, intent(in) :: dim
     type(model_type), intent(in) :: model
     type(terms_type), intent(in) :: terms
-    integer(i8), intent(in) :: first
-    integer, intent(in) :: offset
+    integer(i8), intent(in) :: first, shift
+    real(wp), intent(in) :: g(4)
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), along(lanes, 3)
     real(wp) :: x(lanes), e(lanes), y(lanes), eta(lanes)
     integer(i8) :: j
     integer :: c
 
-    j = first + family%shift(offset)
+    j = first + shift
     x = 0.0_wp
     e = 0.0_wp
     y = 0.0_wp
-    associate (g => family%geometry(:, offset))
-      do c = 1, family%dim
-        eta = u(j:j + lanes - 1, c) - u(first:first + lanes - 1, c)
-        x = x + g(c)*eta
-        e = e + eta**2
-        along(:, c) = g(c) + g(4)*eta
-        y = y + along(:, c)**2/g(4)
-      end do
-      e = 2*x + g(4)*e
-    end associate
+    do c = 1, dim
+      eta = u(j:j + lanes - 1, c) - u(first:first + lanes - 1, c)
+      x = x + g(c)*eta
+      e = e + eta**2
+      along(:, c) = g(c) + g(4)*eta
+      y = y + along(:, c)**2/g(4)
+    end do
+    e = 2*x + g(4)*e
     s = e/(1 + sqrt(y))
     r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
     lambda = (1 + x)*r
@@ -365,7 +363,8 @@ contains
     most = 0.0_wp
     least = 0.0_wp
     do m = 1, weights%n
-      call deform(family, model, terms, first, int(weights%offset(m)), u, s, lambda, r, along)
+      call deform(family%dim, model, terms, first, weights%shift(m), weights%geometry(:, m), u, s, &
+        & lambda, r, along)
       theta = theta + weights%dilatation(:, m)*s*lambda
       if (terms%breaking) call widen(s, weights%stretch(:, m), most, least)
     end do
@@ -391,10 +390,11 @@ contains
     most = 0.0_wp
     least = 0.0_wp
     do m = 1, weights%n
-      call deform(family, model, terms, first, int(weights%offset(m)), u, s, lambda, r, along)
+      call deform(family%dim, model, terms, first, weights%shift(m), weights%geometry(:, m), u, s, &
+        & lambda, r, along)
       magnitude = weights%stretch(:, m)*s
       if (terms%dilatation) then
-        j = first + family%shift(weights%offset(m))
+        j = first + weights%shift(m)
         magnitude = magnitude + (p(first:first + lanes - 1) + p(j:j + lanes - 1)) &
           & *weights%dilatation(:, m)*lambda
       end if
@@ -425,11 +425,12 @@ contains
     theta = 0.0_wp
     stretches = 0.0_wp
     do m = 1, weights%n
-      call deform(family, model, terms, first, int(weights%offset(m)), u, s, lambda, r, along)
+      call deform(family%dim, model, terms, first, weights%shift(m), weights%geometry(:, m), u, s, &
+        & lambda, r, along)
       if (terms%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
       if (size(model%materials) > 1) then
         ! the weights hold q_k + q_j, the energy takes q_k/2 of the slot's own material
-        j = first + family%shift(weights%offset(m))
+        j = first + weights%shift(m)
         do l = 1, lanes
           associate (q => model%materials(model%material(first + l - 1))%q)
             s(l) = s(l)*sqrt(2*q/(q + model%materials(model%material(j + l - 1))%q))

@@ -4,7 +4,7 @@
 module pd_force_weights
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_lattice, only: lattice_family_type, weights_type, lanes, word_bits
+  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, lanes
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: model_type
   implicit none (type, external)
@@ -25,21 +25,22 @@ contains
     type(weights_type), allocatable :: table(:), longer(:)
     integer(i8), allocatable :: column(:)
     integer(i8) :: key, bytes
-    integer :: b, i, number
+    integer :: b, g, i, number
     logical :: is_new
 
     call column_keys(family, column)
     allocate (table(256))
     bytes = 0_i8
     do b = 1, size(family%block)
-      key = 0_i8
-      do i = -family%reach_cells, lanes - 1 + family%reach_cells
+      g = grid_at(family, family%block(b))
+      key = int(g, i8)
+      do i = -family%grids(g)%reach_cells, lanes - 1 + family%grids(g)%reach_cells
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(key, number, is_new)
       family%weights(b) = int(number, i4)
       if (.not. is_new) cycle
-      bytes = bytes + family%n_offsets*(16_i8*lanes + 44)
+      bytes = bytes + family%grids(g)%n*(16_i8*lanes + 44)
       if (bytes > free_bytes + bytes_per_slot*family%n_slots) exit
       if (number > size(table)) then
         allocate (longer(2*size(table)))
@@ -62,23 +63,30 @@ contains
   subroutine column_keys(family, column)
     type(lattice_family_type), intent(in) :: family
     integer(i8), allocatable, intent(out) :: column(:)
-    integer :: m, my, mz, j, k
-    integer(i8) :: first, last, s, row
+    integer :: g, m, my, mz, j, k
+    integer(i8) :: margin, first, last, s, row
 
-    m = family%reach_cells
-    my = merge(m, 0, family%dim > 1)
-    mz = merge(m, 0, family%dim > 2)
-    first = family%block(1) - m
-    last = family%block(size(family%block)) + lanes - 1 + m
-    allocate (column(first:last), source=0_i8)
-    do k = -mz, mz
-      do j = -my, my
-        row = j*int(family%stride(2), i8) + k*int(family%stride(3), i8)
-        !$omp parallel do simd schedule(static) default(none) shared(family, column, row, first, last) private(s)
-        do s = first, last
-          column(s) = mix(column(s), int(family%class_of(s + row), i8))
+    allocate (column(family%n_slots), source=0_i8)
+    do g = 1, size(family%grids)
+      associate (grid => family%grids(g))
+        m = grid%reach_cells
+        my = merge(m, 0, family%dim > 1)
+        mz = merge(m, 0, family%dim > 2)
+        ! rows of the padding that would look beyond the box hold nothing that a block needs
+        margin = my*int(grid%stride(2), i8) + mz*int(grid%stride(3), i8)
+        first = grid%first + margin
+        last = grid%last - margin
+        do k = -mz, mz
+          do j = -my, my
+            row = j*int(grid%stride(2), i8) + k*int(grid%stride(3), i8)
+            !$omp parallel do simd schedule(static) default(none) private(s) &
+            !$omp shared(family, column, row, first, last)
+            do s = first, last
+              column(s) = mix(column(s), int(family%class_of(s + row), i8))
+            end do
+          end do
         end do
-      end do
+      end associate
     end do
   end subroutine column_keys
 
@@ -89,7 +97,7 @@ contains
     type(weights_type), intent(out) :: weights
     integer :: n
 
-    n = family%n_offsets
+    n = family%most_bonds
     allocate (weights%offset(n), weights%shift(n), weights%geometry(4, n), weights%stretch(lanes, n))
     allocate (weights%dilatation(lanes, merge(n, 0, model%dilatation)))
   end subroutine allocate_weights
@@ -106,37 +114,32 @@ contains
     integer :: o, l, m
 
     m = 0
-    do o = 1, family%n_offsets
-      if (.not. any_bond(o)) cycle
-      m = m + 1
-      weights%offset(m) = int(o, i4)
-      weights%shift(m) = family%shift(o)
-      weights%geometry(:, m) = family%geometry(:, o)
-      n = family%xi(o, :)/family%length(o)
-      do l = 1, lanes
-        k = first + l - 1
-        j = k + family%shift(o)
-        weights%stretch(l, m) = 0.0_wp
-        if (model%dilatation) weights%dilatation(l, m) = 0.0_wp
-        if (family%alive(k) == 0_i1 .or. family%alive(j) == 0_i1) cycle
-        weight = family%fraction(o)*family%cell_volume
-        weights%stretch(l, m) = weight*family%length(o)*(model%materials(model%material(k))%q &
-          & + model%materials(model%material(j))%q)
-        if (model%dilatation) weights%dilatation(l, m) = weight
-        if (.not. model%surface) cycle
-        weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
-        if (model%dilatation) weights%dilatation(l, m) = weight*bond_factor(n, model%D(k, :), model%D(j, :))
+    associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
+      do o = 1, grid%n
+        j = first + grid%shift(o)
+        if (.not. any(alive(first:first + lanes - 1) == 1_i1 .and. alive(j:j + lanes - 1) == 1_i1)) cycle
+        m = m + 1
+        weights%offset(m) = int(o, i4)
+        weights%shift(m) = grid%shift(o)
+        weights%geometry(:, m) = grid%geometry(:, o)
+        n = grid%xi(o, :)/grid%length(o)
+        do l = 1, lanes
+          k = first + l - 1
+          j = k + grid%shift(o)
+          weights%stretch(l, m) = 0.0_wp
+          if (model%dilatation) weights%dilatation(l, m) = 0.0_wp
+          if (alive(k) == 0_i1 .or. alive(j) == 0_i1) cycle
+          weight = grid%fraction(o)*grid%cell_volume
+          weights%stretch(l, m) = weight*grid%length(o)*(model%materials(model%material(k))%q &
+            & + model%materials(model%material(j))%q)
+          if (model%dilatation) weights%dilatation(l, m) = weight
+          if (.not. model%surface) cycle
+          weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
+          if (model%dilatation) weights%dilatation(l, m) = weight*bond_factor(n, model%D(k, :), model%D(j, :))
+        end do
       end do
-    end do
+    end associate
     weights%n = m
-
-  contains
-
-    pure logical function any_bond(o)
-      integer, intent(in) :: o
-      any_bond = any(family%alive(first:first + lanes - 1) == 1_i1 .and. &
-        & family%alive(first + family%shift(o):first + family%shift(o) + lanes - 1) == 1_i1)
-    end function any_bond
   end subroutine block_weights
 
   !> Give back the room of offsets that were left out.

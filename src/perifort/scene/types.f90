@@ -65,6 +65,7 @@ module pd_scene_types
     character(name_length) :: volume_correction = 'linear' !! 'linear_extended', 'exact', 'none'
     character(name_length) :: surface_correction = 'energy'!! 'none'
     character(name_length) :: dilatation = 'projected'     !! 'unprojected': Lambda = 1
+    character(name_length) :: family = 'automatic'         !! 'lattice', 'list'
   end type horizon_group
 
   !> `&crack`: a segment (2D), a parallelogram or a disc (3D)
