@@ -3,8 +3,8 @@ module pd_family_cells
   use pd_base_kinds, only: wp, i2, i4, i8
   implicit none (type, external)
   private
-  public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, joins_labels, &
-    & brute_force_neighbours
+  public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, neighbours_of, &
+    & joins_labels, brute_force_neighbours
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
   type :: cells_type
@@ -109,6 +109,25 @@ contains
     end do
   end subroutine collect_neighbours
 
+  !> The neighbours of one point in `found(:number)`, which grows as needed.
+  pure subroutine neighbours_of(x, half_reach, cells, k, number, found)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    type(cells_type), intent(in) :: cells
+    integer, intent(in) :: k
+    integer(i4), intent(out) :: number
+    integer(i4), allocatable, intent(inout) :: found(:)
+
+    if (.not. allocated(found)) allocate (found(0))
+    call visit(x, half_reach, cells, k, number, found, .false.)
+    if (number == 0_i4) return
+    if (number > size(found)) then
+      deallocate (found)
+      allocate (found(2*number))
+    end if
+    call visit(x, half_reach, cells, k, number, found, .true.)
+  end subroutine neighbours_of
+
   !> Whether two points with different labels are neighbours.
   logical function joins_labels(x, half_reach, cells, label) result(joins)
     real(wp), intent(in) :: x(:, :)
@@ -122,11 +141,10 @@ contains
     joins = .false.
     !$omp parallel default(none) shared(x, half_reach, cells, label) private(found, number, k) &
     !$omp reduction(.or.:joins)
-    allocate (found(size(x, 1)))
     !$omp do schedule(dynamic, 512)
     do k = 1, size(x, 1)
       if (joins) cycle
-      call visit(x, half_reach, cells, k, number, found, .true.)
+      call neighbours_of(x, half_reach, cells, k, number, found)
       if (any(label(found(:number)) /= label(k))) joins = .true.
     end do
     !$omp end parallel

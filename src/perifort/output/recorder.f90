@@ -1,14 +1,17 @@
 !> Writes what a run is asked to keep: outputs of fields, rows of history with energies, reactions
 !> and probes, and the progress line.
 module pd_output_recorder
+  use, intrinsic :: iso_fortran_env, only: error_unit
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_clock, only: phase_timer_type, progress_type
   use pd_base_error, only: error_type
+  use pd_base_text, only: to_text
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
+  use pd_output_contact, only: touching_points
   use pd_output_results, only: results_type
   use pd_output_types, only: column_type, field_type
   implicit none (type, external)
@@ -42,11 +45,12 @@ module pd_output_recorder
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(energies_type) :: energies          !! of the last row
-    type(energies_type) :: first_energies    !! of the first row
+    real(wp) :: supply = 0.0_wp              !! energy at the first row, breaking at t = 0 included [J]
     integer :: rows = 0
     integer :: outputs = 0
     integer :: steps_done = 0
     real(wp) :: time = 0.0_wp
+    logical :: touched = .false.             !! contact has been reported
   contains
     procedure :: observe
   end type recorder_type
@@ -224,7 +228,8 @@ contains
     integer :: m, p, f
 
     call energies_of(system, v, recorder%energies)
-    if (recorder%rows == 0) recorder%first_energies = recorder%energies
+    if (recorder%rows == 0) recorder%supply = recorder%energies%kinetic + recorder%energies%strain &
+      & + system%dissipated
     recorder%rows = recorder%rows + 1
     row = [real(instant%step, wp), instant%time, recorder%energies%kinetic, recorder%energies%strain, &
       & system%dissipated, system%external_work, real(system%broken, wp), maxval(system%state%damage), &
@@ -306,6 +311,7 @@ contains
     end do
     call recorder%results%end_output(error)
     recorder%outputs = recorder%outputs + 1
+    if (.not. recorder%touched) call warn_of_contact(recorder, system, instant)
 
   contains
 
@@ -328,5 +334,21 @@ contains
       call recorder%results%put_field(f, of_slots(system%body%slot), error)
     end subroutine put_scalars
   end subroutine write_output
+
+  !> Say once that points pass through each other, which the method doesn't hinder.
+  subroutine warn_of_contact(recorder, system, instant)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(in) :: system
+    type(instant_type), intent(in) :: instant
+    integer :: first, second
+
+    call touching_points(system%body, system%family, system%state%u, first, second)
+    recorder%touched = first > 0
+    if (.not. recorder%touched) return
+    call recorder%progress%finish()
+    write (error_unit, '(a)') 'warning: at t = '//to_text(instant%time)//' s points '//to_text(first)// &
+      & ' and '//to_text(second)//', which share no intact bond, are closer than half a spacing: '// &
+      & 'there is no contact, pieces pass through each other from here on'
+  end subroutine warn_of_contact
 
 end module pd_output_recorder

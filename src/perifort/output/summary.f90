@@ -103,7 +103,7 @@ contains
       & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
       & /(real(system%family%n_bonds, wp)*recorder%steps_done), 3)//' ns per bond and step, '// &
       & to_text(recorder%steps_done/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
-    associate (now => recorder%energies, first => recorder%first_energies)
+    associate (now => recorder%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))
       if (system%model%breaking) then
@@ -113,7 +113,7 @@ contains
       end if
       text = text//line('external work', with_unit(system%external_work, 'J'))
       if (.not. recorder%schedule%relaxation) then
-        supply = first%kinetic + first%strain + system%external_work
+        supply = recorder%supply + system%external_work
         balance = now%kinetic + now%strain + system%dissipated - supply
         largest = max(abs(now%kinetic) + abs(now%strain) + system%dissipated, abs(supply))
         if (largest > 0.0_wp) text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '// &
