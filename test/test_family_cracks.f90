@@ -271,8 +271,8 @@ contains
     expected = 0
     do i = 1, set_up%system%body%n_points
       do j = i + 1, set_up%system%body%n_points
-        a = set_up%system%body%x(i, :)
-        b = set_up%system%body%x(j, :)
+        a = set_up%system%body%x(set_up%system%body%slot(i), :)
+        b = set_up%system%body%x(set_up%system%body%slot(j), :)
         if (norm2(b - a) > 3.015_wp .or. (a(3) - 4.1_wp)*(b(3) - 4.1_wp) > 0.0_wp) cycle
         t = (4.1_wp - a(3))/(b(3) - a(3))
         r = a + t*(b - a) - scene%cracks(1)%centre

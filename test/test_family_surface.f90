@@ -238,7 +238,7 @@ contains
     scene%bodies(1)%upper = scene%bodies(1)%upper + 0.3_wp
     call ready(scene, set_up, error)
     if (allocated(error)) return
-    associate (model => set_up%system%model)
+    associate (model => set_up%system%model, live => set_up%system%body%slot)
       call expect(error, maxval(abs(model%D(:, 2:) - 1)), 0.0_wp, 0.0_wp, 'D across a chain')
       call expect(error, maxval(abs(model%S(:, 2:) - 1)), 0.0_wp, 0.0_wp, 'S across a chain')
       ! a chain is a tiny part of a ball: far from 1, but finite
