@@ -1,5 +1,5 @@
-!> Bodies on which force loops are tried: every dimension with every term of the force alone and with
-!> all of them, on every kind of family. A new kind joins by one line in `kinds` and one in
+!> Bodies on which force loops are tried: every dimension with every term of the force alone and
+!> with all of them, on every kind of family. A new kind joins by one line in `kinds` and one in
 !> `build_family`.
 module force_subjects
   use pd_base_kinds, only: wp, i1, i2, i8
@@ -68,7 +68,7 @@ contains
       allocate (list)
       call new_list_family(body, rule, list)
       call move_alloc(list, family)
-    case ('lattice')
+    case default
       allocate (lattice)
       call new_lattice_family(body, rule, breakable, lattice, fault)
       call move_alloc(lattice, family)
@@ -100,7 +100,7 @@ contains
     select case (subject%dim)
     case (1); count(1) = 17
     case (2); count(:2) = [11, 9]
-    case (3); count = [8, 7, 6]
+    case default; count = [8, 7, 6]
     end select
     call allocate_points(subject%body, subject%dim, product(count))
     associate (body => subject%body)
@@ -220,7 +220,7 @@ contains
       subject%crack = .true.
       subject%hole = .true.
       subject%breaking = .true.
-    case (14)
+    case default
       subject%surface = .true.
       subject%thermal = .true.
       subject%two_materials = .true.

@@ -35,9 +35,10 @@ contains
       & new_unittest('the same bits on 1, 2 and 4 threads', test_threads)]
   end subroutine collect_force_contract
 
-  !> Force, dilatation and energy by both ways, from tiny strains to large ones, since loops may take
-  !> other formulas for small ones. Each is a sum of some 100 terms, with different order and forms of
-  !> the same formula: a few hundred rounding errors of its largest term; temperatures add theirs.
+  !> Force, dilatation and energy by both ways, from tiny strains to large ones, since loops may
+  !> take other formulas for small ones. Each is a sum of some 100 terms, with different order and
+  !> forms of the same formula: a few hundred rounding errors of its largest term; temperatures add
+  !> theirs.
   subroutine test_reference(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
@@ -87,7 +88,8 @@ contains
   end subroutine test_reference
 
   !> sum V f = 0 and sum y x V f = 0: action and reaction are equal along the deformed bond. The sum
-  !> of |V f| over all points has an error of one rounding per term; 1e-13 of it leaves some hundred.
+  !> of |V f| over all points has an error of one rounding per term; 1e-13 of it leaves some
+  !> hundred.
   subroutine test_balance(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
@@ -128,9 +130,9 @@ contains
     end do
   end subroutine test_balance
 
-  !> A translation by many body lengths and rotations by any angle. Stretch comes from differences of
-  !> displacements, each rounded to eps |u|: the force may reach eps |u|/|xi| of that of a unit stretch,
-  !> summed over the family. Forces at unit stretch come from a uniform expansion.
+  !> A translation by many body lengths and rotations by any angle. Stretch comes from differences
+  !> of displacements, each rounded to eps |u|: the force may reach eps |u|/|xi| of that of a unit
+  !> stretch, summed over the family. Forces at unit stretch come from a uniform expansion.
   subroutine test_rigid(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: degrees(*) = [1.0e-6_wp, 1.0_wp, 30.0_wp, 77.0_wp, 90.0_wp, 180.0_wp, &
@@ -370,8 +372,8 @@ contains
     end do
   end subroutine test_crushed
 
-  !> Strained slots are found by the passes, and every broken bond is broken from both its ends: damage
-  !> weighted by family volumes balances, and the energy that is gone is what was dissipated.
+  !> Strained slots are found by the passes, and every broken bond is broken from both its ends:
+  !> damage weighted by family volumes balances, and the energy that is gone is what was dissipated.
   subroutine test_breaking(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject

@@ -250,8 +250,8 @@ contains
     close (unit, status='delete')
   end subroutine test_file
 
-  !> u = alpha dT x relaxes a free body that is uniformly hot: every bond's mechanical stretch is 0. The
-  !> force that is left is rounding of that of a held hot body.
+  !> u = alpha dT x relaxes a free body that is uniformly hot: every bond's mechanical stretch is 0.
+  !> The force that is left is rounding of that of a held hot body.
   subroutine test_heating(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: points(3) = [9, 7, 6]

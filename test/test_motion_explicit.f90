@@ -32,7 +32,8 @@ contains
       & new_unittest('a body that falls apart is an error with step and point', test_unstable)]
   end subroutine collect_motion_explicit
 
-  !> A plate that moves smoothly and not linearly: initial velocities and displacements of long waves.
+  !> A plate that moves smoothly and not linearly: initial velocities and displacements of long
+  !> waves.
   subroutine smooth_plate(driven, scene)
     logical, intent(in) :: driven
     type(scene_type), intent(out) :: scene
@@ -120,8 +121,8 @@ contains
     end do
   end subroutine measure_orders
 
-  !> Two points one spacing apart, the left one held: omega^2 = 2 q v_c V/(rho |xi|), with q = 2 b delta,
-  !> b = E/(2 A delta^3): omega = sqrt(2 E v_c/(rho delta^2)) dx^(1/2)/|xi|^(1/2).
+  !> Two points one spacing apart, the left one held: omega^2 = 2 q v_c V/(rho |xi|), with q = 2 b
+  !> delta, b = E/(2 A delta^3): omega = sqrt(2 E v_c/(rho delta^2)) dx^(1/2)/|xi|^(1/2).
   subroutine oscillator(amplitude, set_up, omega, error)
     real(wp), intent(in) :: amplitude     !! initial displacement [m]
     type(set_up_type), intent(out) :: set_up
@@ -186,8 +187,8 @@ contains
     diary%slot = slot
   end subroutine begin
 
-  !> Leapfrog from rest gives u_n = U cos(n phi) with sin(phi/2) = omega dt/2, to rounding that grows
-  !> with n; its velocity at t_n is then -U sin(n phi) sin(phi)/dt.
+  !> Leapfrog from rest gives u_n = U cos(n phi) with sin(phi/2) = omega dt/2, to rounding that
+  !> grows with n; its velocity at t_n is then -U sin(n phi) sin(phi)/dt.
   subroutine test_oscillator(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: amplitude = 1.0e-5_wp
@@ -219,9 +220,10 @@ contains
     end do
   end subroutine test_oscillator
 
-  !> u = U cos(k x) from rest in a chain so long that its ends (three points a step) are not heard in
-  !> its middle: u_n = U cos(k x) cos(n phi), sin(phi/2) = omega(k) dt/2, with the sum of the theory page,
-  !> 9, for omega(k). Wave numbers up to the grid's last, step at 0.9 of the stable one.
+  !> u = U cos(k x) from rest in a chain so long that its ends (three points a step) are not heard
+  !> in its middle: u_n = U cos(k x) cos(n phi), sin(phi/2) = omega(k) dt/2, with the sum of the
+  !> theory page, 9, for omega(k). Wave numbers up to the grid's last, step at 0.9 of the stable
+  !> one.
   subroutine test_dispersion(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: dx = 1.0e-2_wp, amplitude = 1.0e-6_wp
