@@ -19,7 +19,7 @@ module bodies
 
   !> Keeps what an explicit run shows: a row per instant.
   type, extends(observer_type) :: diary_type
-    integer :: every = 1                    !! rows are kept at multiples of this step; 0: at settled ones
+    integer :: every = 1                    !! rows at multiples of this step; 0: settled ones
     integer :: slot = 0                     !! slot whose displacement is kept, 0 for none
     integer :: n = 0
     integer :: settled = 0                  !! load steps that converged
@@ -116,7 +116,8 @@ contains
     noise = 2*real(state, wp)/2147483647.0_wp - 1
   end function noise
 
-  !> Displacements of all points: a given gradient and a random part, its components up to `size` [m].
+  !> Displacements of all points: a given gradient and a random part, its components up to `size`
+  !> [m].
   subroutine shake(body, gradient, size, seed, u)
     type(body_type), intent(in) :: body
     real(wp), intent(in) :: gradient(3, 3)

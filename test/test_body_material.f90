@@ -68,8 +68,8 @@ contains
     if (dim == 2) total = total*h
   end function horizon_moment
 
-  !> u = zeta x: theta = dim zeta, W = kappa theta^2/2, in 3D and in both planes with their own kappa
-  !> = E/(3(1-2nu)), E/(2(1-nu)), E/(2(1+nu)(1-2nu)).
+  !> u = zeta x: theta = dim zeta, W = kappa theta^2/2, in 3D and in both planes with their own
+  !> kappa = E/(3(1-2nu)), E/(2(1-nu)), E/(2(1+nu)(1-2nu)).
   subroutine test_expansion(error)
     type(error_type), allocatable, intent(out) :: error
     type(material_type) :: m
@@ -181,8 +181,9 @@ contains
   end subroutine test_bond_constants
 
   !> Bond-based bodies: the energy c s_c^2 |xi|/2 of every bond across a unit of crack is Gc. Over
-  !> all bonds: 3D c s^2 delta^5 pi/10 (known as sqrt(5 Gc/(9 kappa delta))), plane c s^2 h delta^4/4 per
-  !> thickness (known as sqrt(4 pi Gc/(9 E delta)) in plane stress), bar c s^2 A^2 delta^3/6 per area.
+  !> all bonds: 3D c s^2 delta^5 pi/10 (known as sqrt(5 Gc/(9 kappa delta))), plane c s^2 h
+  !> delta^4/4 per thickness (known as sqrt(4 pi Gc/(9 E delta)) in plane stress), bar c s^2 A^2
+  !> delta^3/6 per area.
   subroutine test_critical_stretch(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: Gc = 135.0_wp

@@ -155,8 +155,8 @@ contains
   end subroutine test_counts
 
   !> delta exactly 3 spacings, lattices shifted far away and spacings that no binary fraction is:
-  !> differences of coordinates are then off by up to 1e-10 of a spacing, and every family must still
-  !> be the same.
+  !> differences of coordinates are then off by up to 1e-10 of a spacing, and every family must
+  !> still be the same.
   subroutine test_edge(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: shifts(*) = [0.0_wp, 1.0_wp/3, -7.7_wp, 1234.567_wp]

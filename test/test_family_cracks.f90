@@ -29,10 +29,11 @@ contains
       & new_unittest('two cracks through one bond cut it once', test_twice)]
   end subroutine collect_family_cracks
 
-  !> delta = 3 spacings, linear volume correction, a long crack half a spacing from the row: worked out
-  !> in the theory page, 7. Beside it the book prints 0.38, 0.14, 0.24 (on the crack's plane, ahead of
-  !> and behind the tip) and 0.38, 0.16, 0.02 (0.5, 1.5, 2.5 spacings from it): the first three are the
-  !> counts 11, 4 and 7 of 29, the point itself counted, so not of one definition with the last.
+  !> delta = 3 spacings, linear volume correction, a long crack half a spacing from the row: worked
+  !> out in the theory page, 7. Beside it the book prints 0.38, 0.14, 0.24 (on the crack's plane,
+  !> ahead of and behind the tip) and 0.38, 0.16, 0.02 (0.5, 1.5, 2.5 spacings from it): the first
+  !> three are the counts 11, 4 and 7 of 29, the point itself counted, so not of one definition with
+  !> the last.
   subroutine test_damage(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: allowed = 5.0e-4_wp  !! half of the last digit given
@@ -228,7 +229,8 @@ contains
     real(wp) :: spacing
 
     spacing = 0.1_wp/3
-    ! a bond (i, j) crosses the gap below the row: number of rows that it can start from, times columns
+    ! a bond (i, j) crosses the gap below the row: number of rows that it can start from, times
+    ! columns
     expected = 0
     do j = 1, 3
       do i = -3, 3
@@ -271,8 +273,8 @@ contains
     expected = 0
     do i = 1, set_up%system%body%n_points
       do j = i + 1, set_up%system%body%n_points
-        a = set_up%system%body%x(i, :)
-        b = set_up%system%body%x(j, :)
+        a = set_up%system%body%x(set_up%system%body%slot(i), :)
+        b = set_up%system%body%x(set_up%system%body%slot(j), :)
         if (norm2(b - a) > 3.015_wp .or. (a(3) - 4.1_wp)*(b(3) - 4.1_wp) > 0.0_wp) cycle
         t = (4.1_wp - a(3))/(b(3) - a(3))
         r = a + t*(b - a) - scene%cracks(1)%centre

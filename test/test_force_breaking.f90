@@ -59,7 +59,8 @@ contains
     call expand(set_up, critical*(1 + 1.0e-12_wp))
     call expect_true(error, 2*set_up%system%broken == set_up%system%family%n_bonds, &
       & 'whole above the limit')
-    call expect(error, minval(set_up%system%state%damage), 1.0_wp, 0.0_wp, 'damage')
+    call expect(error, minval(set_up%system%state%damage(set_up%system%body%slot)), 1.0_wp, &
+      & 0.0_wp, 'damage')
     call expect(error, maxval(abs(set_up%system%state%force)), 0.0_wp, 0.0_wp, &
       & 'force without bonds')
   end subroutine test_limit
@@ -106,8 +107,8 @@ contains
     call expect(error, maxval(abs(set_up%system%state%force)), 0.0_wp, 0.0_wp, 'force at rest')
   end subroutine test_for_good
 
-  !> Two halves with limits 1 and 3 times s_c, stretched by 2 s_c: bonds within the tougher half are left.
-  !> With compression allowed in one half alone, only bonds within that half break in it.
+  !> Two halves with limits 1 and 3 times s_c, stretched by 2 s_c: bonds within the tougher half are
+  !> left. With compression allowed in one half alone, only bonds within that half break in it.
   subroutine test_interface(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -181,8 +182,8 @@ contains
     end associate
   end subroutine test_no_fail
 
-  !> The mechanical stretch decides: free expansion by ten times s_c breaks nothing, held heating by as
-  !> much presses and breaks nothing, held cooling tears everything.
+  !> The mechanical stretch decides: free expansion by ten times s_c breaks nothing, held heating by
+  !> as much presses and breaks nothing, held cooling tears everything.
   subroutine test_thermal(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -230,11 +231,12 @@ contains
     call expand(set_up, 2*critical)
     call expect_true(error, set_up%system%broken == 2*pairs(9, 4), &
       & 'broken ones don''t count the cut')
-    call expect(error, minval(set_up%system%state%damage), 1.0_wp, 0.0_wp, 'damage counts both')
+    call expect(error, minval(set_up%system%state%damage(set_up%system%body%slot)), 1.0_wp, &
+      & 0.0_wp, 'damage counts both')
   end subroutine test_counts
 
-  !> All the strain energy there is, theta^2 included, is dissipated when all bonds break at once:
-  !> W of uniform expansion is, per point, a theta^2 + b delta s^2 sum |xi| v_c V; here from the sums.
+  !> All the strain energy there is, theta^2 included, is dissipated when all bonds break at once: W
+  !> of uniform expansion is, per point, a theta^2 + b delta s^2 sum |xi| v_c V; here from the sums.
   subroutine test_energy(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -252,14 +254,15 @@ contains
         lengths = 0.0_wp
         volumes = 0.0_wp
         do j = 1, body%n_points
-          xi = norm2(body%x(j, :) - body%x(i, :))/spacing
+          xi = norm2(body%x(body%slot(j), :) - body%x(body%slot(i), :))/spacing
           if (i == j .or. xi > 3.015_wp) cycle
           vc = min(1.0_wp, 3.515_wp - xi)
-          volumes = volumes + vc*body%volume(j)
-          lengths = lengths + vc*body%volume(j)*xi*spacing
+          volumes = volumes + vc*body%volume(body%slot(j))
+          lengths = lengths + vc*body%volume(body%slot(j))*xi*spacing
         end do
         theta = m%d*3.015_wp*spacing*strain*volumes
-        expected = expected + body%volume(i)*(m%a*theta**2 + m%b*3.015_wp*spacing*strain**2*lengths)
+        expected = expected + body%volume(body%slot(i)) &
+          & *(m%a*theta**2 + m%b*3.015_wp*spacing*strain**2*lengths)
       end do
     end associate
     call expand(set_up, strain)

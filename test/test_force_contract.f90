@@ -1,59 +1,23 @@
 !> What every force loop must do, whatever the family it works on: agree with the theory written
 !> point by point, keep momentum, ignore rigid motions, be the gradient of the energy, and give the
-!> same bits on any number of threads. A new kind of family joins by one line in `build_family` and
-!> one in `kinds`.
+!> same bits on any number of threads.
 module test_force_contract
   use, intrinsic :: iso_fortran_env, only: real128
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_base_kinds, only: wp, i1, i2, i4, i8
-  use pd_base_error, only: fault_type => error_type
+  use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_numbers, only: pi
-  use pd_body_body, only: body_type, grid_type, allocate_points, keep_points
-  use pd_body_material, only: material_type, new_material
-  use pd_family_cracks, only: cut_bonds
-  use pd_family_family, only: family_type
-  use pd_family_lattice, only: lattice_family_type, new_lattice_family
-  use pd_family_list, only: list_family_type, new_list_family
-  use pd_family_surface, only: surface_factors
-  use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
-    & volume_linear_extended, &
-    & volume_exact
+  use pd_family_volume, only: volume_none
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
   use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
-  use pd_force_model, only: model_type, new_model
-  use pd_force_weights, only: build_weights
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
-  use pd_scene_types, only: crack_group
   use testdrive, only: error_type, new_unittest, unittest_type
-  use bodies, only: expect, expect_true, noise, rotation_matrix, shake, text_of, youngs_modulus
+  use bodies, only: expect, expect_true, rotation_matrix, shake, text_of
+  use force_subjects, only: subject_type, kinds, spacing, build, build_pair, subject_number, &
+    & name_of, &
+    & fast_force, some_gradient
   implicit none (type, external)
   private
   public :: collect_force_contract
-
-  !> The kinds of families that must keep the contract.
-  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'lattice']
-
-  real(wp), parameter :: spacing = 1.0e-3_wp  !! of every body here [m]
-
-  !> One body under test, and which terms its force has.
-  type :: subject_type
-    character(8) :: kind = 'list'
-    integer :: dim = 1
-    real(wp) :: poissons_ratio = 0.2_wp
-    logical :: bond_based = .false.
-    logical :: plane_strain = .false.
-    logical :: projected = .true.
-    logical :: surface = .false.
-    logical :: thermal = .false.
-    logical :: two_materials = .false.
-    logical :: hole = .false.
-    logical :: crack = .false.
-    logical :: breaking = .false.
-    integer :: rule = volume_linear
-    type(body_type) :: body
-    class(family_type), allocatable :: family
-    type(model_type) :: model
-  end type subject_type
 
 contains
 
@@ -71,217 +35,18 @@ contains
       & new_unittest('the same bits on 1, 2 and 4 threads', test_threads)]
   end subroutine collect_force_contract
 
-  !> The one place that knows the kinds of families.
-  subroutine build_family(kind, body, rule, family)
-    character(*), intent(in) :: kind
-    type(body_type), intent(inout) :: body
-    type(volume_rule_type), intent(in) :: rule
-    class(family_type), allocatable, intent(out) :: family
-    type(list_family_type) :: list
-    type(lattice_family_type) :: lattice
-    type(fault_type), allocatable :: fault
-
-    select case (kind)
-    case ('list')
-      call new_list_family(body, rule, list)
-      allocate (family, source=list)
-    case ('lattice')
-      call new_lattice_family(body, rule, .true., lattice, fault)
-      if (.not. allocated(fault)) allocate (family, source=lattice)
-    end select
-  end subroutine build_family
-
-  !> Lay out body, family and model of a subject.
-  subroutine build(subject)
-    type(subject_type), intent(inout) :: subject
-    type(material_type), allocatable :: materials(:)
-    type(crack_group) :: crack
-    real(wp), allocatable :: temperature_change(:)
-    logical, allocatable :: keep(:)
-    integer :: count(3), i, j, k, n
-    integer(i8) :: cut
-    real(wp) :: delta
-
-    delta = 3.015_wp*spacing
-    count = 1
-    select case (subject%dim)
-    case (1); count(1) = 17
-    case (2); count(:2) = [11, 9]
-    case (3); count = [8, 7, 6]
-    end select
-    call allocate_points(subject%body, subject%dim, product(count))
-    associate (body => subject%body)
-      n = 0
-      do k = 1, count(3)
-        do j = 1, count(2)
-          do i = 1, count(1)
-            n = n + 1
-            body%x(n, 1) = (i - 0.5_wp)*spacing
-            if (subject%dim > 1) body%x(n, 2) = (j - 0.5_wp)*spacing
-            if (subject%dim > 2) body%x(n, 3) = (k - 0.5_wp)*spacing
-          end do
-        end do
-      end do
-      body%volume = spacing**subject%dim*depth(subject%dim)
-      body%spacing = spacing
-      body%body = 1_i2
-      body%grid = 1_i2
-      body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
-      allocate (materials(merge(2, 1, subject%two_materials)))
-      body%material = 1_i2
-      if (subject%two_materials) where (body%x(:, 1) > 5.2_wp*spacing) body%material = 2_i2
-      do i = 1, size(materials)
-        materials(i) = new_material(i*youngs_modulus, subject%poissons_ratio/i, 7850.0_wp, &
-          & subject%dim, &
-          & subject%plane_strain, depth(2), depth(1), delta, subject%bond_based)
-        materials(i)%expansion = 1.2e-5_wp*i
-        if (subject%breaking) materials(i)%critical_stretch = 0.01_wp*i
-        if (subject%breaking) materials(i)%break_in_compression = .true.
-      end do
-      if (subject%hole) then
-        allocate (keep(body%n_points), source=.true.)
-        if (subject%dim > 1) then
-          do i = 1, body%n_points
-            keep(i) = norm2(body%x(i, &
-              & :) - (count(:subject%dim)/2 + 0.5_wp)*spacing) > 1.2_wp*spacing
-          end do
-        else
-          keep(6) = .false.
-        end if
-        call keep_points(body, keep)
-      end if
-      call build_family(subject%kind, body, volume_rule_type(subject%rule, delta), subject%family)
-      allocate (temperature_change(body%n_slots), source=0.0_wp)
-      if (subject%thermal) then
-        do i = 1, body%n_slots
-          temperature_change(i) = 100*sin(real(7*body%point(i), wp))
-        end do
-      end if
-      call new_model(body, materials, subject%projected, spread(.false., 1, body%n_slots), &
-        & temperature_change, subject%model)
-      subject%model%surface = subject%surface
-      if (subject%surface) call surface_factors(body, subject%family, materials, subject%model%D, &
-        & subject%model%S)
-      select type (family => subject%family)
-      type is (lattice_family_type)
-        call build_weights(family, subject%model)
-      end select
-      if (subject%crack .and. subject%dim == 2) then
-        crack%from(:2) = [-1.0_wp, 4.0_wp]*spacing
-        crack%to(:2) = [4.0_wp, 4.1_wp]*spacing
-        call cut_bonds([crack], body, subject%family, cut)
-      else if (subject%crack .and. subject%dim == 3) then
-        crack%centre = [0.0_wp, 3.1_wp, 3.0_wp]*spacing
-        crack%normal = [0.0_wp, 0.3_wp, 1.0_wp]
-        crack%radius = 3.0_wp*spacing
-        call cut_bonds([crack], body, subject%family, cut)
-      end if
-    end associate
-  end subroutine build
-
-  !> Thickness in 2D, area in 1D.
-  pure real(wp) function depth(dim)
-    integer, intent(in) :: dim
-    depth = 1.0_wp
-    if (dim == 2) depth = 2.0e-3_wp
-    if (dim == 1) depth = 3.0e-4_wp
-  end function depth
-
-  !> The subjects: every dimension with every term alone and with all of them. `number` counts on
-  !> until `there` is false.
-  subroutine subject_number(kind, number, subject, there)
-    character(*), intent(in) :: kind
-    integer, intent(in) :: number
-    type(subject_type), intent(out) :: subject
-    logical, intent(out) :: there
-    integer, parameter :: variants = 14
-
-    there = number <= 3*variants
-    if (.not. there) return
-    subject%kind = kind
-    subject%dim = 1 + (number - 1)/variants
-    select case (mod(number - 1, variants) + 1)
-    case (1); subject%bond_based = .true.
-    case (2); subject%projected = .false.
-    case (3); subject%surface = .true.
-    case (4); subject%thermal = .true.
-    case (5); subject%two_materials = .true.
-    case (6); subject%crack = .true.
-    case (7); subject%hole = .true.
-    case (8); subject%rule = volume_none
-    case (9); subject%rule = volume_linear_extended
-    case (10); subject%rule = volume_exact
-    case (11)
-      subject%bond_based = .true.
-      subject%surface = .true.
-      subject%thermal = .true.
-      subject%two_materials = .true.
-    case (12)
-      subject%poissons_ratio = 0.4_wp
-      subject%plane_strain = .true.
-      subject%crack = .true.
-      subject%hole = .true.
-    case (13)
-      subject%projected = .false.
-      subject%poissons_ratio = 0.4_wp
-      subject%surface = .true.
-      subject%thermal = .true.
-      subject%two_materials = .true.
-      subject%crack = .true.
-      subject%hole = .true.
-      subject%breaking = .true.
-    case (14)
-      subject%surface = .true.
-      subject%thermal = .true.
-      subject%two_materials = .true.
-      subject%crack = .true.
-      subject%hole = .true.
-      subject%rule = volume_exact
-    end select
-    call build(subject)
-  end subroutine subject_number
-
-  !> What a subject is, for messages.
-  function name_of(subject, number) result(name)
-    type(subject_type), intent(in) :: subject
-    integer, intent(in) :: number
-    character(:), allocatable :: name
-    character(40) :: buffer
-    write (buffer, '(2a, i0, a, i0)') trim(subject%kind), ', ', subject%dim, 'D, subject ', number
-    name = trim(buffer)
-  end function name_of
-
-  !> Forces and dilatation coefficients by the fast loops.
-  subroutine fast_force(subject, u, force, p)
-    type(subject_type), intent(inout) :: subject
-    real(wp), intent(in) :: u(:, :)
-    real(wp), allocatable, intent(out) :: force(:, :), p(:)
-    integer(i1), allocatable :: strained(:)
-
-    allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
-    allocate (strained(size(u, 1)), source=0_i1)
-    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
-      & strained)
-    call force_pass(subject%family, subject%model, u, p, force, strained)
-  end subroutine fast_force
-
-  !> A gradient with all components, also where the dimension has no use for them.
-  pure function some_gradient(size_of_it) result(H)
-    real(wp), intent(in) :: size_of_it
-    real(wp) :: H(3, 3)
-    H = size_of_it*reshape([1.0_wp, 0.3_wp, -0.2_wp, 0.7_wp, -0.5_wp, 0.4_wp, 0.1_wp, 0.6_wp, &
-      & 0.8_wp], [3, 3])
-  end function some_gradient
-
-  !> Force, dilatation and energy by both ways. Each is a sum of some 100 terms, with different
-  !> order and forms of the same formula: a few hundred rounding errors of its largest term.
+  !> Force, dilatation and energy by both ways, from tiny strains to large ones, since loops may
+  !> take other formulas for small ones. Each is a sum of some 100 terms, with different order and
+  !> forms of the same formula: a few hundred rounding errors of its largest term; temperatures add
+  !> theirs.
   subroutine test_reference(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
     real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), theta(:), w(:), w_ref(:)
     integer(i1), allocatable :: strained(:)
+    real(wp), parameter :: strains(*) = [1.0e-9_wp, 1.0e-4_wp, 2.0e-3_wp, 0.03_wp, 0.5_wp]
     real(wp) :: largest
-    integer :: kind, number
+    integer :: kind, number, i
     logical :: there
 
     do kind = 1, size(kinds)
@@ -296,23 +61,26 @@ contains
             & source=0.0_wp)
           allocate (strained(n), source=0_i1)
         end associate
-        call shake(subject%body, some_gradient(0.03_wp), 0.02_wp*spacing, 3 + number, u)
-        call fast_force(subject, u, force, p)
-        call reference_force(subject%family, subject%model, u, f_ref)
-        largest = maxval(abs(f_ref))
-        call expect_true(error, largest > 0.0_wp, 'no force: '//name_of(subject, number))
-        call expect(error, maxval(abs(force - f_ref)), 0.0_wp, 1.0e-12_wp*largest, &
-          & 'force, '//name_of(subject, number))
-        if (subject%model%dilatation) then
-          call reference_dilatation(subject%family, subject%model, u, theta)
-          theta = theta*subject%model%materials(subject%model%material)%p
-          call expect(error, maxval(abs(p - theta)), 0.0_wp, 1.0e-12_wp*maxval(abs(theta)), &
-            & 'dilatation, '//name_of(subject, number))
-        end if
-        call energy_pass(subject%family, subject%model, u, w, strained)
-        call reference_energy(subject%family, subject%model, u, w_ref)
-        call expect(error, maxval(abs(w - w_ref)), 0.0_wp, 1.0e-12_wp*maxval(abs(w_ref)), &
-          & 'energy, '//name_of(subject, number))
+        do i = 1, size(strains)
+          call shake(subject%body, some_gradient(strains(i)), 0.5_wp*strains(i)*spacing, &
+            & 3 + number, u)
+          call fast_force(subject, u, force, p)
+          call reference_force(subject%family, subject%model, u, f_ref)
+          largest = maxval(abs(f_ref))
+          call expect_true(error, largest > 0.0_wp, 'no force: '//name_of(subject, number))
+          call expect(error, maxval(abs(force - f_ref)), 0.0_wp, 1.0e-12_wp*largest, &
+            & 'force, '//name_of(subject, number))
+          if (subject%model%dilatation) then
+            call reference_dilatation(subject%family, subject%model, u, theta)
+            theta = theta*subject%model%materials(subject%model%material)%p
+            call expect(error, maxval(abs(p - theta)), 0.0_wp, 1.0e-12_wp*maxval(abs(theta)), &
+              & 'dilatation, '//name_of(subject, number))
+          end if
+          call energy_pass(subject%family, subject%model, u, w, strained)
+          call reference_energy(subject%family, subject%model, u, w_ref)
+          call expect(error, maxval(abs(w - w_ref)), 0.0_wp, 1.0e-12_wp*maxval(abs(w_ref)), &
+            & 'energy, '//name_of(subject, number))
+        end do
         if (allocated(error)) return
       end do
       call expect_true(error, number > 40, 'too few subjects')
@@ -320,7 +88,8 @@ contains
   end subroutine test_reference
 
   !> sum V f = 0 and sum y x V f = 0: action and reaction are equal along the deformed bond. The sum
-  !> of |V f| over all points has an error of one rounding per term; 1e-13 of it leaves some hundred.
+  !> of |V f| over all points has an error of one rounding per term; 1e-13 of it leaves some
+  !> hundred.
   subroutine test_balance(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
@@ -361,9 +130,9 @@ contains
     end do
   end subroutine test_balance
 
-  !> A translation by many body lengths and rotations by any angle. Stretch comes from differences of
-  !> displacements, each rounded to eps |u|: the force may reach eps |u|/|xi| of that of a unit stretch,
-  !> summed over the family. Forces at unit stretch come from a uniform expansion.
+  !> A translation by many body lengths and rotations by any angle. Stretch comes from differences
+  !> of displacements, each rounded to eps |u|: the force may reach eps |u|/|xi| of that of a unit
+  !> stretch, summed over the family. Forces at unit stretch come from a uniform expansion.
   subroutine test_rigid(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: degrees(*) = [1.0e-6_wp, 1.0_wp, 30.0_wp, 77.0_wp, 90.0_wp, 180.0_wp, &
@@ -435,7 +204,7 @@ contains
         allocate (u(subject%body%n_slots, dim))
         call shake(subject%body, some_gradient(0.05_wp), 0.05_wp*spacing, 21, u)
         call fast_force(subject, u, force, p)
-        largest = maxval(abs(force))*spacing**dim*depth(dim)
+        largest = maxval(abs(force))*maxval(subject%body%volume)
         h = 1.0e-5_wp*spacing
         do i = 1, size(chosen)
           k = subject%body%slot(chosen(i))
@@ -529,7 +298,7 @@ contains
 
     do kind = 1, size(kinds)
       subject = subject_type(kind=kinds(kind), dim=2, bond_based=.true., rule=volume_none)
-      call two_points(subject)
+      call build_pair(subject)
       k = subject%body%slot(1)
       j = subject%body%slot(2)
       allocate (u(subject%body%n_slots, 2))
@@ -558,29 +327,6 @@ contains
       deallocate (u)
     end do
   end subroutine test_stretch
-
-  !> Two points one spacing and a bit apart, aslant.
-  subroutine two_points(subject)
-    type(subject_type), intent(inout) :: subject
-    real(wp) :: zero(2)
-
-    call allocate_points(subject%body, 2, 2)
-    subject%body%x(1, :) = [0.5_wp, 0.5_wp]*spacing
-    subject%body%x(2, :) = [1.5_wp, 0.5_wp]*spacing
-    subject%body%volume = spacing**2*depth(2)
-    subject%body%spacing = spacing
-    subject%body%body = 1_i2
-    subject%body%material = 1_i2
-    subject%body%grid = 1_i2
-    call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
-      & subject%family)
-    zero = 0.0_wp
-    call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
-      & depth(2), &
-      & depth(1), 2*spacing, subject%bond_based)], subject%projected, &
-      & spread(.false., 1, subject%body%n_slots), spread(0.0_wp, 1, subject%body%n_slots), &
-      & subject%model)
-  end subroutine two_points
 
   !> All points at one place, and some exactly on top of others: no NaN, no infinity, in fast loops
   !> and reference, in force and energy. The checked build also traps what would make one.
@@ -626,12 +372,12 @@ contains
     end do
   end subroutine test_crushed
 
-  !> Strained slots are found by the passes, and every broken bond is broken from both its ends: damage
-  !> weighted by family volumes balances, and the energy that is gone is what was dissipated.
+  !> Strained slots are found by the passes, and every broken bond is broken from both its ends:
+  !> damage weighted by family volumes balances, and the energy that is gone is what was dissipated.
   subroutine test_breaking(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
-    real(wp), allocatable :: u(:, :), p(:), force(:, :), damage(:), again(:)
+    real(wp), allocatable :: u(:, :), damage(:), again(:)
     integer(i1), allocatable :: strained(:)
     integer(i4), allocatable :: slots(:)
     integer(i8) :: broken
@@ -643,15 +389,13 @@ contains
         subject = subject_type(kind=kinds(kind), dim=dim, breaking=.true., two_materials=.true.)
         call build(subject)
         associate (n => subject%body%n_slots)
-          if (allocated(u)) deallocate (u, p, force, damage, again, strained)
-          allocate (u(n, dim), p(n), force(n, dim), damage(n), again(n), source=0.0_wp)
+          if (allocated(u)) deallocate (u, damage, again, strained)
+          allocate (u(n, dim), damage(n), again(n), source=0.0_wp)
           allocate (strained(n), source=0_i1)
         end associate
         call shake(subject%body, some_gradient(0.0_wp), 0.012_wp*spacing, 41, u)
         before = total_energy(subject, u)
-        if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
-          & strained)
-        call force_pass(subject%family, subject%model, u, p, force, strained)
+        call mark(subject, u, strained)
         call strained_slots(strained, slots)
         call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
           & dissipated)
@@ -665,9 +409,7 @@ contains
         call expect(error, maxval(abs(damage - again)), 0.0_wp, 0.0_wp, 'damage, ' &
           & //name_of(subject, 0))
         ! a second look at the same state finds nothing more
-        if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
-          & strained)
-        call force_pass(subject%family, subject%model, u, p, force, strained)
+        call mark(subject, u, strained)
         call strained_slots(strained, slots)
         call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
           & dissipated)
@@ -676,6 +418,21 @@ contains
       end do
     end do
   end subroutine test_breaking
+
+  !> The strained slots, as the first pass over the bonds marks them.
+  subroutine mark(subject, u, strained)
+    type(subject_type), intent(inout) :: subject
+    real(wp), intent(in) :: u(:, :)
+    integer(i1), intent(inout) :: strained(:)
+    real(wp), allocatable :: force(:, :), p(:)
+
+    allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
+    if (subject%model%dilatation) then
+      call dilatation_pass(subject%family, subject%model, u, p, strained)
+    else
+      call force_pass(subject%family, subject%model, u, p, force, strained)
+    end if
+  end subroutine mark
 
   !> Pairs within the horizon whose stretch |y|/|xi| - 1 is beyond the smaller of the ends' limits,
   !> counted over all pairs of points.

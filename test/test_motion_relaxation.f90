@@ -33,8 +33,8 @@ contains
       & new_unittest('a bar torn in two rests again', test_torn)]
   end subroutine collect_motion_relaxation
 
-  !> Bodies held at x_min by a layer and pulled at x_max: thick and thin, one material and two, with and
-  !> without surface correction.
+  !> Bodies held at x_min by a layer and pulled at x_max: thick and thin, one material and two, with
+  !> and without surface correction.
   subroutine body_number(number, scene, name)
     integer, intent(in) :: number
     type(scene_type), intent(out) :: scene
@@ -97,7 +97,8 @@ contains
   end subroutine pull
 
   !> Solve K u = b by elimination, K from differences of the forces: exact but for the force's
-  !> curvature, a relative 1e-7. Components across thin bodies have no stiffness and no load: left out.
+  !> curvature, a relative 1e-7. Components across thin bodies have no stiffness and no load: left
+  !> out.
   subroutine direct(system, t, u, error)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
@@ -177,8 +178,8 @@ contains
     if (allocated(fault)) call test_failed(error, fault%message)
   end subroutine relax
 
-  !> The residual is relaxed to 1e-9 of the load; the answer's error is that times the condition of these
-  !> small systems (up to some 1e3): 1e-6 of the largest displacement.
+  !> The residual is relaxed to 1e-9 of the load; the answer's error is that times the condition of
+  !> these small systems (up to some 1e3): 1e-6 of the largest displacement.
   subroutine test_direct(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -255,8 +256,8 @@ contains
     end do
   end subroutine test_load_steps
 
-  !> Pulled at both ends: no net translation or rotation, mirror symmetry, and the strain of a bar that is
-  !> held in its middle.
+  !> Pulled at both ends: no net translation or rotation, mirror symmetry, and the strain of a bar
+  !> that is held in its middle.
   subroutine test_balanced(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -292,7 +293,8 @@ contains
         end do
         associate (k => at_point(body, [4.5_wp, spread(2.5_wp, 1, dim - 1)]*spacing), &
           & j => at_point(body, [3.5_wp, spread(2.5_wp, 1, dim - 1)]*spacing))
-          ! stress over E, whatever ends and edges do: without correction surfaces are softer by half
+          ! stress over E, whatever ends and edges do: without correction surfaces are softer by
+          ! half
           call expect_true(error, (u(k, 1) - u(j, 1))/spacing > -0.8_wp*pressure/youngs_modulus &
             & .and. &
             & (u(k, 1) - u(j, 1))/spacing < -4*pressure/youngs_modulus, 'strain in the middle')
@@ -323,7 +325,7 @@ contains
         scene%loads(2)%side = 'x_max'
         scene%loads(1)%force(2) = 5.0_wp
         scene%loads(2)%force(2) = -5.0_wp
-      case (3)  ! held across, pulled along
+      case default  ! held across, pulled along
         scene%boundaries(1)%displacement(1) = -huge(1.0_wp)
       end select
       call ready(scene, set_up, error)
@@ -374,8 +376,8 @@ contains
       & 'strain energy at rest')
   end subroutine test_released
 
-  !> A layer jumps so far that a wave would pass s_c by far, but the state of rest stays at 0.7 of it:
-  !> nothing breaks. One and a half times that, and it does.
+  !> A layer jumps so far that a wave would pass s_c by far, but the state of rest stays at 0.7 of
+  !> it: nothing breaks. One and a half times that, and it does.
   subroutine test_breaks_at_rest(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -411,8 +413,9 @@ contains
     scene%no_fail(2)%lower(1) = 13*spacing
   end subroutine stretched_bar
 
-  !> After breaking it relaxes again until no bond is beyond its limit: here the middle is torn through, the
-  !> halves are at rest without strain, each with its layer, and what was stored is dissipated.
+  !> After breaking it relaxes again until no bond is beyond its limit: here the middle is torn
+  !> through, the halves are at rest without strain, each with its layer, and what was stored is
+  !> dissipated.
   subroutine test_torn(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

@@ -26,8 +26,8 @@ contains
       & new_unittest('a run has the same bits on 1, 2 and 4 threads', test_threads)]
   end subroutine collect_motion_system
 
-  !> Run a scene for `time` with `steps` steps; the largest imbalance kinetic + strain + dissipated -
-  !> work - (the same at the start), over the largest energy that was in play.
+  !> Run a scene for `time` with `steps` steps; the largest imbalance kinetic + strain + dissipated
+  !> - work - (the same at the start), over the largest energy that was in play.
   subroutine imbalance(scene, time, steps, worst, set_up, error, most)
     type(scene_type), intent(in) :: scene
     real(wp), intent(in) :: time
@@ -129,8 +129,8 @@ contains
     time = 50*set_up%plan%limit
   end subroutine ready_bare
 
-  !> At a kink of the imposed speed the inertia of the layer jumps, and the work of that one step is off
-  !> by half the jump: first order, and small.
+  !> At a kink of the imposed speed the inertia of the layer jumps, and the work of that one step is
+  !> off by half the jump: first order, and small.
   subroutine test_kink(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -151,10 +151,11 @@ contains
     call expect_true(error, coarse > 3*fine, 'the imbalance shrinks with the step')
   end subroutine test_kink
 
-  !> A notched plate torn apart by layers that start suddenly. A bond's end falls between two instants,
-  !> so the imbalance is of first order in the step: measured 5 % at 0.8 of the stable step and half
-  !> as much with every halving. It must be no more than the step's error: a quarter of the step, less
-  !> than 0.4 of it; and far less than what was dissipated, which is a good part of all energy.
+  !> A notched plate torn apart by layers that start suddenly. A bond's end falls between two
+  !> instants, so the imbalance is of first order in the step: measured 5 % at 0.8 of the stable
+  !> step and half as much with every halving. It must be no more than the step's error: a quarter
+  !> of the step, less than 0.4 of it; and far less than what was dissipated, which is a good part
+  !> of all energy.
   subroutine test_fracture(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

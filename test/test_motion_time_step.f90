@@ -121,9 +121,10 @@ contains
     end associate
   end subroutine power_iteration
 
-  !> dt <= 2/omega_max by Gershgorin, on every body, with and without surface factors; and no less than
-  !> a fifth of it, or something would be counted twice (measured: bars 0.83, plates 0.53 to 0.58, blocks
-  !> 0.29 at nu = 0.42 and 0.47 to 0.49 else: the bound takes every bond as if it lay along the motion).
+  !> dt <= 2/omega_max by Gershgorin, on every body, with and without surface factors; and no less
+  !> than a fifth of it, or something would be counted twice (measured: bars 0.83, plates 0.53 to
+  !> 0.58, blocks 0.29 at nu = 0.42 and 0.47 to 0.49 else: the bound takes every bond as if it lay
+  !> along the motion).
   subroutine test_limit(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -148,8 +149,9 @@ contains
     end do
   end subroutine test_limit
 
-  !> 300 steps from random velocities: leapfrog keeps an energy that is positive below the limit. The
-  !> energies shown at t_n are larger by up to 1/(1 - 0.99^2) = 50 times in the mode at the limit.
+  !> 300 steps from random velocities: leapfrog keeps an energy that is positive below the limit.
+  !> The energies shown at t_n are larger by up to 1/(1 - 0.99^2) = 50 times in the mode at the
+  !> limit.
   subroutine test_bounded(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

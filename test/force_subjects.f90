@@ -1,0 +1,288 @@
+!> Bodies on which force loops are tried: every dimension with every term of the force alone and
+!> with all of them, on every kind of family. A new kind joins by one line in `kinds` and one in
+!> `build_family`.
+module force_subjects
+  use pd_base_kinds, only: wp, i1, i2, i8
+  use pd_base_error, only: fault_type => error_type
+  use pd_body_body, only: body_type, allocate_points, keep_points
+  use pd_body_material, only: material_type, new_material
+  use pd_family_cracks, only: cut_bonds
+  use pd_family_family, only: family_type
+  use pd_family_lattice, only: lattice_family_type, new_lattice_family
+  use pd_family_list, only: list_family_type, new_list_family
+  use pd_family_surface, only: surface_factors
+  use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
+    & volume_linear_extended, &
+    & volume_exact
+  use pd_force_forces, only: dilatation_pass, force_pass
+  use pd_force_model, only: model_type, new_model
+  use pd_force_weights, only: build_weights
+  use pd_scene_types, only: crack_group
+  use bodies, only: youngs_modulus
+  implicit none (type, external)
+  private
+  public :: subject_type, kinds, spacing, build, build_pair, subject_number, name_of, fast_force, &
+    & some_gradient
+
+  !> The kinds of families that must keep the contract.
+  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'lattice']
+
+  !> Of every body here [m]; a power of 2, so that positions are exact.
+  real(wp), parameter :: spacing = 2.0_wp**(-10)
+
+  !> One body under test, and which terms its force has.
+  type :: subject_type
+    character(8) :: kind = 'list'
+    integer :: dim = 1
+    real(wp) :: poissons_ratio = 0.2_wp
+    logical :: bond_based = .false.
+    logical :: plane_strain = .false.
+    logical :: projected = .true.
+    logical :: surface = .false.
+    logical :: thermal = .false.
+    logical :: two_materials = .false.
+    logical :: hole = .false.
+    logical :: crack = .false.
+    logical :: breaking = .false.
+    integer :: rule = volume_linear
+    type(body_type) :: body
+    class(family_type), allocatable :: family
+    type(model_type) :: model
+  end type subject_type
+
+contains
+
+  !> The one place that knows the kinds of families.
+  subroutine build_family(kind, body, rule, breakable, family)
+    character(*), intent(in) :: kind
+    type(body_type), intent(inout) :: body
+    type(volume_rule_type), intent(in) :: rule
+    logical, intent(in) :: breakable
+    class(family_type), allocatable, intent(out) :: family
+    type(list_family_type), allocatable :: list
+    type(lattice_family_type), allocatable :: lattice
+    type(fault_type), allocatable :: fault
+
+    select case (kind)
+    case ('list')
+      allocate (list)
+      call new_list_family(body, rule, list)
+      call move_alloc(list, family)
+    case default
+      allocate (lattice)
+      call new_lattice_family(body, rule, breakable, lattice, fault)
+      call move_alloc(lattice, family)
+    end select
+  end subroutine build_family
+
+  !> What a family keeps of the model once that is complete.
+  subroutine finish_family(subject)
+    type(subject_type), intent(inout) :: subject
+    select type (family => subject%family)
+    type is (lattice_family_type)
+      call build_weights(family, subject%model)
+    end select
+  end subroutine finish_family
+
+  !> Lay out body, family and model of a subject.
+  subroutine build(subject)
+    type(subject_type), intent(inout) :: subject
+    type(material_type), allocatable :: materials(:)
+    type(crack_group) :: crack
+    real(wp), allocatable :: temperature_change(:)
+    logical, allocatable :: keep(:)
+    integer :: count(3), i, j, k, n
+    integer(i8) :: cut
+    real(wp) :: delta
+
+    delta = 3.015_wp*spacing
+    count = 1
+    select case (subject%dim)
+    case (1); count(1) = 17
+    case (2); count(:2) = [11, 9]
+    case default; count = [8, 7, 6]
+    end select
+    call allocate_points(subject%body, subject%dim, product(count))
+    associate (body => subject%body)
+      n = 0
+      do k = 1, count(3)
+        do j = 1, count(2)
+          do i = 1, count(1)
+            n = n + 1
+            body%x(n, 1) = (i - 0.5_wp)*spacing
+            if (subject%dim > 1) body%x(n, 2) = (j - 0.5_wp)*spacing
+            if (subject%dim > 2) body%x(n, 3) = (k - 0.5_wp)*spacing
+          end do
+        end do
+      end do
+      body%volume = spacing**subject%dim*depth(subject%dim)
+      body%spacing = spacing
+      body%body = 1_i2
+      body%grid = 1_i2
+      allocate (materials(merge(2, 1, subject%two_materials)))
+      body%material = 1_i2
+      if (subject%two_materials) where (body%x(:, 1) > 5.2_wp*spacing) body%material = 2_i2
+      do i = 1, size(materials)
+        materials(i) = new_material(i*youngs_modulus, subject%poissons_ratio/i, 7850.0_wp, &
+          & subject%dim, &
+          & subject%plane_strain, depth(2), depth(1), delta, subject%bond_based)
+        materials(i)%expansion = 1.2e-5_wp*i
+        if (subject%breaking) materials(i)%critical_stretch = 0.01_wp*i
+        if (subject%breaking) materials(i)%break_in_compression = .true.
+      end do
+      if (subject%hole) then
+        allocate (keep(body%n_points), source=.true.)
+        if (subject%dim > 1) then
+          do i = 1, body%n_points
+            keep(i) = norm2(body%x(i, &
+              & :) - (count(:subject%dim)/2 + 0.5_wp)*spacing) > 1.2_wp*spacing
+          end do
+        else
+          keep(6) = .false.
+        end if
+        call keep_points(body, keep)
+      end if
+      call build_family(subject%kind, body, volume_rule_type(subject%rule, delta), &
+        & subject%crack .or. subject%breaking, subject%family)
+      allocate (temperature_change(body%n_slots), source=0.0_wp)
+      if (subject%thermal) then
+        do i = 1, body%n_slots
+          temperature_change(i) = 100*sin(real(7*body%point(i), wp))
+        end do
+      end if
+      call new_model(body, materials, subject%projected, spread(.false., 1, body%n_slots), &
+        & temperature_change, subject%model)
+      subject%model%surface = subject%surface
+      if (subject%surface) call surface_factors(body, subject%family, materials, subject%model%D, &
+        & subject%model%S)
+      call finish_family(subject)
+      if (subject%crack .and. subject%dim == 2) then
+        crack%from(:2) = [-1.0_wp, 4.0_wp]*spacing
+        crack%to(:2) = [4.0_wp, 4.1_wp]*spacing
+        call cut_bonds([crack], body, subject%family, cut)
+      else if (subject%crack .and. subject%dim == 3) then
+        crack%centre = [0.0_wp, 3.1_wp, 3.0_wp]*spacing
+        crack%normal = [0.0_wp, 0.3_wp, 1.0_wp]
+        crack%radius = 3.0_wp*spacing
+        call cut_bonds([crack], body, subject%family, cut)
+      end if
+    end associate
+  end subroutine build
+
+  !> Thickness in 2D, area in 1D.
+  pure real(wp) function depth(dim)
+    integer, intent(in) :: dim
+    depth = 1.0_wp
+    if (dim == 2) depth = 2.0e-3_wp
+    if (dim == 1) depth = 3.0e-4_wp
+  end function depth
+
+  !> The subjects: every dimension with every term alone and with all of them. `number` counts on
+  !> until `there` is false.
+  subroutine subject_number(kind, number, subject, there)
+    character(*), intent(in) :: kind
+    integer, intent(in) :: number
+    type(subject_type), intent(out) :: subject
+    logical, intent(out) :: there
+    integer, parameter :: variants = 14
+
+    there = number <= 3*variants
+    if (.not. there) return
+    subject%kind = kind
+    subject%dim = 1 + (number - 1)/variants
+    select case (mod(number - 1, variants) + 1)
+    case (1); subject%bond_based = .true.
+    case (2); subject%projected = .false.
+    case (3); subject%surface = .true.
+    case (4); subject%thermal = .true.
+    case (5); subject%two_materials = .true.
+    case (6); subject%crack = .true.
+    case (7); subject%hole = .true.
+    case (8); subject%rule = volume_none
+    case (9); subject%rule = volume_linear_extended
+    case (10); subject%rule = volume_exact
+    case (11)
+      subject%bond_based = .true.
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+    case (12)
+      subject%poissons_ratio = 0.4_wp
+      subject%plane_strain = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+    case (13)
+      subject%projected = .false.
+      subject%poissons_ratio = 0.4_wp
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+      subject%breaking = .true.
+    case default
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+      subject%rule = volume_exact
+    end select
+    call build(subject)
+  end subroutine subject_number
+
+  !> What a subject is, for messages.
+  function name_of(subject, number) result(name)
+    type(subject_type), intent(in) :: subject
+    integer, intent(in) :: number
+    character(:), allocatable :: name
+    character(40) :: buffer
+    write (buffer, '(2a, i0, a, i0)') trim(subject%kind), ', ', subject%dim, 'D, subject ', number
+    name = trim(buffer)
+  end function name_of
+
+  !> Forces and dilatation coefficients by the fast loops.
+  subroutine fast_force(subject, u, force, p)
+    type(subject_type), intent(inout) :: subject
+    real(wp), intent(in) :: u(:, :)
+    real(wp), allocatable, intent(out) :: force(:, :), p(:)
+    integer(i1), allocatable :: strained(:)
+
+    allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
+    allocate (strained(size(u, 1)), source=0_i1)
+    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
+      & strained)
+    call force_pass(subject%family, subject%model, u, p, force, strained)
+  end subroutine fast_force
+
+  !> A gradient with all components, also where the dimension has no use for them.
+  pure function some_gradient(size_of_it) result(H)
+    real(wp), intent(in) :: size_of_it
+    real(wp) :: H(3, 3)
+    H = size_of_it*reshape([1.0_wp, 0.3_wp, -0.2_wp, 0.7_wp, -0.5_wp, 0.4_wp, 0.1_wp, 0.6_wp, &
+      & 0.8_wp], [3, 3])
+  end function some_gradient
+
+  !> Two points of a plane one spacing apart along x, the horizon two spacings.
+  subroutine build_pair(subject)
+    type(subject_type), intent(inout) :: subject
+
+    call allocate_points(subject%body, 2, 2)
+    subject%body%x(1, :) = [0.5_wp, 0.5_wp]*spacing
+    subject%body%x(2, :) = [1.5_wp, 0.5_wp]*spacing
+    subject%body%volume = spacing**2*depth(2)
+    subject%body%spacing = spacing
+    subject%body%body = 1_i2
+    subject%body%material = 1_i2
+    subject%body%grid = 1_i2
+    call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
+      & .false., subject%family)
+    call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
+      & depth(2), &
+      & depth(1), 2*spacing, subject%bond_based)], subject%projected, &
+      & spread(.false., 1, subject%body%n_slots), spread(0.0_wp, 1, subject%body%n_slots), &
+      & subject%model)
+    call finish_family(subject)
+  end subroutine build_pair
+
+end module force_subjects
