@@ -4,7 +4,7 @@
 module force_subjects
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_base_error, only: fault_type => error_type
-  use pd_body_body, only: body_type, allocate_points, keep_points
+  use pd_body_body, only: body_type, grid_type, allocate_points, keep_points
   use pd_body_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
   use pd_family_family, only: family_type
@@ -119,6 +119,7 @@ contains
       body%spacing = spacing
       body%body = 1_i2
       body%grid = 1_i2
+      body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
       allocate (materials(merge(2, 1, subject%two_materials)))
       body%material = 1_i2
       if (subject%two_materials) where (body%x(:, 1) > 5.2_wp*spacing) body%material = 2_i2
@@ -275,6 +276,7 @@ contains
     subject%body%body = 1_i2
     subject%body%material = 1_i2
     subject%body%grid = 1_i2
+    subject%body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
     call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
       & .false., subject%family)
     call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
