@@ -28,7 +28,7 @@ contains
   subroutine list_dilatation(family, model, u, p, strained)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(out) :: p(:)
     integer(i1), intent(inout) :: strained(:)
     type(stage_type) :: stage
@@ -42,7 +42,7 @@ contains
       first = family%start(k)
       n = int(family%start(k + 1) - first)
       call deform(family, model, u, k, n, first, stage, strained)
-      call factors(model%surface, model%dim, n, family%neighbour(first:first + n - 1), k, &
+      call factors(model, n, family%neighbour(first:first + n - 1), k, &
         & stage%across, model%D, stage%factor)
       p(k) = model%materials(model%material(k))%p*model%materials(model%material(k))%t* &
         & sum(stage%factor(:n)*stage%stretch(:n)*stage%lambda(:n)*stage%weight(:n))
@@ -54,8 +54,8 @@ contains
   subroutine list_force(family, model, u, p, force, strained)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(in) :: p(:)
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(out) :: force(:, :)
     integer(i1), intent(inout) :: strained(:)
     type(stage_type) :: stage
@@ -72,7 +72,7 @@ contains
       n = int(family%start(k + 1) - first)
       call deform(family, model, u, k, n, first, stage, strained)
       associate (neighbour => family%neighbour(first:first + n - 1))
-        call factors(model%surface, model%dim, n, neighbour, k, stage%across, model%S, stage%factor)
+        call factors(model, n, neighbour, k, stage%across, model%S, stage%factor)
         if (size(model%materials) == 1) then
           q = 2*model%materials(1)%q
           stage%stretch(:n) = q*stage%factor(:n)*stage%stretch(:n)
@@ -84,7 +84,7 @@ contains
           end do
         end if
         if (model%dilatation) then
-          call factors(model%surface, model%dim, n, neighbour, k, stage%across, model%D, stage%factor)
+          call factors(model, n, neighbour, k, stage%across, model%D, stage%factor)
           do i = 1, n
             j = neighbour(i)
             stage%stretch(i) = stage%stretch(i) &
@@ -103,7 +103,7 @@ contains
   subroutine list_energy(family, model, u, energy, strained)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(out) :: energy(:)
     integer(i1), intent(inout) :: strained(:)
     type(stage_type) :: stage
@@ -119,10 +119,10 @@ contains
       call deform(family, model, u, k, n, first, stage, strained)
       associate (m => model%materials(model%material(k)), &
         & neighbour => family%neighbour(first:first + n - 1))
-        call factors(model%surface, model%dim, n, neighbour, k, stage%across, model%S, stage%factor)
+        call factors(model, n, neighbour, k, stage%across, model%S, stage%factor)
         energy(k) = m%q/2*sum(stage%factor(:n)*stage%stretch(:n)**2*stage%length(:n)*stage%weight(:n))
         if (abs(m%a) > 0.0_wp) then
-          call factors(model%surface, model%dim, n, neighbour, k, stage%across, model%D, stage%factor)
+          call factors(model, n, neighbour, k, stage%across, model%D, stage%factor)
           energy(k) = energy(k) + m%a*(m%t*sum(stage%factor(:n)*stage%stretch(:n)*stage%lambda(:n) &
             & *stage%weight(:n)))**2
         end if
@@ -142,7 +142,7 @@ contains
   subroutine deform(family, model, u, k, n, first, stage, strained)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in), contiguous :: u(:, :)
     integer, intent(in) :: k, n
     integer(i8), intent(in) :: first
     type(stage_type), intent(inout) :: stage
@@ -151,18 +151,18 @@ contains
     logical :: over
 
     associate (neighbour => family%neighbour(first:first + n - 1), &
-      & intact => family%intact(first:first + n - 1), last => size(u, 1))
+      & intact => family%intact(first:first + n - 1), most => family%most_bonds)
       ! constant dimensions, so that each has a loop of its own
       select case (model%dim)
       case (3)
-        call geometry(3, n, last, neighbour, family%x, u, k, model%surface, stage%normal, stage%across, &
-          & stage%length, stage%stretch, stage%lambda, size(stage%normal, 1))
+        call geometry_3(n, most, family%n_slots, neighbour, family%x, u, k, model%surface, &
+          & stage%normal, stage%across, stage%length, stage%stretch, stage%lambda)
       case (2)
-        call geometry(2, n, last, neighbour, family%x, u, k, model%surface, stage%normal, stage%across, &
-          & stage%length, stage%stretch, stage%lambda, size(stage%normal, 1))
+        call geometry_2(n, most, family%n_slots, neighbour, family%x, u, k, model%surface, &
+          & stage%normal, stage%across, stage%length, stage%stretch, stage%lambda)
       case default
-        call geometry(1, n, last, neighbour, family%x, u, k, model%surface, stage%normal, stage%across, &
-          & stage%length, stage%stretch, stage%lambda, size(stage%normal, 1))
+        call geometry_1(n, most, family%n_slots, neighbour, family%x, u, k, model%surface, &
+          & stage%normal, stage%across, stage%length, stage%stretch, stage%lambda)
       end select
       call weights(family, k, n, neighbour, intact, stage%length, stage%weight)
       if (.not. model%projected) stage%lambda(:n) = 1.0_wp
@@ -195,52 +195,41 @@ contains
     exceeds = stretch > limit*(1 - 1.0e-9_wp) .and. limit >= 0.0_wp .and. intact == 1_i1
   end function exceeds
 
-  !> Stretch, direction and Lambda of n bonds, the arithmetic with one division.
-  pure subroutine geometry(dim, n, last, neighbour, x, u, k, surface, normal, across, length, stretch, &
-    & lambda, most)
-    integer, intent(in) :: dim, n, last, most
-    integer(i4), intent(in) :: neighbour(n)
-    real(wp), intent(in) :: x(last, dim), u(last, dim)
-    integer, intent(in) :: k
-    logical, intent(in) :: surface
-    real(wp), intent(inout) :: normal(most, dim), across(most, dim), length(most), stretch(most), &
-      & lambda(most)
-    real(wp) :: xi(3), eta(3), L2, Ly, y2, y, L, xe, ee, common, inverse_y, xk(3), uk(3)
-    integer :: i, j, c
+  ! One text for all dimensions, code of its own for each: the dimension must be a constant where
+  ! the loops are compiled.
 
-    xk(:dim) = x(k, :)
-    uk(:dim) = u(k, :)
-    !$omp simd private(xi, eta)
-    do i = 1, n
-      j = neighbour(i)
-      L2 = 0.0_wp
-      xe = 0.0_wp
-      ee = 0.0_wp
-      y2 = 0.0_wp
-      do c = 1, dim
-        xi(c) = x(j, c) - xk(c)
-        eta(c) = u(j, c) - uk(c)
-        L2 = L2 + xi(c)**2
-        xe = xe + xi(c)*eta(c)
-        ee = ee + eta(c)**2
-        y2 = y2 + (xi(c) + eta(c))**2
-      end do
-      L = sqrt(L2)
-      y = sqrt(y2)
-      ! the tiny term lets the force of a bond crushed to a point vanish instead of being NaN
-      y2 = y2 + 1.0e-30_wp*L2
-      Ly = L*(y + L)
-      common = 1.0_wp/(Ly*y2)
-      length(i) = L
-      stretch(i) = (2*xe + ee)*y2*common
-      inverse_y = y*Ly*common
-      lambda(i) = (L2 + xe)*inverse_y*(y2*(y + L)*common)
-      do c = 1, dim
-        normal(i, c) = (xi(c) + eta(c))*inverse_y
-        if (surface) across(i, c) = xi(c)**2/L2
-      end do
-    end do
-  end subroutine geometry
+  pure subroutine geometry_1(n, most, n_slots, neighbour, x, u, k, surface, normal, across, &
+    & length, stretch, lambda)
+    integer, parameter :: dim = 1
+    include 'bond_geometry.inc'
+  end subroutine geometry_1
+
+  pure subroutine geometry_2(n, most, n_slots, neighbour, x, u, k, surface, normal, across, &
+    & length, stretch, lambda)
+    integer, parameter :: dim = 2
+    include 'bond_geometry.inc'
+  end subroutine geometry_2
+
+  pure subroutine geometry_3(n, most, n_slots, neighbour, x, u, k, surface, normal, across, &
+    & length, stretch, lambda)
+    integer, parameter :: dim = 3
+    include 'bond_geometry.inc'
+  end subroutine geometry_3
+
+  pure subroutine factors_1(n, most, n_slots, neighbour, k, across, g, factor)
+    integer, parameter :: dim = 1
+    include 'bond_factors.inc'
+  end subroutine factors_1
+
+  pure subroutine factors_2(n, most, n_slots, neighbour, k, across, g, factor)
+    integer, parameter :: dim = 2
+    include 'bond_factors.inc'
+  end subroutine factors_2
+
+  pure subroutine factors_3(n, most, n_slots, neighbour, k, across, g, factor)
+    integer, parameter :: dim = 3
+    include 'bond_factors.inc'
+  end subroutine factors_3
 
   !> v_c V_j of n bonds, 0 for broken ones.
   pure subroutine weights(family, k, n, neighbour, intact, length, weight)
@@ -248,8 +237,8 @@ contains
     integer, intent(in) :: k, n
     integer(i4), intent(in) :: neighbour(n)
     integer(i1), intent(in) :: intact(n)
-    real(wp), intent(in) :: length(:)
-    real(wp), intent(inout) :: weight(:)
+    real(wp), intent(in) :: length(n)
+    real(wp), intent(inout) :: weight(n)
     real(wp) :: spacing
     integer :: i, j
 
@@ -273,29 +262,27 @@ contains
   end subroutine weights
 
   !> Surface factors G of n bonds from those of their ends (7.7); 1 without surface correction.
-  pure subroutine factors(surface, dim, n, neighbour, k, across, g, factor)
-    logical, intent(in) :: surface
-    integer, intent(in) :: dim, n
+  pure subroutine factors(model, n, neighbour, k, across, g, factor)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: n
     integer(i4), intent(in) :: neighbour(n)
     integer, intent(in) :: k
-    real(wp), intent(in) :: across(:, :)
+    real(wp), intent(in), contiguous :: across(:, :)
     real(wp), allocatable, intent(in) :: g(:, :)
-    real(wp), intent(inout) :: factor(:)
-    real(wp) :: sum2
-    integer :: i, c
+    real(wp), intent(inout), contiguous :: factor(:)
 
-    if (.not. surface) then
+    if (.not. model%surface) then
       factor(:n) = 1.0_wp
       return
     end if
-    !$omp simd private(sum2)
-    do i = 1, n
-      sum2 = 0.0_wp
-      do c = 1, dim
-        sum2 = sum2 + across(i, c)*(2/(g(k, c) + g(neighbour(i), c)))**2
-      end do
-      factor(i) = 1.0_wp/sqrt(sum2)
-    end do
+    select case (model%dim)
+    case (3)
+      call factors_3(n, size(across, 1), size(g, 1), neighbour, k, across, g, factor)
+    case (2)
+      call factors_2(n, size(across, 1), size(g, 1), neighbour, k, across, g, factor)
+    case default
+      call factors_1(n, size(across, 1), size(g, 1), neighbour, k, across, g, factor)
+    end select
   end subroutine factors
 
 end module pd_force_list
