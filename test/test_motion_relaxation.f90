@@ -384,20 +384,23 @@ contains
     type(set_up_type) :: set_up
     type(diary_type) :: diary
 
-    call stretched_bar(scene)
+    call stretched_bar(3.0_wp, scene)
     scene%boundaries(2)%displacement(1) = 0.7e-2_wp*20*spacing
     call relax(scene, set_up, diary, error)
+    if (allocated(error)) return
     call expect_true(error, set_up%system%broken == 0_i8, 'bonds broke on the way to rest')
     call expect(error, maxval(set_up%system%state%damage), 0.0_wp, 0.0_wp, 'damage')
     scene%boundaries(2)%displacement(1) = 1.4e-2_wp*20*spacing
     call relax(scene, set_up, diary, error)
+    if (allocated(error)) return
     call expect_true(error, set_up%system%broken > 0_i8, &
       & 'no bond broke beyond the critical stretch')
   end subroutine test_breaks_at_rest
 
   !> A bar between layers, in one load step, s_c = 0.01. Its ends are softer and stretch more: they
   !> are held from breaking.
-  subroutine stretched_bar(scene)
+  subroutine stretched_bar(zone, scene)
+    real(wp), intent(in) :: zone   !! width of the no-fail zone at each end [spacings]
     type(scene_type), intent(out) :: scene
 
     call box_scene([20], spacing, 0.3_wp, scene)
@@ -409,8 +412,8 @@ contains
     scene%boundaries(2)%side = 'x_max'
     scene%materials(1)%critical_stretch = 0.01_wp
     scene%no_fail%shape = 'box'
-    scene%no_fail(1)%upper(1) = 7*spacing
-    scene%no_fail(2)%lower(1) = 13*spacing
+    scene%no_fail(1)%upper(1) = zone*spacing
+    scene%no_fail(2)%lower(1) = (20 - zone)*spacing
   end subroutine stretched_bar
 
   !> After breaking it relaxes again until no bond is beyond its limit: here the middle is torn
@@ -424,7 +427,7 @@ contains
     real(wp) :: jump
     integer :: k
 
-    call stretched_bar(scene)
+    call stretched_bar(7.0_wp, scene)
     jump = 3.0e-2_wp*20*spacing
     scene%boundaries(2)%displacement(1) = jump
     scene%relaxation%load_steps = 5
