@@ -416,9 +416,9 @@ contains
     scene%no_fail(2)%lower(1) = (20 - zone)*spacing
   end subroutine stretched_bar
 
-  !> After breaking it relaxes again until no bond is beyond its limit, in one load step as in five: here
-  !> the middle is torn through, the halves are at rest without strain, each with its layer, and what was
-  !> stored is dissipated.
+  !> After breaking it relaxes again until no bond is beyond its limit, in one load step as in five:
+  !> here the middle is torn through, the halves are at rest without strain, each with its layer,
+  !> and what was stored is dissipated.
   subroutine test_torn(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -445,7 +445,8 @@ contains
         ! what a strain of s_c would store in the bar
         call expect(error, diary%strain(diary%n), 0.0_wp, 1.0e-6_wp*youngs_modulus*0.01_wp**2/2 &
           & *20*spacing*3.0e-4_wp, 'strain energy')
-        call expect_true(error, system%broken > 0_i8 .and. system%dissipated > 0.0_wp, 'nothing broke')
+        call expect_true(error, system%broken > 0_i8 .and. system%dissipated > 0.0_wp, &
+          & 'nothing broke')
       end associate
     end do
   end subroutine test_torn
