@@ -54,7 +54,7 @@ contains
       case (2)
         n = [cos(2*pi*i/angles), sin(2*pi*i/angles), 0.0_wp]
         sum_of_directions = sum_of_directions + 2*pi/angles*dot_product(n, matmul(strain, n))**m
-      case (3)
+      case default
         do j = 1, size(node)
           n = [sqrt(1 - node(j)**2)*cos(2*pi*i/angles), sqrt(1 - node(j)**2)*sin(2*pi*i/angles), &
             & node(j)]

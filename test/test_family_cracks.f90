@@ -300,6 +300,7 @@ contains
       scene%cracks(:)%to(2) = 4.0_wp
       if (c == 1) call ready(scene, once, error)
       if (c == 2) call ready(scene, twice, error)
+      if (allocated(error)) return
     end do
     if (allocated(error)) return
     call expect_true(error, once%cut > 0 .and. once%cut == twice%cut, &

@@ -133,6 +133,7 @@ contains
 
     if (allocated(error)) return
     call measure(points, poissons_ratio, .true., found, error)
+    if (allocated(error)) return
     do n = 0, 3
       call expect(error, found%dilatation(n), 0.0_wp, allowed%dilatation(n), &
         & name//', dilatation of stretch, '//places(n))
@@ -155,6 +156,7 @@ contains
 
     do dim = 1, 3
       call measure(points(:dim), 0.2_wp, .true., with, error)
+      if (allocated(error)) return
       call measure(points(:dim), 0.2_wp, .false., without, error)
       if (allocated(error)) return
       call expect_true(error, without%dilatation(1) > 1.7_wp*with%dilatation(1) .and. &
@@ -267,6 +269,7 @@ contains
     call box_scene([12, 10], spacing, 0.3_wp, scene)
     scene%horizon%surface_correction = 'energy'
     call ready(scene, whole, error)
+    if (allocated(error)) return
     deallocate (scene%cracks)
     allocate (scene%cracks(1))
     scene%cracks(1)%from(:2) = [0.0_wp, 5*spacing]

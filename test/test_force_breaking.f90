@@ -77,6 +77,7 @@ contains
     call expect_true(error, set_up%system%broken == 0, 'compression broke bonds unasked')
     scene%materials(1)%break_in_compression = .true.
     call ready(scene, set_up, error)
+    if (allocated(error)) return
     call expand(set_up, -critical*(1 - 1.0e-12_wp))
     call expect_true(error, set_up%system%broken == 0, 'broken below the limit')
     call expand(set_up, -critical*(1 + 1.0e-12_wp))
@@ -125,6 +126,7 @@ contains
       & 'bonds left within the tougher half')
     scene%materials(1)%break_in_compression = .true.
     call ready(scene, set_up, error)
+    if (allocated(error)) return
     call expand(set_up, -2*critical)
     call expect_true(error, set_up%system%broken == pairs(9, 8), 'bonds broken in compression')
   end subroutine test_interface
@@ -202,6 +204,7 @@ contains
     call expect_true(error, set_up%system%broken == 0, 'held heating')
     scene%initial(1)%temperature_change = -scene%initial(1)%temperature_change
     call ready(scene, set_up, error)
+    if (allocated(error)) return
     call expand(set_up, 0.0_wp)
     call expect_true(error, 2*set_up%system%broken == set_up%system%family%n_bonds, 'held cooling')
   end subroutine test_thermal
@@ -313,6 +316,7 @@ contains
     allocate (scene%no_fail(1))
     scene%no_fail(1)%shape = 'box'
     call ready(scene, set_up, error)
+    if (allocated(error)) return
     call expect_true(error, .not. set_up%system%model%breaking, &
       & 'a look with a zone over everything')
   end subroutine test_no_breaking

@@ -109,6 +109,7 @@ contains
     if (allocated(error)) return
     time = 20*set_up%plan%limit
     call run(scene, 'runge_kutta', time, 16*steps, truth, error)
+    if (allocated(error)) return
     do i = 1, size(integrators)
       call run(scene, trim(integrators(i)), time, steps, coarse, error)
       call run(scene, trim(integrators(i)), time, 2*steps, fine, error)
@@ -144,6 +145,7 @@ contains
     scene%initial(1)%region = 'right'
     scene%initial(1)%displacement(1) = amplitude
     call ready(scene, set_up, error)
+    if (allocated(error)) return
     ! delta = 1.3 dx: v_c = 0.8
     omega = sqrt(2*youngs_modulus*0.8_wp/density_of_steel)/(1.3_wp*1.0e-2_wp)
   end subroutine oscillator
