@@ -171,8 +171,10 @@ contains
     !> Integral of sqrt(r^2 - t^2) from 0 to t.
     pure real(wp) function primitive(t)
       real(wp), intent(in) :: t
-      primitive = 0.0_wp
-      if (r > 0.0_wp) primitive = (t*sqrt(max(0.0_wp, r**2 - t**2)) + r**2*asin(min(1.0_wp, t/r)))/2
+      real(wp) :: root
+      ! atan2 keeps its digits where t is all but r, and r many times the cell
+      root = sqrt(max(0.0_wp, (r - t)*(r + t)))
+      primitive = (t*root + r**2*atan2(t, root))/2
     end function primitive
   end function corner_in_disc
 

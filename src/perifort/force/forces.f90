@@ -18,9 +18,9 @@ contains
   subroutine dilatation_pass(family, model, u, p, strained)
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(out) :: p(:)
-    integer(i1), intent(inout) :: strained(:)
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: p(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
 
     select type (family)
     type is (list_family_type)
@@ -34,10 +34,10 @@ contains
   subroutine force_pass(family, model, u, p, force, strained)
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(in) :: p(:)
-    real(wp), intent(out) :: force(:, :)
-    integer(i1), intent(inout) :: strained(:)
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(in), contiguous :: p(:)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    integer(i1), intent(inout), contiguous :: strained(:)
 
     select type (family)
     type is (list_family_type)
@@ -51,9 +51,9 @@ contains
   subroutine energy_pass(family, model, u, energy, strained)
     class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(out) :: energy(:)
-    integer(i1), intent(inout) :: strained(:)
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
 
     select type (family)
     type is (list_family_type)

@@ -29,8 +29,8 @@ contains
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(out) :: p(:)
-    integer(i1), intent(inout) :: strained(:)
+    real(wp), intent(inout), contiguous :: p(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
     type(stage_type) :: stage
     integer :: k, n
     integer(i8) :: first
@@ -56,8 +56,8 @@ contains
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(in), contiguous :: p(:)
-    real(wp), intent(out) :: force(:, :)
-    integer(i1), intent(inout) :: strained(:)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    integer(i1), intent(inout), contiguous :: strained(:)
     type(stage_type) :: stage
     integer :: k, n, c, i, j
     integer(i8) :: first
@@ -104,8 +104,8 @@ contains
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(out) :: energy(:)
-    integer(i1), intent(inout) :: strained(:)
+    real(wp), intent(inout), contiguous :: energy(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
     type(stage_type) :: stage
     integer :: k, n
     integer(i8) :: first
@@ -146,7 +146,7 @@ contains
     integer, intent(in) :: k, n
     integer(i8), intent(in) :: first
     type(stage_type), intent(inout) :: stage
-    integer(i1), intent(inout) :: strained(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
     integer :: i, j
     logical :: over
 
