@@ -23,7 +23,8 @@ contains
     integer, intent(in) :: lonely         !! points without a bond
     integer, intent(in) :: threads
     character(:), allocatable :: text
-    integer :: p
+    real(wp) :: distance
+    integer :: p, k
 
     text = ''
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
@@ -50,8 +51,13 @@ contains
       text = text//line('steps', to_text(plan%steps)//', to t = '//with_unit(plan%steps*plan%step, 's', 6))
     end if
     do p = 1, size(probes)
-      text = text//line('probe', probes(p)%name//' is point '// &
-        & to_text(int(system%body%point(probes(p)%slot)))//' at ('//position(system, int(probes(p)%slot))//') m')
+      k = int(probes(p)%slot)
+      text = text//line('probe', probes(p)%name//' is point '//to_text(int(system%body%point(k)))// &
+        & ' at ('//position(system, k)//') m')
+      distance = norm2(system%body%x(k, :) - scene%probes(p)%point(:system%body%dim))
+      if (distance > system%body%spacing(k)) text = text//line('warning', 'probe '// &
+        & probes(p)%name//' lies outside the bodies: the nearest point is '// &
+        & with_unit(distance, 'm', 3)//' away')
     end do
   end function summary_before
 
