@@ -96,6 +96,8 @@ contains
       & "'points' needs 2 counts|a/b.nml:4")
     call expect_fault(error, scene_2d//soft//go//'&body lower = 0 0 upper = 1 1 points = 3 3 3 /', &
       & "'points' needs 2 counts")
+    call expect_fault(error, scene_2d//soft//go//'&body lower = 0 0 upper = 1 1'//line// &
+      & 'points = 50000 50000 /', 'too many points: 2.5e9|a/b.nml:5|at most 1e9')
   end subroutine test_lattices
 
   subroutine test_spacing(error)

@@ -13,6 +13,7 @@ module pd_scene_check_bodies
   public :: check_body, check_shape, check_material, check_crack, check_file, needed_ratio
 
   real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
+  real(wp), parameter :: most_points = 1.0e9_wp         !! points and slots have 32-bit numbers
   real(wp), parameter :: ratio_tolerance = 1.0e-3_wp    !! 0.333 is meant to be 1/3
 
 contains
@@ -63,6 +64,12 @@ contains
         call rule_fault(error, 'body', number, 'points', "'points' needs "//to_text(d)// &
           & ' counts in a scene of dimension '//to_text(d), 'one count along each direction', &
           & source)
+        return
+      end if
+      if (product(real(body%points(:d), wp)) > most_points) then
+        call rule_fault(error, 'body', number, 'points', 'too many points: '// &
+          & to_text(product(real(body%points(:d), wp)), 3), 'a body has at most '// &
+          & to_text(most_points, 3), source)
         return
       end if
       call check_spacing(body, d, number, error, source)
