@@ -390,11 +390,13 @@ contains
     type(output_group), intent(inout) :: group
 
     call keys%key('every', group%every, '', 'steps (relaxation: load steps) between outputs', &
-      & at_least=1, default='start and end only', hidden=group%every == 0)
+      & at_least=1, default='a tenth of the steps; relaxation: 1', hidden=group%every == 0)
     call keys%key('interval', group%interval, 's', 'time between outputs, instead of every', &
       & above=0.0_wp)
-    call keys%key('history_every', group%history_every, '', 'steps between rows of the history', &
-      & at_least=1, default='max(1, steps/2000)', hidden=group%history_every == 0)
+    call keys%key('history_every', group%history_every, '', &
+      & 'steps (relaxation: iterations) between rows of the history', &
+      & at_least=1, default='max(1, steps/2000); relaxation: max(1, maximum_iterations/2000)', &
+      & hidden=group%history_every == 0)
     call keys%list('fields', group%fields, 'fields to write', field_names, &
       & default="'displacement', 'velocity', 'damage'")
     call keys%key('precision', group%precision, 'of the fields in the file', &
