@@ -30,7 +30,7 @@ contains
   end subroutine collect_family_cracks
 
   !> delta = 3 spacings, linear volume correction, a long crack half a spacing from the row: worked
-  !> out in the theory page, 7. Beside it the book prints 0.38, 0.14, 0.24 (on the crack's plane,
+  !> out in doc/theory.md, 8. Beside it the book prints 0.38, 0.14, 0.24 (on the crack's plane,
   !> ahead of and behind the tip) and 0.38, 0.16, 0.02 (0.5, 1.5, 2.5 spacings from it): the first
   !> three are the counts 11, 4 and 7 of 29, the point itself counted, so not of one definition with
   !> the last.

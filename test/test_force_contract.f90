@@ -285,7 +285,7 @@ contains
 
   !> Two points in a plane: the force of their one bond is 2 q s v_c V, so it shows the stretch. The
   !> truth is the definition in quadruple precision from the same displacements. Allowed is what the
-  !> conventions page says: 8 eps (|s| + |eta|/|xi|), and eps (|u_k| + |u_j|)/|xi| from forming eta.
+  !> theory page (2) says: 8 eps (|s| + |eta|/|xi|), and eps (|u_k| + |u_j|)/|xi| from forming eta.
   subroutine test_stretch(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: angles(*) = [0.0_wp, 0.4_wp, 1.5707963267948966_wp, 2.5_wp, 3.1_wp]

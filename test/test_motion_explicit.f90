@@ -223,8 +223,8 @@ contains
   end subroutine test_oscillator
 
   !> u = U cos(k x) from rest in a chain so long that its ends (three points a step) are not heard
-  !> in its middle: u_n = U cos(k x) cos(n phi), sin(phi/2) = omega(k) dt/2, with the sum of the
-  !> theory page, 9, for omega(k). Wave numbers up to the grid's last, step at 0.9 of the stable
+  !> in its middle: u_n = U cos(k x) cos(n phi), sin(phi/2) = omega(k) dt/2, with the sum of
+  !> doc/theory.md, 12, for omega(k). Wave numbers up to the grid's last, step at 0.9 of the stable
   !> one.
   subroutine test_dispersion(error)
     type(error_type), allocatable, intent(out) :: error
