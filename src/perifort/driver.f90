@@ -29,8 +29,8 @@ module pd_driver
   use pd_motion_plan, only: plan_type, make_plan, depth_of
   use pd_motion_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, start_system, evaluate
-  use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, planned_outputs, &
-    & planned_rows
+  use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, &
+    & planned_outputs, planned_rows
   use pd_output_results, only: refuse_existing
   use pd_output_summary, only: summary_before, summary_after
   implicit none (type, external)
@@ -80,8 +80,8 @@ contains
     if (allocated(error)) return
     call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
-      call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, set_up%lonely, &
-        & omp_get_max_threads()))
+      call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
+        & set_up%lonely, omp_get_max_threads()))
       call open_recorder(scene, options, set_up, directory, stem, recorder, error)
       if (allocated(error)) return
       call recorder%timer%start('time stepping')
@@ -113,8 +113,8 @@ contains
     if (allocated(error)) return
     call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
-      call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, set_up%lonely, &
-        & omp_get_max_threads()))
+      call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
+        & set_up%lonely, omp_get_max_threads()))
       ! the first evaluation touches the memory, the others are timed
       call evaluate(system, 0.0_wp, breaking=.false.)
       begin = wall_time()
@@ -124,7 +124,8 @@ contains
         if (seconds*i > 0.5_wp) exit
       end do
       if (plan%relaxes) then
-        call say(options, '  run time        '//with_unit(seconds, 's', 3)//' an iteration (measured)')
+        call say(options, '  run time        '//with_unit(seconds, 's', 3)// &
+          & ' an iteration (measured)')
       else
         call say(options, '  run time        about '//duration_text(seconds*plan%steps &
           & *evaluations(plan%integrator))//' without output ('//with_unit(seconds, 's', 3)// &
@@ -168,7 +169,8 @@ contains
       call timer%stop('families')
 
       call timer%start('conditions')
-      call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, error)
+      call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
+        & error)
       if (allocated(error)) return
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
         & no_fail_zone(scene, system%body), temperature_change, system%model)
@@ -218,13 +220,14 @@ contains
       call lattice_suits(system%body, rule, suits, reason)
     end if
     if (scene%horizon%family == 'lattice' .and. .not. suits) then
-      call fail(error, 'the scene cannot have lattice families, which &horizon family asks for: '//reason)
+      call fail(error, &
+        & 'the scene cannot have lattice families, which &horizon family asks for: '//reason)
       return
     end if
     if (suits) then
       allocate (lattice)
-      call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), lattice, &
-        & error)
+      call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), &
+        & lattice, error)
       if (allocated(error)) return
       call move_alloc(lattice, system%family)
     else
@@ -264,11 +267,12 @@ contains
     do i = 1, size(materials)
       associate (group => scene%materials(i), m => materials(i))
         m = new_material(group%youngs_modulus, group%poissons_ratio, group%density, &
-          & scene%header%dimension, plane_strain, scene%header%thickness, scene%header%area, delta, &
-          & group%model == 'bond_based')
+          & scene%header%dimension, plane_strain, scene%header%thickness, scene%header%area, &
+          & delta, group%model == 'bond_based')
         if (is_set(group%critical_stretch)) m%critical_stretch = group%critical_stretch
         if (is_set(group%critical_energy_release_rate)) m%critical_stretch = &
-          & critical_stretch_from_energy(m, group%critical_energy_release_rate, scene%header%dimension, delta)
+          & critical_stretch_from_energy(m, group%critical_energy_release_rate, &
+          & scene%header%dimension, delta)
         m%break_in_compression = group%break_in_compression
         m%expansion = group%thermal_expansion
         if (plane_strain) m%expansion = (1 + m%poissons_ratio)*m%expansion
@@ -416,7 +420,8 @@ contains
     type(run_options_type), intent(in) :: options
     type(system_type), intent(in) :: system
     integer(i8), parameter :: worth_a_thread = 40000_i8  ! bonds, about 20 us of work
-    if (options%threads == 0 .and. system%family%n_bonds < worth_a_thread) call omp_set_num_threads(1)
+    if (options%threads == 0 .and. system%family%n_bonds < worth_a_thread) &
+      & call omp_set_num_threads(1)
   end subroutine choose_threads
 
   subroutine say(options, text)

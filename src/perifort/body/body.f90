@@ -2,12 +2,14 @@
 !>
 !> A point's place in the arrays is its slot. A body is made in point order (slot = point); the
 !> family then arranges it: a list family sorts the points, a lattice family also adds dead slots
-!> (padding and cells cut out), which have no volume and no bonds. Results are written in point order.
+!> (padding and cells cut out), which have no volume and no bonds. Results are written in point
+!> order.
 module pd_body_body
   use pd_base_kinds, only: wp, i2, i4
   implicit none (type, external)
   private
-  public :: body_type, grid_type, allocate_points, append_points, keep_points, arrange, in_point_order
+  public :: body_type, grid_type, allocate_points, append_points, keep_points, arrange, &
+    & in_point_order
 
   !> A uniform grid: points at origin + (i - 1/2) spacing, i integer.
   type :: grid_type
@@ -58,7 +60,8 @@ contains
     allocate (body%grids(0))
   end subroutine allocate_points
 
-  !> Put the points of `more` behind those of `body`; both in point order, grids are those of `body`.
+  !> Put the points of `more` behind those of `body`; both in point order, grids are those of
+  !> `body`.
   pure subroutine append_points(body, more)
     type(body_type), intent(inout) :: body
     type(body_type), intent(in) :: more

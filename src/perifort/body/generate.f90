@@ -135,7 +135,8 @@ contains
     number = int(size(body%grids), i2)
   end function number_of_grid
 
-  !> Points of a cloud file: columns x y z volume (coordinates the dimension doesn't use are ignored).
+  !> Points of a cloud file: columns x y z volume (coordinates the dimension doesn't use are
+  !> ignored).
   subroutine cloud_points(scene, i, depth, body, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: i
@@ -158,8 +159,10 @@ contains
     body%volume = table%values(4, :)
     worst = minloc(body%volume, dim=1)
     if (body%volume(worst) <= 0.0_wp) then
-      call fail(error, 'every point of a cloud needs a positive volume (the fourth column), but here '// &
-        & 'it is '//to_text(body%volume(worst))//newline//' --> '//path//':'//to_text(table%lines(worst)))
+      call fail(error, &
+        & 'every point of a cloud needs a positive volume (the fourth column), but here '// &
+        & 'it is '//to_text(body%volume(worst))//newline//' --> '//path//':'// &
+        & to_text(table%lines(worst)))
       return
     end if
     body%spacing = (body%volume/depth)**(1.0_wp/body%dim)
@@ -177,7 +180,7 @@ contains
     end do
   end function material_number
 
-  !> Rows of a boundary layer (conventions, Layers): 3 at a ratio of 3.015.
+  !> Rows of a boundary layer (doc/theory.md, 10): 3 at a ratio of 3.015.
   pure integer function layer_rows(delta, spacing) result(rows)
     real(wp), intent(in) :: delta, spacing
     rows = max(1, floor(delta/spacing*(1 + 1.0e-9_wp)))

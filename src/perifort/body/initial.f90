@@ -42,7 +42,8 @@ contains
         end do
         call set_field(body, chosen, group%displacement, group%displacement_gradient, u)
         call set_field(body, chosen, group%velocity, group%velocity_gradient, v)
-        if (is_set(group%temperature_change)) where (chosen) temperature_change = group%temperature_change
+        if (is_set(group%temperature_change)) &
+          & where (chosen) temperature_change = group%temperature_change
       end associate
     end do
   end subroutine initial_state
@@ -83,7 +84,8 @@ contains
     if (allocated(error)) return
     if (size(table%values, 2) /= body%n_points) then
       call fail(error, 'the initial state in '//path//' has '//to_text(size(table%values, 2))// &
-        & ' rows, but the scene has '//to_text(body%n_points)//' points (layers included): one row '// &
+        & ' rows, but the scene has '//to_text(body%n_points)// &
+        & ' points (layers included): one row '// &
         & 'per point is expected, in the order of the results')
       return
     end if

@@ -1,4 +1,4 @@
-!> Material parameters of the peridynamic force from those of the classical theory (theory page, 1).
+!> Material parameters of the peridynamic force from the classical ones (doc/theory.md, 1).
 module pd_body_material
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
@@ -21,7 +21,7 @@ module pd_body_material
     real(wp) :: q = 0.0_wp                   !! 2 b delta
     real(wp) :: p = 0.0_wp                   !! 2 a d delta: p_k = p theta_k
     real(wp) :: t = 0.0_wp                   !! d delta: theta_k = t sum(...)
-    real(wp) :: uniaxial_energy = 0.0_wp     !! W/zeta^2 at uniaxial strain zeta (theory page, 4) [Pa]
+    real(wp) :: uniaxial_energy = 0.0_wp     !! W/zeta^2 at uniaxial strain zeta (theory.md, 4) [Pa]
     real(wp) :: critical_stretch = never     !! s_c [-]
     logical :: break_in_compression = .false.
     real(wp) :: expansion = 0.0_wp           !! alpha, (1+nu) alpha in plane strain [1/K]
@@ -87,7 +87,7 @@ contains
     if (dim == 2 .and. .not. plane_strain) nu = 1.0_wp/3.0_wp
   end function special_poissons_ratio
 
-  !> Critical stretch from the critical energy release rate Gc [J/m2] (theory page, 7).
+  !> Critical stretch from the critical energy release rate Gc [J/m2] (doc/theory.md, 8).
   pure real(wp) function critical_stretch_from_energy(m, Gc, dim, delta) result(s_c)
     type(material_type), intent(in) :: m
     real(wp), intent(in) :: Gc

@@ -21,8 +21,10 @@ contains
     allocate (is_inside(size(x, 1)), source=.true.)
     if (shape%shape == 'box' .or. shape%shape == 'cylinder') then
       do c = 1, size(x, 2)
-        if (is_set(shape%lower(c))) is_inside = is_inside .and. x(:, c) >= shape%lower(c) - tolerance
-        if (is_set(shape%upper(c))) is_inside = is_inside .and. x(:, c) <= shape%upper(c) + tolerance
+        if (is_set(shape%lower(c))) &
+          & is_inside = is_inside .and. x(:, c) >= shape%lower(c) - tolerance
+        if (is_set(shape%upper(c))) &
+          & is_inside = is_inside .and. x(:, c) <= shape%upper(c) + tolerance
       end do
     end if
     if (shape%shape == 'box') return

@@ -28,7 +28,8 @@ contains
     integer :: c, k, n, n_cells, at, most
 
     n = size(x, 1)
-    ! far-flung points must not ask for more cells than points are worth: wider cells are still right
+    ! far-flung points must not ask for more cells than points are worth: wider cells are still
+    ! right
     most = max(1, int(real(4*n + 64, wp)**(1.0_wp/size(x, 2))))
     do c = 1, size(x, 2)
       cells%lower(c) = minval(x(:, c))

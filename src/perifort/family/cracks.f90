@@ -117,7 +117,8 @@ contains
     case (disc)
       crosses = norm2(r - crack%normal*dot_product(r, crack%normal)) <= crack%radius + tolerance
     case (segment)
-      crosses = within(dot_product(r, crack%edge_1), dot_product(crack%edge_1, crack%edge_1), tolerance)
+      crosses = within(dot_product(r, crack%edge_1), dot_product(crack%edge_1, crack%edge_1), &
+        & tolerance)
     case default
       crosses = in_parallelogram(crack, r, tolerance)
     end select
@@ -137,7 +138,8 @@ contains
 
   contains
 
-    !> Whether r's part along `edge`, measured across the other edge, is between 0 and the edge's end.
+    !> Whether r's part along `edge`, measured across the other edge, is between 0 and the edge's
+    !> end.
     pure logical function within_of(edge, normal)
       real(wp), intent(in) :: edge(3), normal(3)
       real(wp) :: height, at

@@ -25,7 +25,8 @@ contains
 
     lonely = 0
     allocate (other(body%n_slots), source=0_i4)
-    !$omp parallel default(none) shared(body, family, other) private(bonds, k, i, j, near) reduction(+:lonely)
+    !$omp parallel default(none) shared(body, family, other) private(bonds, k, i, j, near) &
+    !$omp reduction(+:lonely)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
@@ -44,10 +45,12 @@ contains
     if (k == 0) return
     j = other(k)
     if (body%body(k) /= body%body(j)) then
-      call fail(error, 'bodies '//to_text(int(body%body(k)))//' and '//to_text(int(body%body(j)))// &
+      call fail(error, 'bodies '//to_text(int(body%body(k)))//' and '// &
+        & to_text(int(body%body(j)))// &
         & ' overlap: their points '//at(k)//' and '//at(j)//' are closer than half a spacing')
     else
-      call fail(error, 'two points of body '//to_text(int(body%body(k)))//' coincide: '//at(k)//' and '//at(j))
+      call fail(error, 'two points of body '//to_text(int(body%body(k)))//' coincide: '//at(k)// &
+        & ' and '//at(j))
     end if
 
   contains

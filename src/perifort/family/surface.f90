@@ -1,5 +1,5 @@
-!> Surface correction (7.7; theory page, 4): factors that give points near a surface the stiffness of
-!> the bulk.
+!> Surface correction (7.7; doc/theory.md, 4): factors that give points near a surface the stiffness
+!> of the bulk.
 module pd_family_surface
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type

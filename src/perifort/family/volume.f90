@@ -1,4 +1,5 @@
-!> Volume correction (7.2; theory page, 3): how much of a family member's volume lies in the horizon.
+!> Volume correction (7.2; doc/theory.md, 3): how much of a family member's volume lies in the
+!> horizon.
 module pd_family_volume
   use pd_base_kinds, only: wp
   implicit none (type, external)

@@ -22,7 +22,7 @@ module pd_force_reference
 contains
 
   !> State of the `i`-th bond of slot `k` under displacements `u` (n_slots, dim) [m].
-  !> The stretch is formed without cancellation (theory page, 2).
+  !> The stretch is formed without cancellation (doc/theory.md, 2).
   pure function state_of_bond(model, u, k, bonds, i) result(state)
     type(model_type), intent(in) :: model
     real(wp), intent(in) :: u(:, :)
@@ -92,7 +92,7 @@ contains
     end do
   end function point_force
 
-  !> Strain energy density W of slot `k` [J/m3] (theory page, 2).
+  !> Strain energy density W of slot `k` [J/m3] (doc/theory.md, 9).
   pure real(wp) function point_energy(model, u, k, bonds) result(energy)
     type(model_type), intent(in) :: model
     real(wp), intent(in) :: u(:, :)

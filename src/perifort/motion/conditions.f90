@@ -1,4 +1,4 @@
-!> Boundary conditions (7.8; theory page, 8): imposed motion of points and external loads.
+!> Boundary conditions (7.8; doc/theory.md, 10): imposed motion of points and external loads.
 module pd_motion_conditions
   use pd_base_kinds, only: wp, i1, i4
   use pd_motion_curve, only: curve_type
@@ -19,7 +19,7 @@ module pd_motion_conditions
     real(wp) :: amplitude(3) = 0.0_wp       !! [m] or [m/s], times the curve
     type(curve_type) :: curve
     real(wp), allocatable :: start(:, :)    !! displacement at t = 0 (slot, dim) [m]
-    integer(i1), allocatable :: held(:, :)  !! 1 where this motion, not a later one, holds (slot, dim)
+    integer(i1), allocatable :: held(:, :)  !! 1 where this motion holds, not a later one
     real(wp) :: reaction(3) = 0.0_wp        !! force the boundary exerts on the body [N]
   end type motion_type
 
@@ -39,7 +39,8 @@ contains
     integer :: m, c
 
     do m = 1, size(motions)
-      if (.not. allocated(motions(m)%start)) allocate (motions(m)%start(size(motions(m)%slots), size(u, 2)))
+      if (.not. allocated(motions(m)%start)) &
+        & allocate (motions(m)%start(size(motions(m)%slots), size(u, 2)))
       do c = 1, size(u, 2)
         motions(m)%start(:, c) = u(motions(m)%slots, c)
       end do
@@ -74,6 +75,8 @@ contains
               u(motion%slots(i), c) = motion%start(i, c) + motion%amplitude(c)*path
               v(motion%slots(i), c) = motion%amplitude(c)*factor
             end do
+          case default
+            continue  ! a free component
           end select
         end do
       end associate

@@ -87,7 +87,8 @@ contains
         if (is_set(group%pressure)) then
           axis = index('xyz', group%side(1:1))
           outward = merge(-1.0_wp, 1.0_wp, group%side(3:5) == 'min')
-          load%density(:, axis) = load%density(:, axis) - group%pressure*outward/body%spacing(load%slots)
+          load%density(:, axis) = load%density(:, axis) &
+            & - group%pressure*outward/body%spacing(load%slots)
         end if
         load%curve = course(scene, group%ramp_time, group%times, group%values)
       end associate
@@ -140,7 +141,8 @@ contains
     number = 0
   end function body_number
 
-  !> How a condition varies in time; in relaxation, without other word, it grows over the load steps.
+  !> How a condition varies in time; in relaxation, without other word, it grows over the load
+  !> steps.
   function course(scene, ramp_time, times, values) result(curve)
     type(scene_type), intent(in) :: scene
     real(wp), intent(in) :: ramp_time

@@ -40,7 +40,8 @@ contains
     plan%relaxes = scene%time%method == 'relaxation'
     plan%integrator = trim(scene%time%integrator)
     if (.not. any(bound > 0.0_wp)) then
-      call fail(error, 'no point of the scene has a neighbour within the horizon: there is nothing '// &
+      call fail(error, &
+        & 'no point of the scene has a neighbour within the horizon: there is nothing '// &
         & 'to compute. Is the horizon''s ratio or length too small?')
       return
     end if
@@ -51,16 +52,16 @@ contains
     end if
     plan%limit = stable_step(system%body, system%model, bound)*integrator_limit(plan%integrator)/2
     call printed_step(system%body, system%family, system%model, plan%printed)
-    plan%book = book_step(system%model, system%body%dim, system%family%rule%delta, depth_of(scene), &
-      & minval(system%body%spacing, mask=system%body%point > 0))
+    plan%book = book_step(system%model, system%body%dim, system%family%rule%delta, &
+      & depth_of(scene), minval(system%body%spacing, mask=system%body%point > 0))
     plan%step = scene%time%safety*plan%limit
     if (is_set(scene%time%step)) plan%step = scene%time%step
     plan%steps = scene%time%steps
     if (.not. is_set(scene%time%duration)) return
     if (scene%time%duration/plan%step > 0.9_wp*huge(1)) then
       call fail(error, 'the duration of '//to_text(scene%time%duration)//' s needs '// &
-        & to_text(scene%time%duration/plan%step)//' steps of '//to_text(plan%step)//' s, more than '// &
-        & to_text(huge(1)))
+        & to_text(scene%time%duration/plan%step)//' steps of '//to_text(plan%step)// &
+        & ' s, more than '//to_text(huge(1)))
       return
     end if
     plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
@@ -88,8 +89,8 @@ contains
       call chapter_stiffness(system%body, system%family, system%model, relaxation%mass)
       relaxation%mass = safety*relaxation%mass/4
     case ('constant')
-      call constant_stiffness(system%body, system%model, system%family%rule%delta, depth_of(scene), &
-        & relaxation%mass(:, 1))
+      call constant_stiffness(system%body, system%model, system%family%rule%delta, &
+        & depth_of(scene), relaxation%mass(:, 1))
       do c = system%body%dim, 1, -1
         relaxation%mass(:, c) = safety*relaxation%mass(:, 1)/4
       end do

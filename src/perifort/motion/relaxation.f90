@@ -7,7 +7,8 @@ module pd_motion_relaxation
   use pd_base_text, only: to_text
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_rigid, only: rigid_type, find_free_motions, check_balance, remove_free_motions
-  use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads, faulty_slot, place
+  use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads, faulty_slot, &
+    & place
   implicit none (type, external)
   private
   public :: relaxation_type, run_relaxation
@@ -19,7 +20,7 @@ module pd_motion_relaxation
     integer :: load_steps = 1
     integer :: maximum_iterations = 100000    !! of each relaxation
     real(wp) :: tolerance = 1.0e-6_wp         !! of residual force and displacement change [-]
-    real(wp), allocatable :: mass(:, :)       !! lambda with a step of 1 (n_slots, dim) [kg/m3 s2/s2]
+    real(wp), allocatable :: mass(:, :)       !! lambda for a step of 1 (n_slots, dim) [N/m4]
   end type relaxation_type
 
   !> Sums over the free components, one pass for all.
@@ -106,11 +107,11 @@ contains
       if (sums%residual > 0.0_wp) instant%residual = sqrt(sums%residual/reference)
       fault = faulty_slot(system, rate, 1.0_wp)
       if (fault > 0) then
-        call fail(error, 'the relaxation diverges at iteration '//to_text(instant%step)//': point '// &
-          & to_text(int(system%body%point(fault)))//' at ('//place(system, fault)//') moves more than '// &
-          & 'a horizon in one iteration. Likely cause: loads that the body cannot bear, or a density '// &
-          & 'matrix too small for it (density_matrix = ''frame_invariant'' is stable, '// &
-          & 'with others raise safety)', status_no_answer)
+        call fail(error, 'the relaxation diverges at iteration '//to_text(instant%step)// &
+          & ': point '//to_text(int(system%body%point(fault)))//' at ('//place(system, fault)// &
+          & ') moves more than a horizon in one iteration. Likely cause: loads that '// &
+          & 'the body cannot bear, or a density matrix too small for it (density_matrix = '// &
+          & '''frame_invariant'' is stable, with others raise safety)', status_no_answer)
         return
       end if
       call observer%observe(system, instant, error)
@@ -126,12 +127,12 @@ contains
       & ' iterations of load step '//to_text(instant%load_step)//' the residual force is '// &
       & to_text(instant%residual)//' and the change of displacement '// &
       & to_text(sqrt(sums%change/max(tiny(1.0_wp), sums%displacement)))//' (tolerance '// &
-      & to_text(relaxation%tolerance)//'). Raise maximum_iterations or tolerance, or use more load '// &
-      & 'steps', status_no_answer)
+      & to_text(relaxation%tolerance)// &
+      & '). Raise maximum_iterations or tolerance, or use more load steps', status_no_answer)
   end subroutine relax
 
-  !> a = F/lambda of the free components, 0 elsewhere. `reference`, if it is 0, becomes the square of
-  !> the loads, or without loads of the first residual: a body released from a strained state.
+  !> a = F/lambda of the free components, 0 elsewhere. `reference`, if it is 0, becomes the square
+  !> of the loads, or without loads of the first residual: a body released from a strained state.
   subroutine fictitious_acceleration(system, relaxation, t, a, reference)
     type(system_type), intent(in) :: system
     type(relaxation_type), intent(in) :: relaxation

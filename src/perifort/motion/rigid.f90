@@ -57,7 +57,8 @@ contains
       ! out of the dimension (a rotation about x in a plane): no motion at all
       mode = vectors(:, i)
       do j = 1, rigid%number
-        mode = mode - rigid%combination(:, j)*dot_product(rigid%combination(:, j), matmul(mass, mode))
+        mode = mode - rigid%combination(:, j) &
+          & *dot_product(rigid%combination(:, j), matmul(mass, mode))
       end do
       if (dot_product(mode, matmul(mass, mode)) <= 1.0e-10_wp*mass(1, 1)) cycle
       rigid%number = rigid%number + 1
@@ -110,7 +111,8 @@ contains
       do k = 1, system%body%n_slots
         if (abs(loads(k, c)) <= 0.0_wp) cycle
         mode = motion_at(rigid, system%body%x(k, :), c)
-        work = work + loads(k, c)*system%body%volume(k)*matmul(mode, rigid%combination(:, :rigid%number))
+        work = work + loads(k, c)*system%body%volume(k) &
+          & *matmul(mode, rigid%combination(:, :rigid%number))
         applied = applied + abs(loads(k, c))*system%body%volume(k)*maxval(abs(matmul(mode, &
           & rigid%combination(:, :rigid%number))))
       end do
@@ -137,7 +139,8 @@ contains
         if (system%body%point(k) == 0) cycle
         mode = motion_at(rigid, system%body%x(k, :), c)
         do i = 1, rigid%number
-          amount(i) = amount(i) + dot_product(mode, rigid%combination(:, i))*u(k, c)*system%body%volume(k)
+          amount(i) = amount(i) &
+            & + dot_product(mode, rigid%combination(:, i))*u(k, c)*system%body%volume(k)
         end do
       end do
     end do

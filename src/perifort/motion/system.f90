@@ -79,7 +79,8 @@ contains
     allocate (holder(system%body%n_slots, system%body%dim), source=0_i4)
     do m = 1, size(system%motions)
       do c = 1, system%body%dim
-        if (system%motions(m)%kind(c) /= free_component) holder(system%motions(m)%slots, c) = int(m, i4)
+        if (system%motions(m)%kind(c) /= free_component) &
+          & holder(system%motions(m)%slots, c) = int(m, i4)
       end do
     end do
     do m = 1, size(system%motions)
@@ -96,8 +97,8 @@ contains
     system%held = merge(1_i1, 0_i1, holder > 0)
   end subroutine hold_components
 
-  !> Steps 1 to 4 of conventions' "A step": impose at time `t`, break bonds (unless `breaking` is
-  !> false), dilatation, forces. Breaking needs no pass of its own: the first pass over the bonds
+  !> The first half of a step (doc/theory.md, 5): impose at time `t`, break bonds (unless `breaking`
+  !> is false), dilatation, forces. Breaking needs no pass of its own: the first pass over the bonds
   !> marks the strained slots, and only those are computed again.
   subroutine evaluate(system, t, breaking)
     type(system_type), intent(inout) :: system
@@ -188,8 +189,8 @@ contains
     end do
   end subroutine renew_force
 
-  !> Add `scale` times the loads at time `t` to `values` (n_slots, dim); `per_density` divides by the
-  !> point's density, which turns force density into acceleration.
+  !> Add `scale` times the loads at time `t` to `values` (n_slots, dim); `per_density` divides by
+  !> the point's density, which turns force density into acceleration.
   subroutine add_loads(system, t, scale, per_density, values)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: t, scale
@@ -218,8 +219,8 @@ contains
     inverse_density = 1.0_wp/model%materials(model%material(k))%density
   end function inverse_density
 
-  !> Work of loads and imposed motion since the last call, by the trapezoidal rule, and the reactions
-  !> at time `t`. To be called once per step, after `evaluate`.
+  !> Work of loads and imposed motion since the last call, by the trapezoidal rule, and the
+  !> reactions at time `t`. To be called once per step, after `evaluate`.
   subroutine account(system, t)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
@@ -240,7 +241,8 @@ contains
         motion%reaction = 0.0_wp
         do c = 1, system%body%dim
           acceleration = 0.0_wp
-          if (motion%kind(c) == moved_by_velocity) acceleration = motion%amplitude(c)*motion%curve%slope(t)
+          if (motion%kind(c) == moved_by_velocity) &
+            & acceleration = motion%amplitude(c)*motion%curve%slope(t)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)
@@ -353,11 +355,11 @@ contains
     integer :: k
 
     k = max(1, faulty_slot(system, system%state%v, dt))
-    call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))//'): point '// &
-      & to_text(int(system%body%point(k)))//' at ('//place(system, k)//') moves more than a horizon in a '// &
-      & 'step of '//to_text(dt)//' s. Likely cause: a time step above the stable one '// &
-      & '(`perifort check` prints it; lower safety or step), or an imposed velocity beyond the wave '// &
-      & 'speed', status_no_answer)
+    call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))// &
+      & '): point '//to_text(int(system%body%point(k)))//' at ('//place(system, k)// &
+      & ') moves more than a horizon in a step of '//to_text(dt)//' s. Likely cause: a time step '// &
+      & 'above the stable one (`perifort check` prints it; lower safety or step), or an imposed '// &
+      & 'velocity beyond the wave speed', status_no_answer)
   end subroutine explain_fault
 
   !> Position of a slot as text.

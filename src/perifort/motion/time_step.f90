@@ -1,4 +1,4 @@
-!> The stable time step (7.25 in the form of conventions, "Time step and ADR mass").
+!> The stable time step (7.25 in the form of doc/theory.md, 6).
 module pd_motion_time_step
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
@@ -8,7 +8,8 @@ module pd_motion_time_step
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: stiffness_bound, stable_step, printed_step, book_step, chapter_stiffness, integrator_limit
+  public :: stiffness_bound, stable_step, printed_step, book_step, chapter_stiffness, &
+    & integrator_limit
   public :: constant_stiffness, horizon_volume
 
 contains
@@ -27,7 +28,8 @@ contains
     integer :: k, i, j
 
     allocate (inverse(body%n_slots), source=0.0_wp)
-    !$omp parallel default(none) shared(body, family, model, bound, inverse) private(bonds, n, k, i, j)
+    !$omp parallel default(none) shared(body, family, model, bound, inverse) &
+    !$omp private(bonds, n, k, i, j)
     call allocate_bonds(family, bonds)
     if (model%dilatation) then
       !$omp do schedule(dynamic, 256)
@@ -54,7 +56,8 @@ contains
         n = bonds%xi(i, :)/bonds%length(i)
         bound(k) = bound(k) + ((model%materials(model%material(k))%q &
           & + model%materials(model%material(j))%q)*factor(model, model%S, n, k, j) &
-          & + (inverse(k) + inverse(j))*factor(model, model%D, n, k, j))*bonds%weight(i)/bonds%length(i)
+          & + (inverse(k) + inverse(j))*factor(model, model%D, n, k, j)) &
+          & *bonds%weight(i)/bonds%length(i)
       end do
     end do
     !$omp end parallel
@@ -79,7 +82,8 @@ contains
 
     step = huge(step)
     do k = 1, body%n_slots
-      if (bound(k) > 0.0_wp) step = min(step, sqrt(2*model%materials(model%material(k))%density/bound(k)))
+      if (bound(k) > 0.0_wp) &
+        & step = min(step, sqrt(2*model%materials(model%material(k))%density/bound(k)))
     end do
   end function stable_step
 
@@ -97,7 +101,8 @@ contains
 
     allocate (inverse(body%n_slots), source=0.0_wp)
     squared = huge(squared)
-    !$omp parallel default(none) shared(body, family, model, inverse) private(bonds, k, i, printed) &
+    !$omp parallel default(none) shared(body, family, model, inverse) &
+    !$omp private(bonds, k, i, printed) &
     !$omp reduction(min:squared)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
@@ -160,7 +165,8 @@ contains
     integer :: k, i, c, j
 
     delta = family%rule%delta
-    !$omp parallel default(none) shared(body, family, model, stiffness, delta) private(bonds, k, i, c, j, term)
+    !$omp parallel default(none) shared(body, family, model, stiffness, delta) &
+    !$omp private(bonds, k, i, c, j, term)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
@@ -171,7 +177,8 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           term = 4*delta/bonds%length(i)*(0.5_wp*max(m%a, 0.0_wp)*m%d**2*delta/bonds%length(i) &
-            & *(body%volume(k)*bonds%weight(i)/body%volume(j) + bonds%weight(i)) + m%b)*bonds%weight(i)
+            & *(body%volume(k)*bonds%weight(i)/body%volume(j) + bonds%weight(i)) &
+            & + m%b)*bonds%weight(i)
           do c = 1, body%dim
             stiffness(k, c) = stiffness(k, c) + abs(bonds%xi(i, c))/bonds%length(i)*term
           end do

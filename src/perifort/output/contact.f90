@@ -1,5 +1,5 @@
-!> There is no contact: separated or crushed pieces pass through each other. This looks for the first
-!> pair of points that do, so that a run can say so.
+!> There is no contact: separated or crushed pieces pass through each other. This looks for the
+!> first pair of points that do, so that a run can say so.
 module pd_output_contact
   use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type

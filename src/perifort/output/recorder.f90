@@ -45,7 +45,7 @@ module pd_output_recorder
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(energies_type) :: energies          !! of the last row
-    real(wp) :: supply = 0.0_wp              !! energy at the first row, breaking at t = 0 included [J]
+    real(wp) :: supply = 0.0_wp              !! energy at the first row, with breaking at t = 0 [J]
     integer :: rows = 0
     integer :: outputs = 0
     integer :: steps_done = 0
@@ -78,8 +78,9 @@ contains
     type(column_type), allocatable :: columns(:)
     integer :: m, c, p, f
 
-    columns = [column_type('step', '1'), column_type('time', 's'), column_type('kinetic_energy', 'J'), &
-      & column_type('strain_energy', 'J'), column_type('dissipated_energy', 'J'), &
+    columns = [column_type('step', '1'), column_type('time', 's'), &
+      & column_type('kinetic_energy', 'J'), column_type('strain_energy', 'J'), &
+      & column_type('dissipated_energy', 'J'), &
       & column_type('external_work', 'J'), column_type('broken_bonds', '1'), &
       & column_type('maximum_damage', '1'), column_type('step_size', 's')]
     if (relaxation) columns = [columns, column_type('residual', '1'), column_type('load_step', '1')]
@@ -96,7 +97,8 @@ contains
             columns = [columns, column_type(probes(p)%name//'_'//trim(field%name), field%unit)]
           else
             do c = 1, system%body%dim
-              columns = [columns, column_type(probes(p)%name//'_'//trim(field%name)//'_'//xyz(c), field%unit)]
+              columns = [columns, column_type(probes(p)%name//'_'//trim(field%name)//'_'//xyz(c), &
+                & field%unit)]
             end do
           end if
         end associate
@@ -125,7 +127,8 @@ contains
     if (mod(schedule%steps, schedule%history_every) /= 0) number = number + 1
   end function planned_rows
 
-  !> Whether step `step` is the first at or after a multiple of the interval, or a multiple of every.
+  !> Whether step `step` is the first at or after a multiple of the interval, or a multiple of
+  !> every.
   pure logical function output_due(schedule, step, dt) result(due)
     type(schedule_type), intent(in) :: schedule
     integer, intent(in) :: step
@@ -161,10 +164,11 @@ contains
       observer%time = instant%time
       if (schedule%relaxation) then
         row = instant%settled .or. mod(instant%step, schedule%history_every) == 0
-        output = instant%settled .and. (instant%last .or. mod(instant%load_step, schedule%every) == 0)
+        output = instant%settled .and. &
+          & (instant%last .or. mod(instant%load_step, schedule%every) == 0)
         call observer%progress%update(int(instant%load_step, i8) &
-          & - merge(0_i8, 1_i8, instant%settled .or. instant%load_step == 0), instant%time, system%broken, &
-          & relaxation_note(instant))
+          & - merge(0_i8, 1_i8, instant%settled .or. instant%load_step == 0), instant%time, &
+          & system%broken, relaxation_note(instant))
       else
         row = instant%last .or. mod(instant%step, schedule%history_every) == 0
         output = instant%last .or. output_due(schedule, instant%step, instant%dt)
@@ -231,16 +235,17 @@ contains
     if (recorder%rows == 0) recorder%supply = recorder%energies%kinetic + recorder%energies%strain &
       & + system%dissipated
     recorder%rows = recorder%rows + 1
-    row = [real(instant%step, wp), instant%time, recorder%energies%kinetic, recorder%energies%strain, &
-      & system%dissipated, system%external_work, real(system%broken, wp), maxval(system%state%damage), &
-      & instant%dt]
+    row = [real(instant%step, wp), instant%time, recorder%energies%kinetic, &
+      & recorder%energies%strain, system%dissipated, system%external_work, &
+      & real(system%broken, wp), maxval(system%state%damage), instant%dt]
     if (recorder%schedule%relaxation) row = [row, instant%residual, real(instant%load_step, wp)]
     do m = 1, size(system%motions)
       if (system%motions(m)%name /= '') row = [row, system%motions(m)%reaction(:system%body%dim)]
     end do
     do p = 1, size(recorder%probes)
       do f = 1, size(recorder%probes(p)%fields)
-        row = [row, probe_values(system, recorder%probes(p)%fields(f), int(recorder%probes(p)%slot), v)]
+        row = [row, probe_values(system, recorder%probes(p)%fields(f), &
+          & int(recorder%probes(p)%slot), v)]
       end do
     end do
     call recorder%results%add_row(row, error)
@@ -301,7 +306,7 @@ contains
         allocate (values(system%body%n_slots))
         call reference_dilatation(system%family, system%model, system%state%u, values)
         call put_scalars(values)
-      case ('energy_density')
+      case default  ! energy_density
         allocate (values(system%body%n_slots))
         call energy_pass(system%family, system%model, system%state%u, values, system%strained)
         call put_scalars(values)
@@ -346,8 +351,9 @@ contains
     recorder%touched = first > 0
     if (.not. recorder%touched) return
     call recorder%progress%finish()
-    write (error_unit, '(a)') 'warning: at t = '//to_text(instant%time)//' s points '//to_text(first)// &
-      & ' and '//to_text(second)//', which share no intact bond, are closer than half a spacing: '// &
+    write (error_unit, '(a)') 'warning: at t = '//to_text(instant%time)//' s points '// &
+      & to_text(first)//' and '//to_text(second)// &
+      & ', which share no intact bond, are closer than half a spacing: '// &
       & 'there is no contact, pieces pass through each other from here on'
   end subroutine warn_of_contact
 

@@ -30,30 +30,35 @@ contains
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
     text = text//line('points', to_text(system%body%n_points)//', '// &
       & to_text(scene%header%dimension)//'D, horizon '//with_unit(system%family%rule%delta, 'm'))
-    text = text//line('bonds', to_text(system%family%n_bonds)//' (each from both ends), at most '// &
-      & to_text(system%family%most_bonds)//' a point')
-    if (size(scene%cracks) > 0) text = text//line('cracks', to_text(size(scene%cracks))//', which cut '// &
+    text = text//line('bonds', to_text(system%family%n_bonds)// &
+      & ' (each from both ends), at most '//to_text(system%family%most_bonds)//' a point')
+    if (size(scene%cracks) > 0) &
+      & text = text//line('cracks', to_text(size(scene%cracks))//', which cut '// &
       & to_text(cut)//' bonds')
-    if (lonely > 0) text = text//line('warning', to_text(lonely)//' points have no neighbour and stay put')
+    if (lonely > 0) &
+      & text = text//line('warning', to_text(lonely)//' points have no neighbour and stay put')
     text = text//line('memory', with_unit(real(memory_of(system), wp), 'B', 3))
     text = text//kernels(scene, system)
     text = text//line('threads', to_text(threads))
     if (plan%relaxes) then
-      text = text//line('relaxation', to_text(plan%relaxation%load_steps)//' load step(s), tolerance '// &
-        & to_text(plan%relaxation%tolerance)//', density matrix '//trim(scene%relaxation%density_matrix))
+      text = text//line('relaxation', to_text(plan%relaxation%load_steps)// &
+        & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', density matrix '// &
+        & trim(scene%relaxation%density_matrix))
     else
       text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
         & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &
         & ' (7.25, '//plan%integrator//')')
       text = text//line('', '7.25 as printed '//printed(plan)//', the book''s estimate '// &
         & with_unit(plan%book, 's', 6))
-      if (plan%step > plan%limit) text = text//line('warning', 'the time step is above the stable one')
-      text = text//line('steps', to_text(plan%steps)//', to t = '//with_unit(plan%steps*plan%step, 's', 6))
+      if (plan%step > plan%limit) &
+        & text = text//line('warning', 'the time step is above the stable one')
+      text = text//line('steps', to_text(plan%steps)//', to t = '//&
+        & with_unit(plan%steps*plan%step, 's', 6))
     end if
     do p = 1, size(probes)
       k = int(probes(p)%slot)
-      text = text//line('probe', probes(p)%name//' is point '//to_text(int(system%body%point(k)))// &
-        & ' at ('//position(system, k)//') m')
+      text = text//line('probe', probes(p)%name//' is point '// &
+        & to_text(int(system%body%point(k)))//' at ('//position(system, k)//') m')
       distance = norm2(system%body%x(k, :) - scene%probes(p)%point(:system%body%dim))
       if (distance > system%body%spacing(k)) text = text//line('warning', 'probe '// &
         & probes(p)%name//' lies outside the bodies: the nearest point is '// &
@@ -78,7 +83,8 @@ contains
       text = text//line('', trim(merge('surface factors: corrected by energy ', &
         & 'no surface factors: switched off     ', model%surface)))
       if (model%breaking) then
-        text = text//line('', 'bonds can break'//trim(merge(', in compression too', repeat(' ', 20), model%compression)))
+        text = text//line('', 'bonds can break'// &
+          & trim(merge(', in compression too', repeat(' ', 20), model%compression)))
       else if (any(scene%materials%critical_stretch > 0.0_wp) .or. &
         & any(scene%materials%critical_energy_release_rate > 0.0_wp)) then
         text = text//line('', 'no bond can break: all points lie in no-fail zones')
@@ -108,7 +114,8 @@ contains
     if (recorder%steps_done > 0) text = text//line('speed', &
       & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
       & /(real(system%family%n_bonds, wp)*recorder%steps_done), 3)//' ns per bond and step, '// &
-      & to_text(recorder%steps_done/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
+      & to_text(recorder%steps_done/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
+      & ' steps/s')
     associate (now => recorder%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))
@@ -122,7 +129,8 @@ contains
         supply = recorder%supply + system%external_work
         balance = now%kinetic + now%strain + system%dissipated - supply
         largest = max(abs(now%kinetic) + abs(now%strain) + system%dissipated, abs(supply))
-        if (largest > 0.0_wp) text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '// &
+        if (largest > 0.0_wp) &
+          & text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '// &
           & to_text(100*abs(balance)/largest, 2)//' % of the energy')
       end if
     end associate

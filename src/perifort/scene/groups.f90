@@ -268,8 +268,9 @@ contains
     call keys%key('dilatation', group%dilatation, 'stretch in the dilatation: projected '// &
       & '(as in the book) or unprojected (Lambda = 1)', &
       & allowed=[character(11) :: 'projected', 'unprojected'])
-    call keys%key('family', group%family, 'how families are kept: a lattice where all points lie '// &
-      & 'on grids, else lists; or one of them by force', &
+    call keys%key('family', group%family, &
+      & 'how families are kept: a lattice where all points lie on grids, else lists; or one of '// &
+      & 'them by force', &
       & allowed=[character(9) :: 'automatic', 'lattice', 'list'])
   end subroutine visit_horizon
 
