@@ -357,9 +357,9 @@ contains
     k = max(1, faulty_slot(system, system%state%v, dt))
     call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))// &
       & '): point '//to_text(int(system%body%point(k)))//' at ('//place(system, k)// &
-      & ') moves more than a horizon in a step of '//to_text(dt)//' s. Likely cause: a time step '// &
-      & 'above the stable one (`perifort check` prints it; lower safety or step), or an imposed '// &
-      & 'velocity beyond the wave speed', status_no_answer)
+      & ') moves more than a horizon in a step of '//to_text(dt)//' s. Likely cause: a time '// &
+      & 'step above the stable one (`perifort check` prints it; lower safety or step), or an '// &
+      & 'imposed velocity beyond the wave speed', status_no_answer)
   end subroutine explain_fault
 
   !> Position of a slot as text.
