@@ -104,16 +104,16 @@ class Lattice:
             law = law + 2 * self.a * (self.theta_transposed @ self.theta)
         return (self.transposed @ law @ self.stretch).tocsc()
 
-    def statics(self, load, held=None):
+    def statics(self, load, held=None, imposed=None):
         """Displacements (n, dim) under a force density (n, dim) [N/m3].
 
-        `held` (n, dim), true where the displacement is 0. Without it the body is free: the load must be in
-        balance, and mean displacement and mean rotation are 0.
+        `held` (n, dim), true where the displacement is that of `imposed` (n, dim), by default 0. Without it
+        the body is free, the load must be in balance, and a rigid motion of the answer means nothing.
         """
-        b = load.ravel().astype(float)
+        u = np.zeros(self.n * self.dim) if imposed is None else np.where(held, imposed, 0.0).ravel()
+        b = load.ravel() - self.apply(u)
         free = np.ones(b.size, bool) if held is None else ~held.ravel()
         if self.dim < 3 and held is not None:
-            u = np.zeros(b.size)
             u[free] = splu(self.matrix()[free][:, free]).solve(b[free])
             return u.reshape(self.n, self.dim)
         def product(v):
@@ -129,7 +129,6 @@ class Lattice:
         part, status = cg(solver, b[free], rtol=1e-11, maxiter=20000, M=sp.diags(1 / scale))
         if status != 0:
             raise RuntimeError("the conjugate gradients did not converge")
-        u = np.zeros(b.size)
         u[free] = part
         return u.reshape(self.n, self.dim)
 

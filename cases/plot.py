@@ -114,14 +114,13 @@ def draw(figure, place, results, name, output, title, magnify, window=None, limi
         shown = slice(None, None, max(1, len(positions) // 60000))
         drawn = axis.scatter(*positions[shown].T, c=values[shown], s=4, linewidths=0, depthshade=False, **colours)
         extent = np.ptp(positions, axis=0)
-        axis.set_box_aspect(np.maximum(extent, 0.05 * extent.max()), zoom=1.3)
+        axis.set_box_aspect(np.maximum(extent, 0.05 * extent.max()), zoom=1.15)
         # Labels of short sides would lie on top of one another
         for side, length, ticks in zip("xyz", extent, (axis.xaxis, axis.yaxis, axis.zaxis)):
             if length > 0.3 * extent.max():
                 ticks.set_label_text(f"{side} [m]")
             else:
                 ticks.set_ticks([])
-                ticks.set_label_text(side)
         axis.tick_params(labelsize=6)
     else:
         axis = figure.add_subplot(*place)
@@ -133,7 +132,7 @@ def draw(figure, place, results, name, output, title, magnify, window=None, limi
         axis.set(xlabel="x [m]", ylabel="y [m]")
         axis.ticklabel_format(scilimits=(-2, 3))
     axis.set_title(title, fontsize=10)
-    figure.colorbar(drawn, ax=axis, shrink=0.75 if dim == 2 else 0.5, label=label)
+    figure.colorbar(drawn, ax=axis, shrink=0.75 if dim == 2 else 0.5, pad=0.05 if dim == 2 else 0.12, label=label)
 
 
 def figure_of_fields(items, path, columns=1, magnify=0.0, panel=(5.0, 3.6), window=None, limits=None, dpi=80):

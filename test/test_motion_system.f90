@@ -7,7 +7,8 @@ module test_motion_system
   use pd_motion_explicit, only: run_explicit
   use pd_scene_types, only: scene_type
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
-  use bodies, only: box_scene, diary_type, expect, expect_true, ready, text_of
+  use bodies, only: box_scene, density_of_steel, diary_type, expect, expect_true, ready, text_of, &
+    & youngs_modulus
   implicit none (type, external)
   private
   public :: collect_motion_system
@@ -23,11 +24,48 @@ contains
       & new_unittest('imposed motion and loads pay for the energy', test_work), &
       & new_unittest('kinks of the imposed speed cost first order', test_kink), &
       & new_unittest('breaking bonds take their energy out', test_fracture), &
+      & new_unittest('a bond pulls once more if it breaks after the forces', test_break_late), &
       & new_unittest('a run has the same bits on 1, 2 and 4 threads', test_threads)]
   end subroutine collect_motion_system
 
-  !> Run a scene for `time` with `steps` steps; the largest imbalance kinetic + strain + dissipated
-  !> - work - (the same at the start), over the largest energy that was in play.
+  !> Two points, pulled apart beyond the limit from the start. If their bond breaks before the forces
+  !> they never move; if after, the first half kick sends them towards each other, and nothing stops
+  !> them.
+  subroutine test_break_late(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: stretch = 0.02_wp, ratio = 3.015_wp, dt = 1.0e-8_wp
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(diary_type) :: diary
+    type(fault_type), allocatable :: fault
+    real(wp) :: speed
+    integer :: late
+
+    call box_scene([2], spacing, 0.0_wp, scene)
+    scene%materials(1)%critical_stretch = stretch/2
+    deallocate (scene%initial)
+    allocate (scene%initial(1))
+    scene%initial(1)%displacement_gradient(1, 1) = stretch
+    do late = 0, 1
+      if (late == 1) scene%time%breaking = 'after_forces'
+      call ready(scene, set_up, error)
+      if (allocated(error)) return
+      diary = diary_type(slot=set_up%system%body%slot(1))
+      call run_explicit(set_up%system, 'forward_backward', dt, 3, diary, fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      ! c s V/rho over half a step, with c = 2 E/(A delta^2) and V = A dx
+      speed = late*dt/2*2*youngs_modulus/(ratio**2*spacing)*stretch/density_of_steel
+      call expect(error, diary%u(1, 4) - diary%u(1, 1), 3*dt*speed, 1.0e-9_wp*(dt*speed + spacing*1.0e-6_wp), &
+        & 'way of the first point')
+      call expect_true(error, set_up%system%broken == 1, 'the bond did not break, or not once')
+    end do
+  end subroutine test_break_late
+
+  !> Run a scene for `time` with `steps` steps; the largest imbalance kinetic + strain + dissipated -
+  !> work - (the same at the start), over the largest energy that was in play.
   subroutine imbalance(scene, time, steps, worst, set_up, error, most)
     type(scene_type), intent(in) :: scene
     real(wp), intent(in) :: time

@@ -194,6 +194,7 @@ contains
       call timer%stop('cracks')
 
       call timer%start('time step')
+      system%break_late = scene%time%breaking == 'after_forces'
       call start_system(system)
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return

@@ -42,6 +42,7 @@ module pd_motion_system
     real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
     real(wp), allocatable :: last_u(:)          !! work accounting: place and force of each
     real(wp), allocatable :: last_force(:)      !! component that does work, at the last step
+    logical :: break_late = .false.             !! bonds break after the step's forces
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
   end type system_type
 
@@ -99,32 +100,36 @@ contains
 
   !> The first half of a step (doc/theory.md, 5): impose at time `t`, break bonds (unless `breaking`
   !> is false), dilatation, forces. Breaking needs no pass of its own: the first pass over the bonds
-  !> marks the strained slots, and only those are computed again.
+  !> marks the strained slots, and only those are computed again. With `break_late` the bonds of this
+  !> instant still pull and break thereafter, as in the book's programs: a bond then lives up to a
+  !> step too long, an error of first order in the step; the other order errs both ways.
   subroutine evaluate(system, t, breaking)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
     logical, intent(in) :: breaking
     integer(i4), allocatable :: slots(:)
-    logical :: breaks
+    logical :: early, late
 
-    breaks = breaking .and. system%model%breaking
+    early = breaking .and. system%model%breaking .and. .not. system%break_late
+    late = breaking .and. system%model%breaking .and. system%break_late
     associate (state => system%state, model => system%model)
       call impose(system%motions, t, state%u, state%v)
       if (model%dilatation) then
         call dilatation_pass(system%family, model, state%u, state%p, system%strained)
-        if (breaks) then
+        if (early) then
           call break_marked(system, slots)
           call renew_dilatation(system, slots)
         end if
         call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
       else
         call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
-        if (breaks) then
+        if (early) then
           call break_marked(system, slots)
           call renew_force(system, slots)
         end if
       end if
     end associate
+    if (late) call break_marked(system, slots)
   end subroutine evaluate
 
   !> Break every bond beyond its limit at the present displacements (relaxation, after a load step);

@@ -366,6 +366,9 @@ contains
       & default='explicit: steps or duration is required', hidden=group%steps == 0)
     call keys%key('duration', group%duration, 's', 'time to compute, instead of steps', &
       & above=0.0_wp)
+    call keys%key('breaking', group%breaking, 'explicit: a bond beyond its limit breaks before '// &
+      & "the step's forces, or after it has pulled once more (as in the book's programs)", &
+      & allowed=[character(13) :: 'before_forces', 'after_forces'])
   end subroutine visit_time
 
   !> `&relaxation`

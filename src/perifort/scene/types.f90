@@ -125,6 +125,7 @@ module pd_scene_types
     real(wp) :: safety = 0.8_wp                  !! fraction of 7.25 [-]
     integer :: steps = 0
     real(wp) :: duration = unset                 !! [s], instead of steps
+    character(name_length) :: breaking = 'before_forces'      !! 'after_forces'
   end type time_group
 
   !> `&relaxation`
