@@ -225,7 +225,7 @@ contains
 
   !> Strain energy of the whole body [J].
   real(wp) function total_energy(subject, u) result(energy)
-    type(subject_type), intent(in) :: subject
+    type(subject_type), intent(inout) :: subject
     real(wp), intent(in) :: u(:, :)
     real(wp), allocatable :: density(:)
     integer(i1), allocatable :: strained(:)

@@ -19,6 +19,9 @@ module pd_family_list
     real(wp), allocatable :: volume(:)         !! [m3]
     real(wp), allocatable :: spacing(:)        !! [m]
     real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
+    logical :: one_spacing = .false.           !! all points have the same
+    real(wp), allocatable :: place(:, :)       !! position and volume, point by point (4, n_slots)
+    real(wp), allocatable :: moved(:, :)       !! displacement and p, kept by the force loops (4, n_slots)
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
@@ -65,6 +68,12 @@ contains
     family%x = body%x
     family%volume = body%volume
     family%spacing = body%spacing
+    family%one_spacing = maxval(family%spacing) <= minval(family%spacing)
+    allocate (family%place(4, family%n_slots), family%moved(4, family%n_slots), source=0.0_wp)
+    do k = 1, family%n_slots
+      family%place(:family%dim, k) = body%x(k, :)
+      family%place(4, k) = body%volume(k)
+    end do
     if (rule%kind == volume_exact) call store_fractions(family)
   end subroutine new_list_family
 
@@ -121,7 +130,7 @@ contains
 
   pure integer(i8) function bytes(family)
     class(list_family_type), intent(in) :: family
-    bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*(3 + family%dim)
+    bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*(11 + family%dim)
     if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds
   end function bytes
 

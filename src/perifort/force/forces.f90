@@ -49,7 +49,7 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine energy_pass(family, model, u, energy, strained)
-    class(family_type), intent(in) :: family
+    class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
