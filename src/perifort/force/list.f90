@@ -172,6 +172,8 @@ contains
 
     own = [-place(1, k), -place(2, k), -place(3, k), 0.0_wp]
     own_moved = [-moved(1, k), -moved(2, k), -moved(3, k), moved(4, k)]
+    ! four components at a time, not the bonds: vectors of bonds would be gathered number by number
+    !GCC$ novector
     do i = 1, n
       xi(:, i) = place(:, neighbour(i)) + own
       eta(:, i) = moved(:, neighbour(i)) + own_moved
