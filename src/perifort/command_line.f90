@@ -268,7 +268,7 @@ contains
     character(:), allocatable :: text
     integer, parameter :: w = 90
     character(*), parameter :: threads = &
-      & '  --threads N     number of threads (default: all cores, or OMP_NUM_THREADS)'
+      & '  --threads N     number of threads (default: OMP_NUM_THREADS or all; small scenes one)'
 
     select case (command)
     case ('run')

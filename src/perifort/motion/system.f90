@@ -100,9 +100,9 @@ contains
 
   !> The first half of a step (doc/theory.md, 5): impose at time `t`, break bonds (unless `breaking`
   !> is false), dilatation, forces. Breaking needs no pass of its own: the first pass over the bonds
-  !> marks the strained slots, and only those are computed again. With `break_late` the bonds of this
-  !> instant still pull and break thereafter, as in the book's programs: a bond then lives up to a
-  !> step too long, an error of first order in the step; the other order errs both ways.
+  !> marks the strained slots, and only those are computed again. With `break_late` the bonds of
+  !> this instant still pull and break thereafter, as in the book's programs: a bond then lives up
+  !> to a step too long, an error of first order in the step; the other order errs both ways.
   subroutine evaluate(system, t, breaking)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
