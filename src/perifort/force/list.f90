@@ -168,15 +168,18 @@ contains
     real(wp), intent(in) :: place(4, n_slots), moved(4, n_slots)
     real(wp), intent(inout) :: xi(4, n), eta(4, n)
     real(wp) :: own(4), own_moved(4)
-    integer :: i
+    integer :: i, j, c
 
     own = [-place(1, k), -place(2, k), -place(3, k), 0.0_wp]
     own_moved = [-moved(1, k), -moved(2, k), -moved(3, k), moved(4, k)]
     ! four components at a time, not the bonds: vectors of bonds would be gathered number by number
-    !GCC$ novector
     do i = 1, n
-      xi(:, i) = place(:, neighbour(i)) + own
-      eta(:, i) = moved(:, neighbour(i)) + own_moved
+      j = neighbour(i)
+      !$omp simd
+      do c = 1, 4
+        xi(c, i) = place(c, j) + own(c)
+        eta(c, i) = moved(c, j) + own_moved(c)
+      end do
     end do
   end subroutine fetch
 
