@@ -398,13 +398,13 @@ contains
         & '  --points N ...    points along an edge, several numbers for several sizes', &
         & '                    (default: 80 in 3D, 500 in 2D, 1000 in 1D)', &
         & '  --dimension D ... 1, 2, 3 or some of them (default: all)', &
-        & '  --threads N,...   numbers of threads (default: 1 and all, bars 1); 1 is always there', &
+        & '  --threads N,...   numbers of threads (default: 1 and all; bars: 1); 1 is always in', &
         & '  --model MODEL     state_based, bond_based or both (default)', &
         & '  --family FAMILY   lattice, list or both (default)', &
-        & '  --breaking WORD   on: bonds can break, though none does; off; or both (default: both,', &
-        & '                    for lists off)', &
+        & '  --breaking WORD   on: bonds can break, though none does; off; or both', &
+        & '                    (default: both, for lists off)', &
         & '  --surface         with surface correction (default: without)', &
-        & '  --seconds S       each of five or more repeats takes so long at least (default: 0.25)', &
+        & '  --seconds S       a repeat, of five or more, takes so long at least (default: 0.25)', &
         & '  --csv FILE        write the numbers to a file, too; one of that name is replaced'], &
         & newline)
     case ('version')

@@ -262,9 +262,9 @@ contains
 
   !> Bytes that a step must move between memory and processor at least, if every array is read or
   !> written once by every pass that needs it. Force pass: u, p read, force written; dilatation
-  !> pass: u read, p written; motion: force, v, u read, v, u written. Where bonds can break: the bits
-  !> read by each pass, the marks written and read. Lists: number and flag of every bond, positions,
-  !> volumes and spacings read by each pass.
+  !> pass: u read, p written; motion: force, v, u read, v, u written. Where bonds can break: the
+  !> bits read by each pass, the marks written and read. Lists: number and flag of every bond,
+  !> positions, volumes and spacings read by each pass.
   pure real(wp) function bytes_of_step(system) result(bytes)
     type(system_type), intent(in) :: system
     integer :: d, passes

@@ -20,7 +20,8 @@ module pd_study_machine
 contains
 
   !> Measure with `threads` threads. `length`: elements of each of the three arrays; they must
-  !> exceed the caches by far. `repeats`: the best of so many counts, since other work only slows down.
+  !> exceed the caches by far. `repeats`: the best of so many counts, since other work can only make
+  !> things slower.
   subroutine measure_machine(threads, length, repeats, machine)
     integer, intent(in) :: threads, repeats
     integer(i8), intent(in) :: length

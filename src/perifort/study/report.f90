@@ -39,8 +39,8 @@ contains
     step = timing%seconds/timing%steps
     text = to_text(kernel%dimension)//','//trim(kernel%model)//','//trim(kernel%family)//','// &
       & switch(kernel%breaking)//',double,'//to_text(timing%points)//','//to_text(timing%bonds)// &
-      & ','//to_text(kernel%threads)//','//to_text(timing%steps)//','//to_text(timing%seconds, 9)// &
-      & ','//to_text(1.0e9_wp*step/real(timing%bonds, wp), 9)//','// &
+      & ','//to_text(kernel%threads)//','//to_text(timing%steps)//','// &
+      & to_text(timing%seconds, 9)//','//to_text(1.0e9_wp*step/real(timing%bonds, wp), 9)//','// &
       & to_text(real(timing%bytes, wp)/real(timing%points, wp))//','//to_text(timing%build)//','// &
       & to_text(1.0e-9_wp*timing%traffic/step)//','//to_text(1.0e-9_wp*timing%flops/step)//','// &
       & to_text(efficiency)
@@ -62,8 +62,8 @@ contains
     write (unit, '(a)') '', &
       & 'Horizon 3.015 spacings, '//trim(merge('with   ', 'without', surface))// &
       & ' surface correction; bonds are directed.', &
-      & '  ns/bond   a whole step (forces, the look for breaking bonds where they can, accounts of', &
-      & '            work, new velocities and displacements; no output), wall time, median of repeats', &
+      & '  ns/bond   a whole step (forces, the look for breaking bonds where they can, accounts', &
+      & '            of work, new velocities and displacements; no output), wall time, median', &
       & '  cpu       the same in processor time per thread', &
       & '  forces    without accounts and motion', &
       & '  B/pt      memory of points and families; build/pt: time to build the families [ns]', &
