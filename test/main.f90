@@ -39,6 +39,7 @@ program main
   use test_scene_template, only: collect_scene_template
   use test_scene_values, only: collect_scene_values
   use test_scene_write, only: collect_scene_write
+  use test_study_bench, only: collect_study_bench
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -78,6 +79,7 @@ program main
   call register('scene_template', collect_scene_template)
   call register('scene_values', collect_scene_values)
   call register('scene_write', collect_scene_write)
+  call register('study_bench', collect_study_bench)
 
   call read_arguments()
   if (len(suite_name) > 0) then

@@ -17,6 +17,7 @@ contains
       & new_unittest('run with all its options', test_run), &
       & new_unittest('options may stand before the file and take =', test_order), &
       & new_unittest('defaults', test_defaults), &
+      & new_unittest('bench with all its options', test_bench), &
       & new_unittest('names after -- may begin with a dash', test_dashes), &
       & new_unittest('help is there for every command', test_help), &
       & new_unittest('--help excuses what is missing', test_help_excuses), &
@@ -73,6 +74,45 @@ contains
     if (allocated(error)) return
     call check(error, len(line%argument), 0)
   end subroutine test_defaults
+
+  !> Several numbers may be parted by blanks or commas.
+  subroutine test_bench(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'bench', '--points', '40', '80', '--threads', '1,2', &
+      & '--dimension=3,2', '--model', 'both', '--family', 'list', '--breaking', 'off', &
+      & '--surface', '--seconds', '0.5', '--csv', 'a.csv'], line, fault)
+    call check(error, .not. allocated(fault), 'a good command line was refused')
+    if (allocated(error)) return
+    call check(error, size(line%bench%points) == 2 .and. size(line%bench%threads) == 2 .and. &
+      & size(line%bench%dimensions) == 2, 'how many numbers')
+    if (allocated(error)) return
+    call check(error, all(line%bench%points == [40, 80]) .and. all(line%bench%threads == [1, 2]) &
+      & .and. all(line%bench%dimensions == [3, 2]), 'the numbers')
+    if (allocated(error)) return
+    call check(error, line%bench%model//' '//line%bench%family//' '//line%bench%breaking//' '// &
+      & line%bench%csv, 'both list off a.csv')
+    if (allocated(error)) return
+    call check(error, line%bench%surface .and. abs(line%bench%seconds - 0.5d0) <= 0.0d0)
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', 'a.nml'], 'takes no argument')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', '--points', '40,,80'], "found '40,,80'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', '--points', '3'], "'--points' must be between")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', '--threads', '1', '0'], "found '1,0'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', '--seconds', 'long'], "found 'long'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', '--model', 'bond'], 'must be state_based')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--threads', '1,2'], 'takes one number')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--csv', 'b'], "no option of 'run'")
+  end subroutine test_bench
 
   subroutine test_dashes(error)
     type(error_type), allocatable, intent(out) :: error

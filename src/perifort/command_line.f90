@@ -1,16 +1,18 @@
 !> What the user typed: one command, its file or name, and options; and the texts of `--help`.
 module pd_command_line
   use pd_base_error, only: error_type, fail, status_usage
-  use pd_base_text, only: join, nearest_name, newline
+  use pd_base_text, only: join, nearest_name, newline, to_text
+  use pd_study_options, only: bench_options_type, check_options
   implicit none (type, external)
   private
   public :: command_line_type, parse_command_line, read_command_line, help_text, command_names
 
   integer, parameter :: word_length = 16
-  character(word_length), parameter :: command_names(6) = [character(word_length) :: &
-    & 'run', 'check', 'template', 'reference', 'version', 'help']
-  character(word_length), parameter :: option_names(5) = [character(word_length) :: &
-    & '--output', '--threads', '--overwrite', '--quiet', '--help']
+  character(word_length), parameter :: command_names(7) = [character(word_length) :: &
+    & 'run', 'check', 'template', 'reference', 'bench', 'version', 'help']
+  character(word_length), parameter :: option_names(13) = [character(word_length) :: &
+    & '--output', '--threads', '--overwrite', '--quiet', '--points', '--dimension', '--model', &
+    & '--family', '--breaking', '--surface', '--seconds', '--csv', '--help']
 
   !> A command line, understood and checked.
   type :: command_line_type
@@ -20,6 +22,7 @@ module pd_command_line
     integer :: threads = 0                         !! `--threads`; 0 = as the machine has it
     logical :: overwrite = .false.                 !! `--overwrite`
     logical :: quiet = .false.                     !! `--quiet`
+    type(bench_options_type) :: bench              !! the options of `bench`
     logical :: help = .false.                      !! `--help`: only the text is wanted
     character(:), allocatable :: text              !! the command line as it was typed
   end type command_line_type
@@ -113,6 +116,11 @@ contains
           if (i <= size(arguments)) value = trim(arguments(i))
           ! An option in the value's place means that the value was forgotten.
           if (i > size(arguments) .or. index(value, '--') == 1) value = ''
+          do while (i < size(arguments) .and. takes_many(name, line%command))
+            if (verify(trim(arguments(i + 1)), '0123456789,') > 0) exit
+            i = i + 1
+            value = value//','//trim(arguments(i))
+          end do
         else if (has_value .and. .not. takes_value(name)) then
           call usage(error, line, "'"//name//"' takes no value, found '"//value//"'")
           return
@@ -139,6 +147,7 @@ contains
     type(command_line_type), intent(inout) :: line
     logical, intent(in) :: seen(:)
     type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: fault
     integer :: i
 
     if (line%help) return
@@ -155,11 +164,18 @@ contains
     end do
     select case (line%command)
     case ('run', 'check')
-      if (len(line%argument) == 0) &
-        & call usage(error, line, "'"//line%command//"' needs the scene file")
-    case ('version')
-      if (len(line%argument) > 0) call usage(error, line, "'version' takes no argument, found '"// &
-        & line%argument//"'")
+      if (len(line%argument) == 0) then
+        call usage(error, line, "'"//line%command//"' needs the scene file")
+      else if (allocated(line%bench%threads)) then
+        if (size(line%bench%threads) > 1) call usage(error, line, "'"//line%command// &
+          & "' takes one number of '--threads', found "//to_text(size(line%bench%threads)))
+      end if
+    case ('bench', 'version')
+      if (len(line%argument) > 0) call usage(error, line, "'"//line%command// &
+        & "' takes no argument, found '"//line%argument//"'")
+      if (allocated(error)) return
+      call check_options(line%bench, fault)
+      if (allocated(fault)) call usage(error, line, fault%message)
     case ('help')
       line%help = .true.
       line%command = ''
@@ -197,16 +213,39 @@ contains
       if (len(value) > 0) return
       call usage(error, line, "'--output' needs a folder, as in --output results")
     case ('--threads')
-      status = 1
-      if (len(value) > 0 .and. len(value) <= 6 .and. verify(value, '0123456789') == 0) &
-        & read (value, *, iostat=status) line%threads
+      call read_numbers(value, line%bench%threads)
       if (len(value) == 0) then
         call usage(error, line, "'--threads' needs a number, as in --threads 4")
-      else if (status /= 0 .or. line%threads < 1) then
-        line%threads = 0
+      else if (size(line%bench%threads) == 0 .or. any(line%bench%threads > 999999)) then
         call usage(error, line, "'--threads' needs a whole number from 1 to 999999, found '"// &
           & value//"'")
+      else
+        line%threads = line%bench%threads(1)
       end if
+    case ('--points')
+      call read_numbers(value, line%bench%points)
+      if (size(line%bench%points) == 0) call usage(error, line, "'--points' needs numbers of "// &
+        & "points along an edge, as in --points 40 80, found '"//value//"'")
+    case ('--dimension')
+      call read_numbers(value, line%bench%dimensions)
+      if (size(line%bench%dimensions) == 0) call usage(error, line, &
+        & "'--dimension' needs 1, 2 or 3, or some of them, found '"//value//"'")
+    case ('--model', '--family', '--breaking')
+      if (name == '--model') line%bench%model = value
+      if (name == '--family') line%bench%family = value
+      if (name == '--breaking') line%bench%breaking = value
+      if (len(value) == 0) call usage(error, line, "'"//name//"' needs a word")
+    case ('--surface')
+      line%bench%surface = .true.
+    case ('--seconds')
+      status = 1
+      if (len(value) > 0 .and. verify(value, '0123456789.') == 0) &
+        & read (value, *, iostat=status) line%bench%seconds
+      if (status /= 0) call usage(error, line, "'--seconds' needs a number, as in "// &
+        & "--seconds 0.5, found '"//value//"'")
+    case ('--csv')
+      line%bench%csv = value
+      if (len(value) == 0) call usage(error, line, "'--csv' needs a file, as in --csv bench.csv")
     case ('--overwrite')
       line%overwrite = .true.
     case ('--quiet')
@@ -218,10 +257,50 @@ contains
     end select
   end subroutine set_option
 
+  !> Whole numbers above 0, parted by commas; none if there is anything else.
+  subroutine read_numbers(text, numbers)
+    character(*), intent(in) :: text
+    integer, allocatable, intent(out) :: numbers(:)
+    integer, parameter :: longest = 9
+    integer :: at, next, number, status
+
+    allocate (numbers(0))
+    at = 1
+    do while (at <= len(text) + 1)
+      next = index(text(at:)//',', ',')
+      status = 1
+      if (next > 1 .and. next <= longest + 1) then
+        if (verify(text(at:at + next - 2), '0123456789') == 0) &
+          & read (text(at:at + next - 2), *, iostat=status) number
+      end if
+      if (status == 0) then
+        if (number < 1) status = 1
+      end if
+      if (status /= 0) then
+        numbers = numbers(:0)
+        return
+      end if
+      numbers = [numbers, number]
+      at = at + next
+    end do
+  end subroutine read_numbers
+
   pure logical function takes_value(name)
     character(*), intent(in) :: name
-    takes_value = name == '--output' .or. name == '--threads'
+    select case (name)
+    case ('--overwrite', '--quiet', '--surface', '--help')
+      takes_value = .false.
+    case default
+      takes_value = .true.
+    end select
   end function takes_value
+
+  !> Whether several words may follow. Where a file comes next, one must do.
+  pure logical function takes_many(name, command)
+    character(*), intent(in) :: name, command
+    takes_many = name == '--points' .or. name == '--dimension' .or. &
+      & (name == '--threads' .and. command == 'bench')
+  end function takes_many
 
   pure logical function belongs(option, command)
     character(*), intent(in) :: option, command
@@ -229,7 +308,10 @@ contains
     case ('--help')
       belongs = .true.
     case ('--threads')
-      belongs = command == 'run' .or. command == 'check'
+      belongs = command == 'run' .or. command == 'check' .or. command == 'bench'
+    case ('--points', '--dimension', '--model', '--family', '--breaking', '--surface', &
+      & '--seconds', '--csv')
+      belongs = command == 'bench'
     case default
       belongs = command == 'run'
     end select
@@ -303,6 +385,28 @@ contains
         & '', &
         & 'Print every group and key of a scene file, or those of one group: meaning, unit,', &
         & 'default.'], newline)
+    case ('bench')
+      text = join([character(w) :: &
+        & 'perifort bench [--points N ...] [--dimension D ...] [--threads N,...] [--model MODEL]', &
+        & '               [--family FAMILY] [--breaking WORD] [--surface] [--seconds S]', &
+        & '               [--csv FILE]', &
+        & '', &
+        & 'Measure the speed of the force loops on standard bodies (cube, plate, bar) and print', &
+        & 'it beside the bandwidth and the peak of this machine. Without options this takes a', &
+        & 'minute or two. Other work on the machine disturbs it.', &
+        & '', &
+        & '  --points N ...    points along an edge, several numbers for several sizes', &
+        & '                    (default: 80 in 3D, 500 in 2D, 1000 in 1D)', &
+        & '  --dimension D ... 1, 2, 3 or some of them (default: all)', &
+        & '  --threads N,...   numbers of threads (default: 1 and all; bars: 1); 1 is always in', &
+        & '  --model MODEL     state_based, bond_based or both (default)', &
+        & '  --family FAMILY   lattice, list or both (default)', &
+        & '  --breaking WORD   on: bonds can break, though none does; off; or both', &
+        & '                    (default: both, for lists off)', &
+        & '  --surface         with surface correction (default: without)', &
+        & '  --seconds S       a repeat, of five or more, takes so long at least (default: 0.25)', &
+        & '  --csv FILE        write the numbers to a file, too; one of that name is replaced'], &
+        & newline)
     case ('version')
       text = join([character(w) :: &
         & 'perifort version', &
@@ -316,6 +420,7 @@ contains
         & '  perifort check FILE          check a scene and tell what it costs', &
         & '  perifort template [NAME]     print a commented scene to start from', &
         & '  perifort reference [GROUP]   print the groups and keys of a scene', &
+        & '  perifort bench               measure the speed on this machine', &
         & '  perifort version             print version, compiler and HDF5', &
         & '  perifort help COMMAND        more on a command, as does COMMAND --help', &
         & '', &

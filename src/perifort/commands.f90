@@ -11,6 +11,7 @@ module pd_commands
   use pd_scene_reference, only: write_reference
   use pd_scene_template, only: write_template
   use pd_scene_types, only: scene_type
+  use pd_study_bench, only: run_bench
   implicit none (type, external)
   private
   public :: execute, hdf5_version
@@ -48,6 +49,8 @@ contains
       call write_template(output_unit, line%argument, error)
     case ('reference')
       call write_reference(output_unit, line%argument, error)
+    case ('bench')
+      call run_bench(line%bench, error)
     case ('version')
       call write_version()
     case default

@@ -1,0 +1,180 @@
+!> What the machine can do at best, measured here and now: bytes per second from memory and
+!> operations per second in registers; and what it is.
+module pd_study_machine
+  use pd_base_clock, only: wall_time
+  use pd_base_kinds, only: wp, i8
+  implicit none (type, external)
+  private
+  public :: machine_type, measure_machine, processor_name, available_memory, processor_time
+
+  !> Best of some repeats, with a number of threads.
+  type :: machine_type
+    integer :: threads = 1
+    real(wp) :: bandwidth = 0.0_wp   !! of a = b + s c on long arrays, 24 bytes an element [bytes/s]
+    real(wp) :: peak = 0.0_wp        !! multiply-adds in registers, two operations each [1/s]
+  end type machine_type
+
+  integer, parameter :: lanes = 8            !! elements of an accumulator
+  integer, parameter :: inner = 20000        !! multiply-adds between looks at the clock
+
+contains
+
+  !> Measure with `threads` threads. `length`: elements of each of the three arrays; they must
+  !> exceed the caches by far. `repeats`: the best of so many counts, since other work can only make
+  !> things slower.
+  subroutine measure_machine(threads, length, repeats, machine)
+    integer, intent(in) :: threads, repeats
+    integer(i8), intent(in) :: length
+    type(machine_type), intent(out) :: machine
+
+    machine%threads = threads
+    call measure_bandwidth(threads, length, repeats, machine%bandwidth)
+    call measure_peak(threads, repeats, machine%peak)
+  end subroutine measure_machine
+
+  !> The triad a = b + s c. Memory traffic that the hardware adds (reading a before it is written)
+  !> is not counted, as is usual.
+  subroutine measure_bandwidth(threads, length, repeats, bandwidth)
+    integer, intent(in) :: threads, repeats
+    integer(i8), intent(in) :: length
+    real(wp), intent(out) :: bandwidth
+    real(wp), allocatable :: a(:), b(:), c(:)
+    real(wp) :: begin, best
+    integer(i8) :: i
+    integer :: r
+
+    allocate (a(length), b(length), c(length))
+    ! each thread touches first what it will work on
+    !$omp parallel do schedule(static) num_threads(threads) default(none) &
+    !$omp shared(a, b, c, length) private(i)
+    do i = 1, length
+      a(i) = 0.0_wp
+      b(i) = 1.0_wp
+      c(i) = 2.0_wp
+    end do
+    best = huge(best)
+    do r = 1, repeats
+      begin = wall_time()
+      !$omp parallel do simd schedule(static) num_threads(threads) default(none) &
+      !$omp shared(a, b, c, length, r) private(i)
+      do i = 1, length
+        a(i) = b(i) + r*c(i)
+      end do
+      best = min(best, wall_time() - begin)
+    end do
+    bandwidth = 24*real(length, wp)/max(best, tiny(best))
+    ! a result that nobody reads need not be computed
+    if (abs(a(length) - (1 + 2*repeats)) > 0.0_wp) bandwidth = 0.0_wp
+  end subroutine measure_bandwidth
+
+  !> Independent chains of multiply-adds, as many as hide their latency and still stay in registers.
+  subroutine measure_peak(threads, repeats, peak)
+    integer, intent(in) :: threads, repeats
+    real(wp), intent(out) :: peak
+    real(wp) :: begin, seconds, best, sums
+    integer :: r, t
+    integer(i8) :: rounds
+
+    rounds = 1_i8
+    best = huge(best)
+    r = 0
+    do while (r < repeats)
+      sums = 0.0_wp
+      begin = wall_time()
+      !$omp parallel do schedule(static, 1) num_threads(threads) default(none) &
+      !$omp shared(threads, rounds) private(t) reduction(+:sums)
+      do t = 1, threads
+        sums = sums + chains(rounds)
+      end do
+      seconds = wall_time() - begin
+      if (sums <= 0.0_wp) exit
+      if (seconds < 0.02_wp) then
+        rounds = 4*rounds
+        cycle
+      end if
+      r = r + 1
+      best = min(best, seconds/real(rounds, wp))
+    end do
+    peak = 2*6*real(lanes, wp)*inner*threads/best
+  end subroutine measure_peak
+
+  !> Six times `lanes` chains of `rounds*inner` multiply-adds; the value depends on all of them.
+  function chains(rounds) result(total)
+    integer(i8), intent(in) :: rounds
+    real(wp) :: total
+    real(wp) :: a(lanes), b(lanes), c(lanes), d(lanes), e(lanes), f(lanes), x, y
+    integer(i8) :: r
+    integer :: i, l
+
+    a = 1.0_wp
+    b = 1.1_wp
+    c = 1.2_wp
+    d = 1.3_wp
+    e = 1.4_wp
+    f = 1.5_wp
+    x = 0.999_wp
+    y = 0.001_wp
+    do r = 1, rounds
+      do i = 1, inner
+        !$omp simd
+        do l = 1, lanes
+          a(l) = a(l)*x + y
+          b(l) = b(l)*x + y
+          c(l) = c(l)*x + y
+          d(l) = d(l)*x + y
+          e(l) = e(l)*x + y
+          f(l) = f(l)*x + y
+        end do
+      end do
+    end do
+    total = sum(a + b + c + d + e + f)
+  end function chains
+
+  !> Processor time of all threads of this program so far [s].
+  function processor_time() result(seconds)
+    real(wp) :: seconds
+    call cpu_time(seconds)
+  end function processor_time
+
+  !> The processor's name, as Linux tells it; 'unknown' elsewhere.
+  function processor_name() result(name)
+    character(:), allocatable :: name
+    name = entry_of('/proc/cpuinfo', 'model name')
+    if (name == '') name = 'unknown'
+  end function processor_name
+
+  !> Memory that is free for programs [bytes], as Linux tells it; huge elsewhere.
+  function available_memory() result(bytes)
+    integer(i8) :: bytes
+    character(:), allocatable :: text
+    integer :: status
+
+    bytes = huge(bytes)
+    text = entry_of('/proc/meminfo', 'MemAvailable')
+    if (text == '') return
+    read (text, *, iostat=status) bytes
+    if (status == 0) bytes = 1024_i8*bytes
+    if (status /= 0) bytes = huge(bytes)
+  end function available_memory
+
+  !> The text after the colon of the first line of `file` that begins with `name`; '' without one.
+  function entry_of(file, name) result(text)
+    character(*), intent(in) :: file, name
+    character(:), allocatable :: text
+    character(500) :: line
+    integer :: unit, status
+
+    text = ''
+    open (newunit=unit, file=file, status='old', action='read', iostat=status)
+    if (status /= 0) return
+    do
+      read (unit, '(a)', iostat=status) line
+      if (status /= 0) exit
+      if (index(line, name) /= 1) cycle
+      text = trim(adjustl(line(index(line, ':') + 1:)))
+      exit
+    end do
+    close (unit)
+  end function entry_of
+
+end module pd_study_machine
