@@ -189,8 +189,10 @@ contains
 
       call timer%start('cracks')
       call cut_bonds(scene%cracks, system%body, system%family, set_up%cut)
-      allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
-      if (set_up%cut > 0_i8) call damage_of(system%body, system%family, system%state%damage)
+      if (set_up%cut > 0_i8) then
+        allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
+        call damage_of(system%body, system%family, system%state%damage)
+      end if
       call timer%stop('cracks')
 
       call timer%start('time step')

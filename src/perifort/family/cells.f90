@@ -16,6 +16,12 @@ module pd_family_cells
     integer(i4), allocatable :: cell(:)       !! each point's cell
   end type cells_type
 
+  !> Neighbours of a batch of points, one after another.
+  type :: batch_type
+    integer :: count = 0
+    integer(i4), allocatable :: neighbour(:)
+  end type batch_type
+
 contains
 
   !> Sort the points `x` (n, dim) into cells at least `reach` [m] wide.
@@ -87,28 +93,70 @@ contains
     !$omp parallel do schedule(dynamic, 512) default(none) shared(x, half_reach, cells, number) &
     !$omp private(k, none)
     do k = 1, size(x, 1)
-      call visit(x, half_reach, cells, k, number(k), none, .false.)
+      call visit(x, half_reach, cells, k, number(k), none)
     end do
   end subroutine count_neighbours
 
   !> The neighbours of each point in one array (7.11): those of point k stand from `start(k)` to
-  !> `start(k+1) - 1`, ascending.
+  !> `start(k+1) - 1`, ascending. Each batch of points collects into room of its own, so that the
+  !> search is made only once.
   subroutine collect_neighbours(x, half_reach, cells, start, neighbour)
     real(wp), intent(in) :: x(:, :)
     real(wp), intent(in) :: half_reach(:)
     type(cells_type), intent(in) :: cells
-    integer(i8), intent(in) :: start(:)
-    integer(i4), intent(out) :: neighbour(:)
+    integer(i8), allocatable, intent(out) :: start(:)
+    integer(i4), allocatable, intent(out) :: neighbour(:)
+    integer, parameter :: batch_length = 1024
+    type(batch_type), allocatable :: batch(:)
+    integer(i4), allocatable :: found(:)
     integer(i4) :: number
-    integer :: k
+    integer :: b, k, n
 
-    !$omp parallel do schedule(dynamic, 512) default(none) private(k, number) &
-    !$omp shared(x, half_reach, cells, start, neighbour)
-    do k = 1, size(x, 1)
-      call visit(x, half_reach, cells, k, number, neighbour(start(k):start(k + 1) - 1), .true.)
-      call sort(neighbour(start(k):start(k + 1) - 1))
+    n = size(x, 1)
+    allocate (batch((n + batch_length - 1)/batch_length), start(n + 1))
+    !$omp parallel default(none) shared(x, half_reach, cells, batch, start, n) &
+    !$omp private(b, k, found, number)
+    !$omp do schedule(dynamic)
+    do b = 1, size(batch)
+      allocate (batch(b)%neighbour(0))
+      do k = (b - 1)*batch_length + 1, min(b*batch_length, n)
+        call neighbours_of(x, half_reach, cells, k, number, found)
+        start(k + 1) = number
+        if (number == 0) cycle
+        call sort(found(:number))
+        call put(batch(b), found(:number))
+      end do
+    end do
+    !$omp end parallel
+    start(1) = 1_i8
+    do k = 1, n
+      start(k + 1) = start(k) + start(k + 1)
+    end do
+    allocate (neighbour(start(n + 1) - 1))
+    !$omp parallel do schedule(dynamic) default(none) shared(batch, start, neighbour) private(b, k)
+    do b = 1, size(batch)
+      k = (b - 1)*batch_length + 1
+      neighbour(start(k):start(k) + batch(b)%count - 1) = batch(b)%neighbour(:batch(b)%count)
+      deallocate (batch(b)%neighbour)
     end do
   end subroutine collect_neighbours
+
+  !> Put numbers behind those of a batch, which grows as needed.
+  pure subroutine put(batch, numbers)
+    type(batch_type), intent(inout) :: batch
+    integer(i4), intent(in) :: numbers(:)
+    integer(i4), allocatable :: longer(:)
+    integer :: n
+
+    n = batch%count + size(numbers)
+    if (n > size(batch%neighbour)) then
+      allocate (longer(max(n, 2*size(batch%neighbour))))
+      longer(:batch%count) = batch%neighbour(:batch%count)
+      call move_alloc(longer, batch%neighbour)
+    end if
+    batch%neighbour(batch%count + 1:n) = numbers
+    batch%count = n
+  end subroutine put
 
   !> The neighbours of one point in `found(:number)`, which grows as needed.
   pure subroutine neighbours_of(x, half_reach, cells, k, number, found)
@@ -119,14 +167,12 @@ contains
     integer(i4), intent(out) :: number
     integer(i4), allocatable, intent(inout) :: found(:)
 
-    if (.not. allocated(found)) allocate (found(0))
-    call visit(x, half_reach, cells, k, number, found, .false.)
-    if (number == 0_i4) return
-    if (number > size(found)) then
-      deallocate (found)
-      allocate (found(2*number))
-    end if
-    call visit(x, half_reach, cells, k, number, found, .true.)
+    if (.not. allocated(found)) allocate (found(256))
+    call visit(x, half_reach, cells, k, number, found)
+    if (number <= size(found)) return
+    deallocate (found)
+    allocate (found(2*number))
+    call visit(x, half_reach, cells, k, number, found)
   end subroutine neighbours_of
 
   !> Whether two points with different labels are neighbours.
@@ -151,15 +197,15 @@ contains
     !$omp end parallel
   end function joins_labels
 
-  !> Look through the cells around point `k`; count its neighbours and, if asked, collect them.
-  pure subroutine visit(x, half_reach, cells, k, number, found, collect)
+  !> Look through the cells around point `k`: the number of its neighbours, and as many of them as
+  !> `found` has room for.
+  pure subroutine visit(x, half_reach, cells, k, number, found)
     real(wp), intent(in) :: x(:, :)
     real(wp), intent(in) :: half_reach(:)
     type(cells_type), intent(in) :: cells
     integer, intent(in) :: k
     integer(i4), intent(out) :: number
     integer(i4), intent(inout) :: found(:)
-    logical, intent(in) :: collect
     real(wp) :: here(3), d2
     integer :: i(3), low(3), high(3), cx, cy, cz, at, c, m, j
 
@@ -184,7 +230,7 @@ contains
           end do
           if (d2 > (half_reach(k) + half_reach(j))**2) cycle
           number = number + 1_i4
-          if (collect) found(number) = int(j, i4)
+          if (number <= size(found)) found(number) = int(j, i4)
         end do
       end do
     end do

@@ -405,7 +405,8 @@ contains
     class(lattice_family_type), intent(in) :: family
     integer :: t
 
-    bytes = 5_i8*family%n_slots
+    bytes = family%n_slots
+    if (allocated(family%class_of)) bytes = bytes + 4_i8*family%n_slots
     if (allocated(family%broken)) bytes = bytes + 8_i8*family%n_slots*family%words
     if (allocated(family%block)) bytes = bytes + 8_i8*size(family%block)
     if (allocated(family%weights)) bytes = bytes + 4_i8*size(family%weights)

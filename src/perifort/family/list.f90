@@ -4,7 +4,7 @@
 module pd_family_list
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_body_body, only: body_type, arrange
-  use pd_family_cells, only: cells_type, sort_into_cells, count_neighbours, collect_neighbours
+  use pd_family_cells, only: cells_type, sort_into_cells, collect_neighbours
   use pd_family_family, only: family_type, bonds_type
   use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact
   implicit none (type, external)
@@ -15,8 +15,6 @@ module pd_family_list
     integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
     integer(i4), allocatable :: neighbour(:)   !! slot at each bond's other end
     integer(i1), allocatable :: intact(:)      !! 1 intact, 0 broken
-    real(wp), allocatable :: x(:, :)           !! positions (n_slots, dim) [m]
-    real(wp), allocatable :: volume(:)         !! [m3]
     real(wp), allocatable :: spacing(:)        !! [m]
     real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
     logical :: one_spacing = .false.           !! all points have the same
@@ -40,7 +38,6 @@ contains
     type(list_family_type), intent(out) :: family
     type(cells_type) :: cells
     real(wp), allocatable :: half_reach(:)
-    integer(i4), allocatable :: number(:)
     integer :: k
 
     ! fine cells first: they only order the points
@@ -49,24 +46,17 @@ contains
     family%dim = body%dim
     family%n_slots = body%n_slots
     family%rule = rule
-    allocate (half_reach(body%n_slots), number(body%n_slots))
+    allocate (half_reach(body%n_slots))
     do k = 1, body%n_slots
       half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
     end do
     call sort_into_cells(body%x, 2*maxval(half_reach), cells)
-    call count_neighbours(body%x, half_reach, cells, number)
-    allocate (family%start(body%n_slots + 1))
-    family%start(1) = 1_i8
-    do k = 1, body%n_slots
-      family%start(k + 1) = family%start(k) + number(k)
-    end do
-    family%most_bonds = maxval(number)
-    family%n_bonds = family%start(body%n_slots + 1) - 1_i8
-    allocate (family%neighbour(family%n_bonds))
     call collect_neighbours(body%x, half_reach, cells, family%start, family%neighbour)
+    family%n_bonds = size(family%neighbour, kind=i8)
+    do k = 1, body%n_slots
+      family%most_bonds = max(family%most_bonds, int(family%start(k + 1) - family%start(k)))
+    end do
     allocate (family%intact(family%n_bonds), source=1_i1)
-    family%x = body%x
-    family%volume = body%volume
     family%spacing = body%spacing
     family%one_spacing = maxval(family%spacing) <= minval(family%spacing)
     allocate (family%place(4, family%n_slots), family%moved(4, family%n_slots), source=0.0_wp)
@@ -89,7 +79,7 @@ contains
     do k = 1, family%n_slots
       do b = family%start(k), family%start(k + 1) - 1
         j = family%neighbour(b)
-        xi = family%x(j, :) - family%x(k, :)
+        xi = family%place(:family%dim, j) - family%place(:family%dim, k)
         family%fraction(b) = volume_correction(family%rule, xi, norm2(xi), &
           & (family%spacing(k) + family%spacing(j))/2)
       end do
@@ -109,14 +99,14 @@ contains
       bonds%intact(i) = family%intact(family%start(k) + i - 1) == 1_i1
       bonds%length(i) = 0.0_wp
       do c = 1, family%dim
-        bonds%xi(i, c) = family%x(j, c) - family%x(k, c)
+        bonds%xi(i, c) = family%place(c, j) - family%place(c, k)
         bonds%length(i) = bonds%length(i) + bonds%xi(i, c)**2
       end do
       bonds%length(i) = sqrt(bonds%length(i))
       if (allocated(family%fraction)) then
-        bonds%weight(i) = family%volume(j)*family%fraction(family%start(k) + i - 1)
+        bonds%weight(i) = family%place(4, j)*family%fraction(family%start(k) + i - 1)
       else
-        bonds%weight(i) = family%volume(j)*volume_correction(family%rule, bonds%xi(i, :), &
+        bonds%weight(i) = family%place(4, j)*volume_correction(family%rule, bonds%xi(i, :), &
           & bonds%length(i), (family%spacing(k) + family%spacing(j))/2)
       end if
     end do
@@ -130,7 +120,7 @@ contains
 
   pure integer(i8) function bytes(family)
     class(list_family_type), intent(in) :: family
-    bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*(11 + family%dim)
+    bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*10
     if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds
   end function bytes
 

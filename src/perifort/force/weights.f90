@@ -56,6 +56,7 @@ contains
       family%weights(b:) = 0_i4
     end if
     family%table = table(:kinds%count)
+    deallocate (family%class_of)  ! it has done its work
   end subroutine build_weights
 
   !> A key for each slot that says what its cross-section of rows looks like: a block's surroundings

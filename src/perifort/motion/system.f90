@@ -25,7 +25,7 @@ module pd_motion_system
     real(wp), allocatable :: v(:, :)       !! velocity (n_slots, dim) [m/s]
     real(wp), allocatable :: force(:, :)   !! internal force density (n_slots, dim) [N/m3]
     real(wp), allocatable :: p(:)          !! 2 a d delta theta, if the model needs it
-    real(wp), allocatable :: damage(:)     !! local damage [-]
+    real(wp), allocatable :: damage(:)     !! local damage [-], of size 0 if nothing can be damaged
   end type state_type
 
   type :: system_type
@@ -65,7 +65,8 @@ contains
     allocate (system%state%force(n, system%body%dim), source=0.0_wp)
     allocate (system%state%p(merge(n, 0, system%model%dilatation)), source=0.0_wp)
     allocate (system%strained(merge(n, 0, system%model%breaking)), source=0_i1)
-    if (.not. allocated(system%state%damage)) allocate (system%state%damage(n), source=0.0_wp)
+    if (.not. allocated(system%state%damage)) allocate (system%state%damage(merge(n, 0, &
+      & system%model%breaking)), source=0.0_wp)
     call hold_components(system)
     call remember_start(system%motions, system%state%u)
     call impose(system%motions, 0.0_wp, system%state%u, system%state%v)

@@ -237,7 +237,7 @@ contains
     recorder%rows = recorder%rows + 1
     row = [real(instant%step, wp), instant%time, recorder%energies%kinetic, &
       & recorder%energies%strain, system%dissipated, system%external_work, &
-      & real(system%broken, wp), maxval(system%state%damage), instant%dt]
+      & real(system%broken, wp), greatest_damage(system), instant%dt]
     if (recorder%schedule%relaxation) row = [row, instant%residual, real(instant%load_step, wp)]
     do m = 1, size(system%motions)
       if (system%motions(m)%name /= '') row = [row, system%motions(m)%reaction(:system%body%dim)]
@@ -250,6 +250,13 @@ contains
     end do
     call recorder%results%add_row(row, error)
   end subroutine write_row
+
+  !> Greatest local damage of all points, 0 where nothing can be damaged.
+  pure real(wp) function greatest_damage(system)
+    type(system_type), intent(in) :: system
+    greatest_damage = 0.0_wp
+    if (size(system%state%damage) > 0) greatest_damage = maxval(system%state%damage)
+  end function greatest_damage
 
   !> A field at one slot: the components the dimension has, or one value.
   function probe_values(system, field, k, v) result(values)
@@ -268,7 +275,8 @@ contains
     case ('force_density')
       values = system%state%force(k, :)
     case ('damage')
-      values = [system%state%damage(k)]
+      values = [0.0_wp]
+      if (size(system%state%damage) > 0) values = [system%state%damage(k)]
     case default
       call allocate_bonds(system%family, bonds)
       call system%family%bonds_of(k, bonds)
@@ -301,7 +309,12 @@ contains
       case ('force_density')
         call put_vectors(system%state%force)
       case ('damage')
-        call put_scalars(system%state%damage)
+        if (size(system%state%damage) > 0) then
+          call put_scalars(system%state%damage)
+        else
+          allocate (values(system%body%n_slots), source=0.0_wp)
+          call put_scalars(values)
+        end if
       case ('dilatation')
         allocate (values(system%body%n_slots))
         call reference_dilatation(system%family, system%model, system%state%u, values)

@@ -142,9 +142,8 @@ contains
     type(system_type), intent(in) :: system
     integer :: reals
     reals = system%body%dim*4 + 2          ! x, u, v, f; volume, spacing
-    reals = reals + 1                      ! damage
     if (system%model%dilatation) reals = reals + 1
-    if (system%model%breaking) reals = reals + 1
+    if (system%model%breaking) reals = reals + 2  ! damage, s_c
     if (system%model%surface) reals = reals + 2*system%body%dim
     bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) + system%family%bytes()
   end function memory_of
