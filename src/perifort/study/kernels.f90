@@ -60,6 +60,7 @@ module pd_study_kernels
 
   integer, parameter :: round = 5                  !! repeats between looks at their spread
   integer, parameter :: most_rounds = 4
+  integer, parameter :: most_steps = 10000000      !! of a repeat
   real(wp), parameter :: calm = 0.1_wp             !! spread over median at which repeats suffice
 
 contains
@@ -161,7 +162,6 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(stopwatch_type) :: watch
     real(wp), allocatable :: wall(:), processor(:)
-    integer, allocatable :: order(:)
     real(wp) :: one
     integer :: r
 
@@ -170,10 +170,11 @@ contains
       call run(watch, 1)
       if (allocated(error)) return
       one = watch%wall(2) - watch%wall(1)
-      if (one > 0.2_wp*seconds .or. watch%stride > huge(1)/1000) exit
+      if (one > 0.2_wp*seconds .or. watch%stride > most_steps) exit
       watch%stride = 4*watch%stride
     end do
-    watch%stride = max(1, ceiling(watch%stride*min(1.0e6_wp, seconds/max(one, 1.0e-9_wp))))
+    watch%stride = max(1, ceiling(min(real(most_steps, wp), watch%stride*seconds &
+      & /max(one, 1.0e-9_wp))))
     timing%steps = watch%stride
     allocate (wall(0), processor(0))
     do r = 1, most_rounds
@@ -184,8 +185,7 @@ contains
       if (maxval(wall) - minval(wall) < calm*minval(wall) .or. sum(wall) > 3*round*seconds) exit
     end do
     timing%repeats = size(wall)
-    order = ascending(wall)
-    timing%seconds = wall(order((size(wall) + 1)/2))
+    timing%seconds = median(wall)
     timing%least = minval(wall)
     timing%most = maxval(wall)
     timing%processor = median(processor)/omp_get_max_threads()
@@ -303,7 +303,7 @@ contains
   !> The numbers of `values` in ascending order of value.
   pure function ascending(values) result(order)
     real(wp), intent(in) :: values(:)
-    integer, allocatable :: order(:)
+    integer :: order(size(values))
     integer :: i, j, this
 
     order = [(i, i=1, size(values))]
@@ -320,7 +320,7 @@ contains
   !> The middle value, of an even number the lower of the two.
   pure real(wp) function median(values)
     real(wp), intent(in) :: values(:)
-    integer, allocatable :: order(:)
+    integer :: order(size(values))
     order = ascending(values)
     median = values(order((size(values) + 1)/2))
   end function median

@@ -96,14 +96,14 @@ contains
     scale = 1.0e9_wp/(real(timing%bonds, wp)*timing%steps)
     points = real(timing%points, wp)
     text = kernel_label(kernel)//cell(to_text(kernel%threads), 4)//' |'// &
-      & cell(digits(scale*timing%seconds), 8)//' ('//cell(digits(scale*timing%least), 7)//' ..'// &
-      & cell(digits(scale*timing%most), 7)//')'//cell(digits(scale*timing%processor), 8)// &
-      & cell(digits(1.0e9_wp*timing%forces/real(timing%bonds, wp)), 8)//' |'// &
-      & cell(digits(1/step), 9)//' |'//cell(to_text(nint(real(timing%bytes, wp)/points)), 6)// &
-      & cell(digits(1.0e9_wp*timing%build/points), 8)//' |'// &
-      & cell(digits(1.0e-9_wp*timing%traffic/step), 6)// &
+      & cell(numeral(scale*timing%seconds), 8)//' ('//cell(numeral(scale*timing%least), 7)// &
+      & ' ..'//cell(numeral(scale*timing%most), 7)//')'//cell(numeral(scale*timing%processor), 8)// &
+      & cell(numeral(1.0e9_wp*timing%forces/real(timing%bonds, wp)), 8)//' |'// &
+      & cell(numeral(1/step), 9)//' |'//cell(to_text(nint(real(timing%bytes, wp)/points)), 6)// &
+      & cell(numeral(1.0e9_wp*timing%build/points), 8)//' |'// &
+      & cell(numeral(1.0e-9_wp*timing%traffic/step), 6)// &
       & cell(percent(timing%traffic/step, machine%bandwidth), 4)//' |'// &
-      & cell(digits(1.0e-9_wp*timing%flops/step), 8)// &
+      & cell(numeral(1.0e-9_wp*timing%flops/step), 8)// &
       & cell(percent(timing%flops/step, machine%peak), 4)//' |'//cell(fixed(efficiency), 5)
   end function table_row
 
@@ -131,7 +131,7 @@ contains
   end function percent
 
   !> Four digits, but all those before the point up to a million.
-  pure function digits(value) result(text)
+  pure function numeral(value) result(text)
     real(wp), intent(in) :: value
     character(:), allocatable :: text
     character(12) :: buffer
@@ -148,7 +148,7 @@ contains
       buffer = to_text(value, 2)
     end if
     text = trim(adjustl(buffer))
-  end function digits
+  end function numeral
 
   pure function fixed(value) result(text)
     real(wp), intent(in) :: value
