@@ -132,8 +132,11 @@ contains
     type(bench_options_type), intent(in) :: options
     integer, allocatable :: threads(:), wanted(:)
 
-    wanted = [omp_get_max_threads()]
-    if (allocated(options%threads)) wanted = options%threads
+    if (allocated(options%threads)) then
+      allocate (wanted, source=options%threads)
+    else
+      allocate (wanted(1), source=omp_get_max_threads())
+    end if
     threads = [1]
     do while (any(wanted > threads(size(threads))))
       threads = [threads, minval(wanted, mask=wanted > threads(size(threads)))]
