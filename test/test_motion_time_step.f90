@@ -5,6 +5,7 @@ module test_motion_time_step
   use pd_driver, only: set_up_type
   use pd_motion_explicit, only: run_explicit
   use pd_motion_system, only: system_type, evaluate
+  use pd_motion_time_step, only: stiffness_bound
   use pd_scene_types, only: scene_type
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, density_of_steel, diary_type, expect, expect_true, noise, ready, &
@@ -23,6 +24,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('the bound of a bar in closed form', test_bar), &
+      & new_unittest('lattices and lists have the same bounds', test_families), &
       & new_unittest('the step never exceeds the true limit', test_limit), &
       & new_unittest('at 0.99 of the step every body stays bounded', test_bounded), &
       & new_unittest('duration ends exactly, in whole steps', test_duration)]
@@ -69,6 +71,37 @@ contains
     end select
     name = name//', nu = '//text_of(nu)
   end subroutine body_number
+
+  !> The bound summed from a lattice's weights is that of the bonds one by one: to the rounding of
+  !> some hundred terms.
+  subroutine test_families(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: lattice, list
+    character(:), allocatable :: name
+    real(wp), allocatable :: fast(:), plain(:)
+    integer :: number
+
+    do number = 1, bodies_in_all
+      call body_number(number, scene, name)
+      scene%horizon%surface_correction = 'energy'
+      scene%horizon%family = 'lattice'
+      call ready(scene, lattice, error)
+      scene%horizon%family = 'list'
+      call ready(scene, list, error)
+      if (allocated(error)) return
+      allocate (fast(lattice%system%body%n_slots), plain(list%system%body%n_slots), source=0.0_wp)
+      call stiffness_bound(lattice%system%body, lattice%system%family, lattice%system%model, fast)
+      call stiffness_bound(list%system%body, list%system%family, list%system%model, plain)
+      fast = fast(lattice%system%body%slot)
+      plain = plain(list%system%body%slot)
+      call expect(error, maxval(abs(fast/plain - 1)), 0.0_wp, 1.0e-12_wp, 'bound, '//name)
+      call expect(error, lattice%plan%printed/list%plan%printed, 1.0_wp, 1.0e-12_wp, &
+        & 'step of 7.25 as printed, '//name)
+      if (allocated(error)) return
+      deallocate (fast, plain)
+    end do
+  end subroutine test_families
 
   !> M of an inner point: 2 sum (2 q) v_c V/|xi| over 1, 2, 3 spacings, q = E/(A delta^2).
   subroutine test_bar(error)

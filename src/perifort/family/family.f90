@@ -29,6 +29,7 @@ module pd_family_family
     procedure(break_interface), deferred :: break_bond
     procedure(memory_interface), deferred :: bytes
     procedure(describe_interface), deferred :: describe
+    procedure :: alike
   end type family_type
 
   abstract interface
@@ -66,6 +67,14 @@ module pd_family_family
   end interface
 
 contains
+
+  !> A slot, the same for all slots whose families are known to be alike (same material, same members
+  !> at the same offsets), so that what follows from the family alone is computed once.
+  pure integer function alike(family, k)
+    class(family_type), intent(in) :: family
+    integer, intent(in) :: k
+    alike = min(k, family%n_slots)
+  end function alike
 
   !> Room for the bonds of any one point.
   pure subroutine allocate_bonds(family, bonds)

@@ -58,6 +58,7 @@ module pd_family_lattice
     integer :: words = 0                       !! words of bits of one slot
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
+    integer(i4), allocatable :: first_of(:)    !! the first slot of each class
     integer(i8), allocatable :: broken(:, :)   !! 1-bits are broken bonds (n_slots, words), if any can
     integer(i8), allocatable :: block(:)       !! first slot of each block
     integer(i4), allocatable :: weights(:)     !! which weights each block has; 0: made on the fly
@@ -68,6 +69,7 @@ module pd_family_lattice
     procedure :: break_bond
     procedure :: bytes
     procedure :: describe
+    procedure :: alike
     procedure :: allow_breaking
   end type lattice_family_type
 
@@ -292,6 +294,7 @@ contains
     type(lattice_family_type), intent(inout) :: family
     type(lookup_type) :: classes
     integer(i8), allocatable :: key(:)
+    integer(i4), allocatable :: first_of(:)
     integer(i8) :: count, bits, k
     integer :: o, w, g, number
     logical :: is_new
@@ -317,7 +320,7 @@ contains
       end associate
     end do
     family%n_bonds = count
-    allocate (family%class_of(family%n_slots), source=0_i4)
+    allocate (family%class_of(family%n_slots), first_of(1024), source=0_i4)
     do k = 1, family%n_slots
       if (family%alive(k) == 0_i1) cycle
       if (k > 1) then
@@ -328,7 +331,11 @@ contains
       end if
       call classes%number_of(key(k), number, is_new)
       family%class_of(k) = int(number, i4)
+      if (.not. is_new) cycle
+      if (number > size(first_of)) first_of = [first_of, first_of]
+      first_of(number) = int(k, i4)
     end do
+    family%first_of = first_of(:classes%count)
   end subroutine classify
 
   !> Cover the live slots with blocks. Rows begin at multiples of `lanes`, and so do blocks.
@@ -349,6 +356,14 @@ contains
     family%weights = 0_i4
     family%large = 0_i1
   end subroutine find_blocks
+
+  pure integer function alike(family, k)
+    class(lattice_family_type), intent(in) :: family
+    integer, intent(in) :: k
+    alike = k
+    if (.not. allocated(family%class_of)) return
+    if (family%class_of(k) > 0_i4) alike = family%first_of(family%class_of(k))
+  end function alike
 
   !> Give every bond its bit, all intact.
   subroutine allow_breaking(family)

@@ -31,6 +31,8 @@ contains
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
       if (body%point(k) == 0) cycle
+      ! alike slots have their members at the same distances
+      if (family%alike(k) /= k) cycle
       call family%bonds_of(k, bonds)
       if (bonds%n == 0) lonely = lonely + 1
       do i = 1, bonds%n

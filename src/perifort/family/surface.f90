@@ -30,6 +30,7 @@ contains
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
       if (body%point(k) == 0) cycle
+      if (family%alike(k) /= k) cycle
       call family%bonds_of(k, bonds)
       associate (m => materials(body%material(k)))
         do c = 1, body%dim
@@ -48,6 +49,13 @@ contains
           S(k, c) = (m%uniaxial_energy - m%a)/(m%q/2*energy)
         end do
       end associate
+    end do
+    !$omp do schedule(static)
+    do k = 1, body%n_slots
+      i = family%alike(k)
+      if (i == k) cycle
+      D(k, :) = D(i, :)
+      S(k, :) = S(i, :)
     end do
     !$omp end parallel
   end subroutine surface_factors

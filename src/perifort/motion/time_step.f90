@@ -5,6 +5,8 @@ module pd_motion_time_step
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
+  use pd_family_lattice, only: lattice_family_type
+  use pd_force_bound, only: lattice_bound, lattice_printed_bound
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
@@ -21,12 +23,20 @@ contains
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(out) :: bound(:)
+    real(wp), intent(inout), contiguous :: bound(:)
     type(bonds_type) :: bonds
     real(wp), allocatable :: inverse(:)
     real(wp) :: n(body%dim)
     integer :: k, i, j
 
+    select type (family)
+    type is (lattice_family_type)
+      ! the weights hold all that is needed, unless they are not made yet
+      if (allocated(family%table)) then
+        call lattice_bound(family, model, bound)
+        return
+      end if
+    end select
     allocate (inverse(body%n_slots), source=0.0_wp)
     !$omp parallel default(none) shared(body, family, model, bound, inverse) &
     !$omp private(bonds, n, k, i, j)
@@ -94,45 +104,61 @@ contains
     class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(out) :: step
+    real(wp), allocatable :: printed(:)
+    real(wp) :: squared
+    integer :: k
+
+    allocate (printed(body%n_slots), source=0.0_wp)
+    select type (family)
+    type is (lattice_family_type)
+      call lattice_printed_bound(family, model, printed)
+    class default
+      call printed_bound(body, family, model, printed)
+    end select
+    squared = huge(squared)
+    do k = 1, body%n_slots
+      ! a sum that is exactly 0 has no bonds
+      if (printed(k) < 0.0_wp) squared = 0.0_wp
+      if (printed(k) > 0.0_wp) &
+        & squared = min(squared, 2*model%materials(model%material(k))%density/printed(k))
+    end do
+    step = sqrt(squared)
+  end subroutine printed_step
+
+  !> The sum of 7.25 as printed for every slot [N/m4], 0 without bonds. Its inner sum has the plain
+  !> volumes in the book, and is all but the same with v_c.
+  subroutine printed_bound(body, family, model, printed)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: printed(:)
     type(bonds_type) :: bonds
     real(wp), allocatable :: inverse(:)
-    real(wp) :: printed, squared
     integer :: k, i
 
     allocate (inverse(body%n_slots), source=0.0_wp)
-    squared = huge(squared)
-    !$omp parallel default(none) shared(body, family, model, inverse) &
-    !$omp private(bonds, k, i, printed) &
-    !$omp reduction(min:squared)
+    !$omp parallel default(none) shared(body, family, model, inverse, printed) private(bonds, k, i)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
       if (body%point(k) == 0) cycle
       call family%bonds_of(k, bonds)
-      ! the printed inner sum has the plain volumes, and is all but the same with v_c
       inverse(k) = sum(bonds%weight(:bonds%n)/bonds%length(:bonds%n))
     end do
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
+      printed(k) = 0.0_wp
       if (body%point(k) == 0) cycle
       call family%bonds_of(k, bonds)
-      if (bonds%n == 0) cycle
       associate (m => model%materials(model%material(k)))
-        printed = 0.0_wp
         do i = 1, bonds%n
-          printed = printed + (2*m%a*m%t**2*(inverse(k) + inverse(bonds%j(i))) + 2*m%q) &
+          printed(k) = printed(k) + (2*m%a*m%t**2*(inverse(k) + inverse(bonds%j(i))) + 2*m%q) &
             & *bonds%weight(i)/bonds%length(i)
         end do
-        if (printed > 0.0_wp) then
-          squared = min(squared, 2*m%density/printed)
-        else
-          squared = 0.0_wp
-        end if
       end associate
     end do
     !$omp end parallel
-    step = sqrt(squared)
-  end subroutine printed_step
+  end subroutine printed_bound
 
   !> Volume of the horizon [m3]: 4/3 pi delta^3, pi delta^2 h, 2 delta A.
   pure real(wp) function horizon_volume(dim, delta, depth) result(volume)

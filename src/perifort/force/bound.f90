@@ -1,0 +1,121 @@
+!> The bound M of a lattice's stiffness, summed from the weights of its blocks: the same number as
+!> from the bonds one by one, `lanes` slots at a time.
+module pd_force_bound
+  use pd_base_kinds, only: wp, i8
+  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, lanes
+  use pd_force_model, only: model_type
+  use pd_force_weights, only: allocate_weights, block_weights
+  implicit none (type, external)
+  private
+  public :: lattice_bound, lattice_printed_bound
+
+contains
+
+  !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken.
+  subroutine lattice_bound(family, model, bound)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(inout), contiguous :: bound(:)
+    type(weights_type) :: scratch
+    real(wp), allocatable :: inverse(:)
+    integer :: b, pass
+
+    allocate (inverse(family%n_slots), source=0.0_wp)
+    bound = 0.0_wp
+    !$omp parallel default(none) shared(family, model, bound, inverse) private(scratch, b, pass)
+    call allocate_weights(family, model, scratch)
+    do pass = merge(1, 2, model%dilatation), 2
+      !$omp do schedule(static)
+      do b = 1, size(family%block)
+        if (family%weights(b) > 0) then
+          call add(family, model, pass, family%block(b), family%table(family%weights(b)), inverse, bound)
+        else
+          call block_weights(family, model, family%block(b), scratch)
+          call add(family, model, pass, family%block(b), scratch, inverse, bound)
+        end if
+      end do
+    end do
+    !$omp end parallel
+  end subroutine lattice_bound
+
+  !> Pass 1: m_k I_k of a block into `inverse`; pass 2: its M_k.
+  pure subroutine add(family, model, pass, first, weights, inverse, bound)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: pass
+    integer(i8), intent(in) :: first
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(inout), contiguous :: inverse(:), bound(:)
+    real(wp) :: sums(lanes), own(lanes), inverse_length
+    integer(i8) :: j
+    integer :: m, l
+
+    sums = 0.0_wp
+    own = inverse(first:first + lanes - 1)
+    do m = 1, weights%n
+      inverse_length = sqrt(weights%geometry(4, m))
+      if (pass == 1) then
+        sums = sums + weights%dilatation(:, m)*inverse_length
+        cycle
+      end if
+      sums = sums + weights%stretch(:, m)*weights%geometry(4, m)
+      if (.not. model%dilatation) cycle
+      j = first + weights%shift(m)
+      sums = sums + (own + inverse(j:j + lanes - 1))*weights%dilatation(:, m)*inverse_length
+    end do
+    if (pass == 2) then
+      bound(first:first + lanes - 1) = sums
+      return
+    end if
+    do l = 1, lanes
+      associate (m => model%materials(model%material(first + l - 1)))
+        inverse(first + l - 1) = sums(l)*2*max(m%a, 0.0_wp)*m%t**2
+      end associate
+    end do
+  end subroutine add
+
+  !> The sum of 7.25 as printed for every slot [N/m4]: no surface factors, a with its sign, everything
+  !> of the slot's own material.
+  subroutine lattice_printed_bound(family, model, printed)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(inout), contiguous :: printed(:)
+    real(wp), allocatable :: inverse(:)
+    real(wp) :: sums(lanes), own(lanes), weight, there
+    integer(i8) :: first, j
+    integer :: b, o, l, pass
+
+    allocate (inverse(family%n_slots), source=0.0_wp)
+    printed = 0.0_wp
+    !$omp parallel default(none) shared(family, model, printed, inverse) &
+    !$omp private(sums, own, weight, there, first, j, b, o, l, pass)
+    do pass = 1, 2
+      !$omp do schedule(static)
+      do b = 1, size(family%block)
+        first = family%block(b)
+        do l = 1, lanes
+          associate (m => model%materials(model%material(first + l - 1)))
+            own(l) = 2*m%a*m%t**2
+          end associate
+        end do
+        sums = 0.0_wp
+        associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
+          do o = 1, grid%n
+            weight = grid%fraction(o)*grid%cell_volume/grid%length(o)
+            j = first + grid%shift(o)
+            do l = 0, lanes - 1
+              there = weight*real(alive(first + l)*alive(j + l), wp)
+              if (pass == 2) there = there*(own(l + 1)*(inverse(first + l) + inverse(j + l)) &
+                & + 2*model%materials(model%material(first + l))%q)
+              sums(l + 1) = sums(l + 1) + there
+            end do
+          end do
+        end associate
+        if (pass == 1) inverse(first:first + lanes - 1) = sums
+        if (pass == 2) printed(first:first + lanes - 1) = sums
+      end do
+    end do
+    !$omp end parallel
+  end subroutine lattice_printed_bound
+
+end module pd_force_bound
