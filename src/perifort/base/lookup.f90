@@ -16,14 +16,17 @@ module pd_base_lookup
 
 contains
 
-  !> `key` with one more value mixed in. Rotation and exclusive or cannot overflow; a small factor
-  !> spreads the value over the bits.
+  !> `key` with one more value mixed in, all of its 64 bits. Rotation and exclusive or cannot overflow;
+  !> products of 22 bits with a factor of 40 spread the value without overflow either.
   elemental integer(i8) function mix(key, value)
     integer(i8), intent(in) :: key, value
-    integer(i8), parameter :: spread = 2654435761_i8  ! 2^32 over the golden ratio
-    mix = ieor(ishftc(key, 23), iand(value, 1073741823_i8)*spread)
-    mix = ieor(mix, ishftc(iand(ishft(value, -30), 1073741823_i8)*spread, 11))
-    mix = ieor(mix, ishftc(iand(mix, 1073741823_i8)*spread, 29))
+    integer(i8), parameter :: spread = 679535556991_i8  ! 2^40 over the golden ratio, odd
+    integer(i8), parameter :: low = 4194303_i8          ! 22 bits
+
+    mix = ieor(ishftc(key, 23), iand(value, low)*spread)
+    mix = ieor(mix, ishftc(iand(ishft(value, -22), low)*spread, 21))
+    mix = ieor(mix, ishftc(iand(ishft(value, -44), low)*spread, 43))
+    mix = ieor(mix, ishftc(iand(mix, low)*spread, 29))
   end function mix
 
   !> The number of `key`; a new key gets the next one.
