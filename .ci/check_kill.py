@@ -3,9 +3,10 @@
 
     check_kill.py [--times N] [--seed S] NAME.vtkhdf COMMAND ...
 
-COMMAND writes NAME.vtkhdf, each time anew over what is there (perifort run ... --overwrite). It runs once undisturbed;
-then it is started N times (30) and ended with SIGKILL. Every other time it finds no results, else those of the time before.
-Whatever file there is afterwards must open, and all it counts as complete must equal the undisturbed run's.
+COMMAND writes NAME.vtkhdf, each time anew over what is there (perifort run ... --overwrite). It
+runs once undisturbed; then it is started N times (30) and ended with SIGKILL. Every other time it
+finds no results, else those of the time before. Whatever file there is afterwards must open, and
+all it counts as complete must equal the undisturbed run's.
 """
 import argparse
 import random
@@ -29,7 +30,8 @@ def read(path):
         count = steps * len(root["Points"])
         rows = int(file["history"].attrs["rows"])
         found = {"Points": root["Points"][:], "Values": root["Steps/Values"][:steps]}
-        found.update({f"PointData/{name}": data[:count] for name, data in root["PointData"].items()})
+        found.update({f"PointData/{name}": data[:count]
+                      for name, data in root["PointData"].items()})
         found.update({f"history/{name}": data[:rows] for name, data in file["history"].items()})
         found.update({f"points/{name}": data[:] for name, data in file["points"].items()})
         return steps, rows, found
@@ -39,7 +41,8 @@ def same_beginning(part, whole, what):
     """Whether all of `part` is the beginning of `whole`."""
     assert part.keys() == whole.keys(), f"{what}: other datasets"
     for name, values in part.items():
-        assert np.array_equal(values, whole[name][:len(values)], equal_nan=True), f"{what}: {name} differs"
+        assert np.array_equal(values, whole[name][:len(values)],
+                              equal_nan=True), f"{what}: {name} differs"
 
 
 def check_table(path, reference, what):
@@ -52,7 +55,8 @@ def check_table(path, reference, what):
 
 def main():
     """Run, kill, compare."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--times", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("file", type=Path)
@@ -96,9 +100,11 @@ def main():
         if steps < all_steps:
             cut_short.add(steps)
         print(f"{what}: {steps} of {all_steps} outputs, {rows} of {all_rows} rows, all intact")
-    print(f"{options.times} kills, {none_yet} before the first output, {len(cut_short)} different stages of a file")
+    print(f"{options.times} kills, {none_yet} before the first output, "
+          f"{len(cut_short)} different stages of a file")
     if not cut_short:
-        sys.exit("no kill met a file under way: the test shows nothing; write more or kill more often")
+        sys.exit("no kill met a file under way: the test shows nothing; write more or kill more "
+                 "often")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""Hold a results folder to what the user guide promises: names, kinds and lengths of all that h5py finds.
+"""Hold a results folder to what the user guide promises: names, kinds and lengths of all that h5py
+finds.
 
     check_results.py NAME.vtkhdf
 
@@ -48,7 +49,8 @@ def read_with_h5py(path):
         require(len(fields) > 0, "no field was written")
 
         volume = file["points/volume"][()]
-        require(volume.shape == (n,) and volume.dtype == np.float64 and np.all(volume > 0), "volume")
+        require(volume.shape == (n,) and volume.dtype == np.float64 and np.all(volume > 0),
+                "volume")
         for name in ("body", "material", "layer"):
             data = file["points"][name]
             require(data.shape == (n,) and data.dtype == np.int32, f"/points/{name}")

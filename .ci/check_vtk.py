@@ -3,8 +3,8 @@
 
     check_vtk.py NAME.vtkhdf [NAME.pvd] [--partial]
 
-The HDF5 file is read with h5py and with VTK's own reader, the .pvd series with VTK's XML reader; where both are
-given their values must agree. --partial: the file's writer did not live to close it.
+The HDF5 file is read with h5py and with VTK's own reader, the .pvd series with VTK's XML reader;
+where both are given their values must agree. --partial: the file's writer did not live to close it.
 """
 import sys
 import xml.etree.ElementTree as tree
@@ -29,7 +29,8 @@ def check_hdf(path, partial):
     """Check the file's own consistency, then that VTK sees the same numbers in every step."""
     with h5py.File(path, "r") as file:
         root = file["VTKHDF"]
-        assert list(root.attrs["Version"]) == [2, 0] and root.attrs["Type"] in (b"PolyData", "PolyData")
+        assert list(root.attrs["Version"]) == [2, 0] and root.attrs["Type"] in (b"PolyData",
+                                                                                "PolyData")
         points = root["Points"][:]
         steps = int(root["Steps"].attrs["NSteps"])
         times = root["Steps/Values"][:]
@@ -38,24 +39,29 @@ def check_hdf(path, partial):
         for name, data in root["PointData"].items():
             assert "units" in data.attrs, f"{name} has no units"
             if not partial:
-                assert len(data) == steps * len(points), f"{name}: {len(data)} rows for {steps} steps"
+                assert len(data) == steps * len(points), \
+                    f"{name}: {len(data)} rows for {steps} steps"
         if not partial:
             for name, data in root["Steps"].items():
                 if isinstance(data, h5py.Dataset):
-                    assert len(data) == steps, f"Steps/{name}: {len(data)} entries for {steps} steps"
+                    assert len(data) == steps, \
+                        f"Steps/{name}: {len(data)} entries for {steps} steps"
         rows = int(file["history"].attrs["rows"])
         for name, data in file["history"].items():
             assert "units" in data.attrs, f"history/{name} has no units"
-            assert len(data) >= rows if partial else len(data) == rows, f"history/{name}: {len(data)}, not {rows}"
+            assert len(data) >= rows if partial else len(data) == rows, \
+                f"history/{name}: {len(data)}, not {rows}"
         for name, data in file["points"].items():
-            assert len(data) == len(points), f"points/{name}: {len(data)} values for {len(points)} points"
+            assert len(data) == len(points), \
+                f"points/{name}: {len(data)} values for {len(points)} points"
         assert len(file["scene/text"][()]) > 0
 
     reader = vtkHDFReader()
     assert reader.CanReadFile(str(path)), f"VTK cannot read {path}"
     reader.SetFileName(str(path))
     reader.UpdateInformation()
-    assert reader.GetNumberOfSteps() == steps, f"VTK sees {reader.GetNumberOfSteps()} steps, not {steps}"
+    assert reader.GetNumberOfSteps() == steps, \
+        f"VTK sees {reader.GetNumberOfSteps()} steps, not {steps}"
     if steps == 1:
         seen = [reader.GetTimeValue()]
     else:
@@ -70,7 +76,8 @@ def check_hdf(path, partial):
         assert np.array_equal(vtk_to_numpy(output.GetPoints().GetData()), points)
         found = arrays_of(output)
         for name, values in fields.items():
-            assert np.array_equal(found[name], values[step * n:(step + 1) * n]), f"{name}, step {step}"
+            assert np.array_equal(found[name],
+                                  values[step * n:(step + 1) * n]), f"{name}, step {step}"
     print(f"{path}: {steps} steps, {n} points, {rows} history rows, fields {', '.join(fields)}")
     return times, points, fields
 

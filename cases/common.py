@@ -1,9 +1,9 @@
 """What every case's verify.py shares: starting the program, reading its results, judging numbers.
 
-    case = Case(__file__, __doc__)               reads --quick, --pictures, --reuse from the command line
-    results = case.run("bar.nml")                runs a scene of the case's folder, returns its Results
+    case = Case(__file__, __doc__)     reads --quick, --pictures, --reuse from the command line
+    results = case.run("bar.nml")      runs a scene of the case's folder, returns its Results
     case.near("u_x at the end [m]", value, target, relative=0.005)
-    case.finish()                                prints the table; exit status 1 if a target was missed
+    case.finish()                      prints the table; exit status 1 if a target was missed
 """
 import argparse
 import csv
@@ -42,13 +42,15 @@ class Results:
             self.volume = file["points/volume"][()]
             self.layer = file["points/layer"][()]
             self.history = {name: data[()] for name, data in file["history"].items()}
-            self.units = {name: text(data.attrs.get("units", "")) for name, data in file["history"].items()}
+            self.units = {name: text(data.attrs.get("units", ""))
+                          for name, data in file["history"].items()}
             self.scene = text(file["scene/text"][()])
 
     def field(self, name, output=-1):
         """Values of a field at an output: (n) or (n, 3); negative outputs count from the last."""
         if name not in self.fields:
-            raise KeyError(f"{self.path.name} has no field '{name}'; it has {', '.join(self.fields)}")
+            raise KeyError(f"{self.path.name} has no field '{name}'; "
+                           f"it has {', '.join(self.fields)}")
         k = range(self.outputs)[output]
         n = len(self.points)
         with h5py.File(self.path, "r") as file:
@@ -65,11 +67,14 @@ class Results:
         """The number of the body point nearest to a position; ties go to the lowest number."""
         position = np.zeros(3)
         position[:len(point)] = point
-        distance = np.linalg.norm(self.points - position, axis=1) + np.where(self.layer > 0, np.inf, 0.0)
+        distance = np.linalg.norm(self.points - position, axis=1) + np.where(self.layer > 0, np.inf,
+                                                                             0.0)
         return int(np.flatnonzero(distance <= distance.min() * (1 + 1e-9) + 1e-15)[0])
 
     def balance(self):
-        """Largest gap of the energy balance over the history, as a part of the largest energy in it."""
+        """Largest gap of the energy balance over the history, as a part of the largest energy in
+        it.
+        """
         h = self.history
         stored = h["kinetic_energy"] + h["strain_energy"] + h["dissipated_energy"]
         gap = stored - stored[0] - (h["external_work"] - h["external_work"][0])
@@ -84,8 +89,8 @@ def text(value):
 def change(scene, group, **keys):
     """A scene's text with keys of the first group of that name set to other values.
 
-    Keys the group already has are replaced, others are added at its end; a key with a subscript is not
-    found by its bare name. An unknown group is an error.
+    Keys the group already has are replaced, others are added at its end; a key with a subscript is
+    not found by its bare name. An unknown group is an error.
     """
     found = re.search(rf"^&{group}\b.*?^/", scene, re.M | re.S)
     if not found:
@@ -109,13 +114,16 @@ class Case:
         parser = argparse.ArgumentParser(prog=f"./pf verify {self.name}", description=about,
                                          formatter_class=argparse.RawDescriptionHelpFormatter)
         parser.add_argument("--quick", action="store_true", help="leave out the longest runs")
-        parser.add_argument("--pictures", action="store_true", help="renew the pictures in the case's folder")
+        parser.add_argument("--pictures", action="store_true",
+                            help="renew the pictures in the case's folder")
         parser.add_argument("--reuse", action="store_true",
-                            help="take results that an earlier call completed with the same scene and program")
+                            help="take results that an earlier call completed with the same scene "
+                                 "and program")
         self.options = parser.parse_args()
         self.program = os.environ.get("PERIFORT", "")
         if not Path(self.program).is_file():
-            sys.exit(f"error: start this as ./pf verify {self.name}: PERIFORT does not name the program")
+            sys.exit(f"error: start this as ./pf verify {self.name}: PERIFORT does not name "
+                     "the program")
         self.rows, self.missed = [], 0
         self.started = time.time()
         # Of runs done now, not of reused ones
@@ -127,10 +135,11 @@ class Case:
         return (self.folder / name).read_text(encoding="utf-8")
 
     def run(self, scene, text=None, threads=0):
-        """Run a scene of the case's folder, or a variant of it with that text, and read its results.
+        """Run a scene of the case's folder, or a variant of it with that text, and read its
+        results.
 
-        A variant is written beside its results, which go to out/CASE/STEM in both cases. `threads`: 0
-        leaves their number to the program; steps of a few microseconds are better done by 1.
+        A variant is written beside its results, which go to out/CASE/STEM in both cases. `threads`:
+        0 leaves their number to the program; steps of a few microseconds are better done by 1.
         """
         stem = Path(scene).stem
         output = self.out / stem
@@ -168,7 +177,8 @@ class Case:
         """A number must lie near its target, within a relative or an absolute distance."""
         allowed = absolute if absolute is not None else relative * abs(target)
         tolerance = f"{absolute:.3g}" if absolute is not None else f"{100 * relative:.3g} %"
-        self._row(what, f"{value:.6g}", f"{target:.6g}", tolerance, bool(abs(value - target) <= allowed))
+        self._row(what, f"{value:.6g}", f"{target:.6g}", tolerance,
+                  bool(abs(value - target) <= allowed))
 
     def below(self, what, value, limit):
         """A number must not exceed a limit."""
@@ -196,7 +206,8 @@ class Case:
                  for row in [header, rule, *self.rows]]
         print("\n" + "\n".join(lines))
         with open(self.out / "numbers.csv", "w", newline="", encoding="utf-8") as table:
-            csv.writer(table).writerows([("what", "value", "target", "tolerance", "verdict"), *self.rows])
+            csv.writer(table).writerows([("what", "value", "target", "tolerance", "verdict"),
+                                         *self.rows])
         judged = sum(row[4] != "shown" for row in self.rows)
         print(f"\n{self.name}: {judged - self.missed} of {judged} targets met "
               f"in {time.time() - self.started:.0f} s")
@@ -206,8 +217,8 @@ class Case:
 def wave(x, t, strain, length, speed):
     """Displacement of a bar fixed at 0 and free at `length`, released at t = 0 from u = strain x.
 
-    The sum of the series 8 strain L/pi^2 sum (-1)^n/(2n+1)^2 sin((2n+1) pi x/2L) cos((2n+1) pi c t/2L)
-    in closed form: two triangular waves that run apart (d'Alembert), so no term is cut off.
+    The sum of the series 8 strain L/pi^2 sum (-1)^n/(2n+1)^2 sin((2n+1) pi x/2L) cos((2n+1) pi c
+    t/2L) in closed form: two triangular waves that run apart (d'Alembert), so no term is cut off.
     """
     def start(s):
         # The initial displacement, continued: odd about 0, even about the free end, period 4 L

@@ -1,13 +1,13 @@
 """The linear discrete problem of a lattice body, assembled and solved apart from the program.
 
-For small displacements the discrete equations of peridynamics are K u = b. Here K comes from the text
-of the theory with numpy and scipy alone: neighbours by a KD-tree, linear volume correction, surface
-correction by energy, and K kept as a product of sparse factors, for in three dimensions its rows would
-have thousands of entries. What the program computes under small loads must agree with the solution
-to the tolerance of its relaxation, so a slip in either shows.
+For small displacements the discrete equations of peridynamics are K u = b. Here K comes from the
+text of the theory with numpy and scipy alone: neighbours by a KD-tree, linear volume correction,
+surface correction by energy, and K kept as a product of sparse factors, for in three dimensions its
+rows would have thousands of entries. What the program computes under small loads must agree with
+the solution to the tolerance of its relaxation, so a slip in either shows.
 
-The material parameters are derived here too, in another way than the program's: the energy of a point
-under uniform strain is equated to the classical one (see `Lattice`).
+The material parameters are derived here too, in another way than the program's: the energy of a
+point under uniform strain is equated to the classical one (see `Lattice`).
 """
 import numpy as np
 import scipy.sparse as sp
@@ -36,10 +36,12 @@ class Lattice:
         else:
             bulk = shear = 0.0
             sphere = 2 * section
-        # The stretch under uniform strain e is n.e.n. Over the family of the continuum the integral of
-        # 1/|xi| times it, weighted by d delta, must be the dilatation tr e; that gives d. The same
-        # integral of s^2 |xi| with the fourth moments of n gives b from pure shear and a from expansion.
-        over_family = lambda power: sphere * dim * horizon**(dim + power) / (dim + power)  # of |xi|^power
+        # The stretch under uniform strain e is n.e.n. Over the family of the continuum the integral
+        # of 1/|xi| times it, weighted by d delta, must be the dilatation tr e; that gives d. The
+        # same integral of s^2 |xi| with the fourth moments of n gives b from pure shear and a from
+        # expansion.
+        # Integral of |xi|^power over the family
+        over_family = lambda power: sphere * dim * horizon**(dim + power) / (dim + power)
         if dim == 1:
             self.d_delta = 1 / over_family(0)
             self.b_delta = youngs_modulus / 2 / over_family(1)
@@ -86,7 +88,8 @@ class Lattice:
         self.bond_law = 4 * self.b_delta * self.energy_factor * length * weight
         theta_of = self.d_delta * self.dilatation_factor * weight
         self.theta = sp.csr_matrix((np.concatenate([theta_of, theta_of]),
-                                    (np.concatenate([i, j]), np.tile(np.arange(m), 2))), shape=(n, m))
+                                    (np.concatenate([i, j]), np.tile(np.arange(m), 2))),
+                                   shape=(n, m))
         self.theta_transposed = self.theta.T.tocsr()
 
     def apply(self, u):
@@ -107,8 +110,9 @@ class Lattice:
     def statics(self, load, held=None, imposed=None):
         """Displacements (n, dim) under a force density (n, dim) [N/m3].
 
-        `held` (n, dim), true where the displacement is that of `imposed` (n, dim), by default 0. Without it
-        the body is free, the load must be in balance, and a rigid motion of the answer means nothing.
+        `held` (n, dim), true where the displacement is that of `imposed` (n, dim), by default 0.
+        Without it the body is free, the load must be in balance, and a rigid motion of the answer
+        means nothing.
         """
         u = np.zeros(self.n * self.dim) if imposed is None else np.where(held, imposed, 0.0).ravel()
         b = load.ravel() - self.apply(u)
@@ -154,8 +158,8 @@ def without_rigid_motion(points, u):
 def vibration(lattice, held, density, start, step, point, steps):
     """Displacement of one point of a chain over steps of the leapfrog rule, from rest at `start`.
 
-    Exact for the discrete system in space and time: in its modes the rule turns a frequency omega into
-    2 arcsin(omega step/2)/step and changes nothing else. held (n): points that stay at 0.
+    Exact for the discrete system in space and time: in its modes the rule turns a frequency omega
+    into 2 arcsin(omega step/2)/step and changes nothing else. held (n): points that stay at 0.
     """
     free = np.flatnonzero(~held)
     stiffness = lattice.matrix()[free][:, free].toarray()
@@ -163,4 +167,5 @@ def vibration(lattice, held, density, start, step, point, steps):
     angle = 2 * np.arcsin(np.clip(0.5 * step * np.sqrt(np.maximum(squared, 0)), 0, 1))
     amplitude = modes[list(free).index(point)] * (modes.T @ start[free])
     return np.concatenate([np.cos(np.outer(part, angle)) @ amplitude
-                           for part in np.array_split(np.asarray(steps), max(1, len(steps) // 500))])
+                           for part in np.array_split(np.asarray(steps),
+                                                      max(1, len(steps) // 500))])

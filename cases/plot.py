@@ -18,13 +18,17 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 from common import Results  # noqa: E402
 
-UNITS = {"displacement": "m", "velocity": "m/s", "force_density": "N/m$^3$", "energy_density": "J/m$^3$"}
+UNITS = {"displacement": "m", "velocity": "m/s", "force_density": "N/m$^3$",
+         "energy_density": "J/m$^3$"}
 ENERGIES = ("kinetic_energy", "strain_energy", "dissipated_energy", "external_work")
-NOT_OF_PROBES = {"step", "time", "broken_bonds", "maximum_damage", "step_size", "residual", "load_step", *ENERGIES}
+NOT_OF_PROBES = {"step", "time", "broken_bonds", "maximum_damage", "step_size", "residual",
+                 "load_step", *ENERGIES}
 
 
 def values_of(results, name, output=-1):
-    """Values (n) of a field, of a component of it ('displacement_x'), or a vector's magnitude; and a label."""
+    """Values (n) of a field, of a component of it ('displacement_x'), or a vector's magnitude; and
+    a label.
+    """
     if name in results.fields:
         values = results.field(name, output)
         label = name.replace("_", " ")
@@ -36,7 +40,8 @@ def values_of(results, name, output=-1):
         values = results.field(base, output)[:, "xyz".index(name[-1])]
         label = f"{base.replace('_', ' ')} {name[-1]}"
     else:
-        raise KeyError(f"{results.path.name} has no field '{name}'; it has {', '.join(results.fields)} "
+        raise KeyError(f"{results.path.name} has no field '{name}'; "
+                       f"it has {', '.join(results.fields)} "
                        "(a vector's component: displacement_x)")
     return values, label + (f" [{UNITS[base]}]" if base in UNITS else "")
 
@@ -70,29 +75,37 @@ def colours_of(values):
     if low < -0.05 * high < 0:
         bound = max(-low, high)
         return {"cmap": "RdBu_r", "vmin": -bound, "vmax": bound}
-    return {"cmap": "viridis", "vmin": min(low, 0.0) if high > 0 else low, "vmax": high if high > low else low + 1}
+    return {"cmap": "viridis", "vmin": min(low, 0.0) if high > 0 else low,
+            "vmax": high if high > low else low + 1}
 
 
 def positions_of(results, output, magnify):
-    """Positions moved by the displacement times a factor; reference positions without displacement."""
+    """Positions moved by the displacement times a factor; reference positions without
+    displacement.
+    """
     if magnify == 0.0 or "displacement" not in results.fields:
         return results.points
     return results.points + magnify * results.field("displacement", output)
 
 
 def draw_points(axis, positions, values, spacing, colours, size):
-    """Squares of a spacing's width in the plane; `size` (width, height) of the picture's axis in inches."""
+    """Squares of a spacing's width in the plane; `size` (width, height) of the picture's axis in
+    inches.
+    """
     low, high = positions.min(axis=0) - spacing / 2, positions.max(axis=0) + spacing / 2
     inches = min(size[0] / (high[0] - low[0]), size[1] / (high[1] - low[1]))
     side = max(72 * inches * spacing * 1.1, 0.8)
-    drawn = axis.scatter(positions[:, 0], positions[:, 1], c=values, s=side**2, marker="s", linewidths=0,
+    drawn = axis.scatter(positions[:, 0], positions[:, 1], c=values, s=side**2, marker="s",
+                         linewidths=0,
                          rasterized=True, **colours)
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     return drawn
 
 
 def draw(figure, place, results, name, output, title, magnify, window=None, limits=None):
-    """One panel: a field at an output. `place`: rows, columns, number; `window`: x and y limits [m]."""
+    """One panel: a field at an output. `place`: rows, columns, number; `window`: x and y limits
+    [m].
+    """
     values, label = values_of(results, name, output)
     dim = dimension_of(results.points)
     positions = positions_of(results, output, magnify)
@@ -112,7 +125,8 @@ def draw(figure, place, results, name, output, title, magnify, window=None, limi
         axis = figure.add_subplot(*place, projection="3d")
         # More points than a picture can show only make it slow
         shown = slice(None, None, max(1, len(positions) // 60000))
-        drawn = axis.scatter(*positions[shown].T, c=values[shown], s=4, linewidths=0, depthshade=False, **colours)
+        drawn = axis.scatter(*positions[shown].T, c=values[shown], s=4, linewidths=0,
+                             depthshade=False, **colours)
         extent = np.ptp(positions, axis=0)
         axis.set_box_aspect(np.maximum(extent, 0.05 * extent.max()), zoom=1.15)
         # Labels of short sides would lie on top of one another
@@ -125,22 +139,28 @@ def draw(figure, place, results, name, output, title, magnify, window=None, limi
     else:
         axis = figure.add_subplot(*place)
         if window:
-            inside = np.all([(positions[:, c] >= window[c][0]) & (positions[:, c] <= window[c][1]) for c in (0, 1)],
+            inside = np.all([(positions[:, c] >= window[c][0]) & (positions[:, c] <= window[c][1])
+                             for c in (0, 1)],
                             axis=0)
             positions, values = positions[inside], values[inside]
         drawn = draw_points(axis, positions, values, spacing, colours, (0.7 * width, 0.75 * height))
         axis.set(xlabel="x [m]", ylabel="y [m]")
         axis.ticklabel_format(scilimits=(-2, 3))
     axis.set_title(title, fontsize=10)
-    figure.colorbar(drawn, ax=axis, shrink=0.75 if dim == 2 else 0.5, pad=0.05 if dim == 2 else 0.12, label=label)
+    figure.colorbar(drawn, ax=axis, shrink=0.75 if dim == 2 else 0.5,
+                    pad=0.05 if dim == 2 else 0.12, label=label)
 
 
-def figure_of_fields(items, path, columns=1, magnify=0.0, panel=(5.0, 3.6), window=None, limits=None, dpi=80):
-    """One picture of several panels, each (results, field, title) or (results, field, title, output)."""
+def figure_of_fields(items, path, columns=1, magnify=0.0, panel=(5.0, 3.6), window=None,
+                     limits=None, dpi=80):
+    """One picture of several panels, each (results, field, title) or (results, field, title,
+    output).
+    """
     rows = -(-len(items) // columns)
     figure = plt.figure(figsize=(panel[0] * columns, panel[1] * rows))
     for number, (results, name, title, *output) in enumerate(items, 1):
-        draw(figure, (rows, columns, number), results, name, output[0] if output else -1, title, magnify, window,
+        draw(figure, (rows, columns, number), results, name, output[0] if output else -1, title,
+             magnify, window,
              limits)
     save(figure, path, dpi)
 
@@ -163,7 +183,8 @@ def field_picture(results, name, output, magnify, path):
     extent = np.ptp(results.points, axis=0)
     if dim == 2:
         height = np.clip(5.5 * extent[1] / extent[0], 2.5, 9.0)
-        figure_of_fields([(results, name, title, output)], path, magnify=magnify, panel=(7.5, height + 1.0))
+        figure_of_fields([(results, name, title, output)], path, magnify=magnify,
+                         panel=(7.5, height + 1.0))
         return
     figure = plt.figure(figsize=(11, 4.5))
     draw(figure, (1, 2, 1), results, name, output, title, magnify)
@@ -177,7 +198,9 @@ def field_picture(results, name, output, magnify, path):
 
 
 def middle_cut(results, name, output):
-    """Points and values of the layer next to the middle of the thinnest direction, and the names of the axes."""
+    """Points and values of the layer next to the middle of the thinnest direction, and the names of
+    the axes.
+    """
     values, label = values_of(results, name, output)
     extent = np.ptp(results.points, axis=0)
     thin = 2 if extent[2] <= extent[1] else int(np.argmin(extent))
@@ -223,7 +246,8 @@ def history_pictures(results, folder):
     if probes:
         groups.append(("probes", list(units.items())))
     for title, panels in groups:
-        figure, axes = plt.subplots(len(panels), 1, figsize=(7.5, 2.8 * len(panels) + 0.6), sharex=True, squeeze=False)
+        figure, axes = plt.subplots(len(panels), 1, figsize=(7.5, 2.8 * len(panels) + 0.6),
+                                    sharex=True, squeeze=False)
         for axis, (unit, names) in zip(axes[:, 0], panels):
             for name in names:
                 axis.plot(across, h[name], linewidth=1, label=name.replace("_", " "))
@@ -240,10 +264,12 @@ def main():
     parser.add_argument("folder", metavar="DIR", type=Path)
     parser.add_argument("--field", action="append", metavar="NAME",
                         help="only this field, or component as displacement_x (may be repeated)")
-    parser.add_argument("--step", default="-1", metavar="N", help="output number from 0, or 'all' (default: the last)")
+    parser.add_argument("--step", default="-1", metavar="N",
+                        help="output number from 0, or 'all' (default: the last)")
     parser.add_argument("--magnify", type=float, default=0.0, metavar="FACTOR",
                         help="draw points moved by so many times their displacement (default 0)")
-    parser.add_argument("--to", type=Path, metavar="FOLDER", help="where the pictures go (default: DIR)")
+    parser.add_argument("--to", type=Path, metavar="FOLDER",
+                        help="where the pictures go (default: DIR)")
     options = parser.parse_args()
     try:
         results = Results(options.folder)
@@ -255,7 +281,8 @@ def main():
         folder.mkdir(parents=True, exist_ok=True)
         for name in options.field or results.fields:
             for output in outputs:
-                field_picture(results, name, output, options.magnify, folder / f"{name}_{output:04d}.png")
+                field_picture(results, name, output, options.magnify,
+                              folder / f"{name}_{output:04d}.png")
         if not options.field:
             history_pictures(results, folder)
     except (OSError, KeyError) as fault:

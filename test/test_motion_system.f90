@@ -28,9 +28,9 @@ contains
       & new_unittest('a run has the same bits on 1, 2 and 4 threads', test_threads)]
   end subroutine collect_motion_system
 
-  !> Two points, pulled apart beyond the limit from the start. If their bond breaks before the forces
-  !> they never move; if after, the first half kick sends them towards each other, and nothing stops
-  !> them.
+  !> Two points, pulled apart beyond the limit from the start. If their bond breaks before the
+  !> forces they never move; if after, the first half kick sends them towards each other, and
+  !> nothing stops them.
   subroutine test_break_late(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: stretch = 0.02_wp, ratio = 3.015_wp, dt = 1.0e-8_wp
@@ -58,14 +58,14 @@ contains
       end if
       ! c s V/rho over half a step, with c = 2 E/(A delta^2) and V = A dx
       speed = late*dt/2*2*youngs_modulus/(ratio**2*spacing)*stretch/density_of_steel
-      call expect(error, diary%u(1, 4) - diary%u(1, 1), 3*dt*speed, 1.0e-9_wp*(dt*speed + spacing*1.0e-6_wp), &
-        & 'way of the first point')
+      call expect(error, diary%u(1, 4) - diary%u(1, 1), 3*dt*speed, &
+        & 1.0e-9_wp*(dt*speed + spacing*1.0e-6_wp), 'way of the first point')
       call expect_true(error, set_up%system%broken == 1, 'the bond did not break, or not once')
     end do
   end subroutine test_break_late
 
-  !> Run a scene for `time` with `steps` steps; the largest imbalance kinetic + strain + dissipated -
-  !> work - (the same at the start), over the largest energy that was in play.
+  !> Run a scene for `time` with `steps` steps; the largest imbalance kinetic + strain +
+  !> dissipated - work - (the same at the start), over the largest energy that was in play.
   subroutine imbalance(scene, time, steps, worst, set_up, error, most)
     type(scene_type), intent(in) :: scene
     real(wp), intent(in) :: time

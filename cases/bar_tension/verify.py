@@ -17,12 +17,15 @@ def main():
     case.near("u in the middle [m]", u[middle], exact[middle], relative=0.002)
     case.near("u of the last point [m]", u[end], exact[end], relative=0.002)
     inner = (x > 0.1) & (x < 0.9)
-    case.near("strain away from the ends [-]", np.polyfit(x[inner], u[inner], 1)[0], STRESS / MODULUS, relative=1e-6)
-    case.near("reaction of the support [N]", results.history["support_reaction_x"][-1], -STRESS * AREA, relative=1e-6)
-    # Clapeyron: the work of a dead load is twice the energy stored; the program counts the work of slow
-    # loading, half the final force times the displacement
+    case.near("strain away from the ends [-]", np.polyfit(x[inner], u[inner], 1)[0],
+              STRESS / MODULUS, relative=1e-6)
+    case.near("reaction of the support [N]", results.history["support_reaction_x"][-1],
+              -STRESS * AREA, relative=1e-6)
+    # Clapeyron: the work of a dead load is twice the energy stored; the program counts the work of
+    # slow loading, half the final force times the displacement
     case.near("strain energy over the work of the loads [-]",
-              results.history["strain_energy"][-1] / results.history["external_work"][-1], 1.0, relative=1e-6)
+              results.history["strain_energy"][-1] / results.history["external_work"][-1], 1.0,
+              relative=1e-6)
 
     # In one dimension the equations are linear, so nothing but the relaxation's tolerance is left
     lattice = Lattice(points, SPACING, RATIO * SPACING, MODULUS, section=AREA)

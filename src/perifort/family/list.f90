@@ -19,7 +19,7 @@ module pd_family_list
     real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
     logical :: one_spacing = .false.           !! all points have the same
     real(wp), allocatable :: place(:, :)       !! position and volume, point by point (4, n_slots)
-    real(wp), allocatable :: moved(:, :)       !! displacement and p, kept by the force loops (4, n_slots)
+    real(wp), allocatable :: moved(:, :)       !! displacement and p, gathered (4, n_slots)
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of

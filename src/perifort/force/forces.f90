@@ -13,8 +13,8 @@ module pd_force_forces
 
 contains
 
-  !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds can
-  !> break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.
+  !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds
+  !> can break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.
   subroutine dilatation_pass(family, model, u, p, strained)
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model

@@ -14,7 +14,8 @@ module pd_force_lattice
   private
   public :: lattice_dilatation, lattice_force, lattice_energy
 
-  !> Limit and coefficients of h: (1 - 1/sqrt(1 + e))/e = 1/2 - 3/8 e + e^2 (Chebyshev interpolation of the rest).
+  !> Limit and coefficients of h: (1 - 1/sqrt(1 + e))/e = 1/2 - 3/8 e + e^2 (Chebyshev interpolation
+  !> of the rest).
   real(wp), parameter :: small_strain = 0.02_wp
   real(wp), parameter :: h0 = 0.5_wp, h1 = -0.375_wp, h2 = 0.31250000000037114_wp, &
     & h3 = -0.27343750000352559_wp, h4 = 0.24609373329889834_wp, h5 = -0.22558592163388049_wp, &
@@ -34,8 +35,8 @@ module pd_force_lattice
 
 contains
 
-  !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps in
-  !> `family%large` which blocks the fast formula doesn't serve.
+  !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps
+  !> in `family%large` which blocks the fast formula doesn't serve.
   subroutine lattice_dilatation(family, model, u, p, strained)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
@@ -51,7 +52,8 @@ contains
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, b)) then
-        call dilatation_of_block(family, model, terms, b, family%table(family%weights(b)), u, p, strained)
+        call dilatation_of_block(family, model, terms, b, family%table(family%weights(b)), u, p, &
+          & strained)
       else
         call weights_now(family, model, b, scratch)
         call dilatation_of_block(family, model, terms, b, scratch, u, p, strained)
@@ -79,7 +81,8 @@ contains
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, b)) then
-        call force_of_block(family, model, terms, b, family%table(family%weights(b)), u, p, force, strained)
+        call force_of_block(family, model, terms, b, family%table(family%weights(b)), u, p, force, &
+          & strained)
       else
         call weights_now(family, model, b, scratch)
         call force_of_block(family, model, terms, b, scratch, u, p, force, strained)
@@ -151,7 +154,7 @@ contains
     integer, intent(in) :: b
     type(weights_type), intent(inout) :: weights
     integer :: m, o, w, l, n
-    integer(i8) :: first
+    integer(i8) :: first, bit
     real(wp) :: intact(lanes)
 
     first = family%block(b)
@@ -174,7 +177,8 @@ contains
       o = weights%offset(m)
       w = (o - 1)/word_bits + 1
       do l = 1, lanes
-        intact(l) = real(1_i8 - iand(ishft(family%broken(first + l - 1, w), -mod(o - 1, word_bits)), 1_i8), wp)
+        bit = iand(ishft(family%broken(first + l - 1, w), -mod(o - 1, word_bits)), 1_i8)
+        intact(l) = real(1_i8 - bit, wp)
       end do
       weights%stretch(:, m) = weights%stretch(:, m)*intact
       if (model%dilatation) weights%dilatation(:, m) = weights%dilatation(:, m)*intact
@@ -312,8 +316,8 @@ contains
     include 'fast_force.inc'
   end subroutine fast_force_3
 
-  !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda, r = |xi|/|y|
-  !> and the bond's direction over |xi|.
+  !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda,
+  !> r = |xi|/|y| and the bond's direction over |xi|.
   pure subroutine deform(dim, model, terms, first, shift, g, u, s, lambda, r, along)
     integer, intent(in) :: dim
     type(model_type), intent(in) :: model
@@ -342,7 +346,9 @@ contains
     r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
     lambda = (1 + x)*r
     if (.not. terms%projected) lambda = 1.0_wp
-    if (terms%thermal) s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
+    if (terms%thermal) then
+      s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
+    end if
   end subroutine deform
 
   !> The sums of `fast_dilatation` for any strain and with every term; marks strained slots.
@@ -456,7 +462,8 @@ contains
     end where
   end subroutine widen
 
-  !> Mark the slots with a bond at its limit, a hair's breadth early: what breaks is decided elsewhere.
+  !> Mark the slots with a bond at its limit, a hair's breadth early: what breaks is decided
+  !> elsewhere.
   subroutine mark(model, first, most, least, strained)
     type(model_type), intent(in) :: model
     integer(i8), intent(in) :: first

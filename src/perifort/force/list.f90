@@ -124,7 +124,8 @@ contains
       associate (m => model%materials(model%material(k)), &
         & neighbour => family%neighbour(first:first + n - 1))
         call factors(model, n, neighbour, k, stage%across, model%S, stage%factor)
-        energy(k) = m%q/2*sum(stage%factor(:n)*stage%stretch(:n)**2*stage%length(:n)*stage%weight(:n))
+        energy(k) = m%q/2*sum(stage%factor(:n)*stage%stretch(:n)**2*stage%length(:n) &
+          & *stage%weight(:n))
         if (abs(m%a) > 0.0_wp) then
           call factors(model, n, neighbour, k, stage%across, model%D, stage%factor)
           energy(k) = energy(k) + m%a*(m%t*sum(stage%factor(:n)*stage%stretch(:n)*stage%lambda(:n) &
@@ -143,7 +144,8 @@ contains
   end subroutine allocate_stage
 
   !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
-  !> then stands in one place, while gathering each component by itself is what the loops would wait for.
+  !> then stands in one place, while gathering each component by itself is what the loops would wait
+  !> for.
   subroutine gather_state(family, u, p)
     type(list_family_type), intent(inout) :: family
     real(wp), intent(in), contiguous :: u(:, :)
@@ -160,8 +162,8 @@ contains
     end do
   end subroutine gather_state
 
-  !> Bond vectors, relative displacements and p_k + p_j of the bonds of slot `k`. Negating and adding
-  !> is what makes both ends of a bond see the same bits.
+  !> Bond vectors, relative displacements and p_k + p_j of the bonds of slot `k`. Negating and
+  !> adding is what makes both ends of a bond see the same bits.
   pure subroutine fetch(n, n_slots, neighbour, place, moved, k, xi, eta)
     integer, intent(in) :: n, n_slots, k
     integer(i4), intent(in) :: neighbour(n)
@@ -213,11 +215,13 @@ contains
       if (.not. model%projected) stage%lambda(:n) = 1.0_wp
       if (model%thermal) then
         do i = 1, n
-          stage%stretch(i) = stage%stretch(i) - (model%expansion(k) + model%expansion(neighbour(i)))/2
+          stage%stretch(i) = stage%stretch(i) &
+            & - (model%expansion(k) + model%expansion(neighbour(i)))/2
         end do
       end if
       if (.not. model%breaking) return
-      ! marked a hair's breadth early, and by the smallest limit of all: what breaks is decided elsewhere
+      ! marked a hair's breadth early, and by the smallest limit of all: what breaks is decided
+      ! elsewhere
       strained(k) = 0_i1
       if (model%critical(k) < 0.0_wp) return
       limit = model%least_critical*(1 - 1.0e-9_wp)
@@ -290,7 +294,8 @@ contains
       else
         do i = 1, n
           spacing = (family%spacing(k) + family%spacing(neighbour(i)))/2
-          weight(i) = weight(i)*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length(i))/spacing))
+          weight(i) = weight(i) &
+            & *max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length(i))/spacing))
         end do
       end if
     end select

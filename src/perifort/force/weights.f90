@@ -16,8 +16,8 @@ module pd_force_weights
 
 contains
 
-  !> Find the blocks that are alike and make the weights of each kind. When the kinds become too many
-  !> (a lattice full of random holes), the rest make theirs in every pass.
+  !> Find the blocks that are alike and make the weights of each kind. When the kinds become too
+  !> many (a lattice full of random holes), the rest make theirs in every pass.
   subroutine build_weights(family, model)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
@@ -99,8 +99,8 @@ contains
     integer :: n
 
     n = family%most_bonds
-    allocate (weights%offset(n), weights%shift(n), weights%geometry(4, n), weights%stretch(lanes, n))
-    allocate (weights%dilatation(lanes, merge(n, 0, model%dilatation)))
+    allocate (weights%offset(n), weights%shift(n), weights%geometry(4, n))
+    allocate (weights%stretch(lanes, n), weights%dilatation(lanes, merge(n, 0, model%dilatation)))
   end subroutine allocate_weights
 
   !> Weights of the block that begins at slot `first`, as if no bond were broken. Offsets that no
@@ -118,7 +118,8 @@ contains
     associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
       do o = 1, grid%n
         j = first + grid%shift(o)
-        if (.not. any(alive(first:first + lanes - 1) == 1_i1 .and. alive(j:j + lanes - 1) == 1_i1)) cycle
+        if (.not. any(alive(first:first + lanes - 1) == 1_i1 &
+          & .and. alive(j:j + lanes - 1) == 1_i1)) cycle
         m = m + 1
         weights%offset(m) = int(o, i4)
         weights%shift(m) = grid%shift(o)
@@ -136,7 +137,8 @@ contains
           if (model%dilatation) weights%dilatation(l, m) = weight
           if (.not. model%surface) cycle
           weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
-          if (model%dilatation) weights%dilatation(l, m) = weight*bond_factor(n, model%D(k, :), model%D(j, :))
+          if (.not. model%dilatation) cycle
+          weights%dilatation(l, m) = weight*bond_factor(n, model%D(k, :), model%D(j, :))
         end do
       end do
     end associate
