@@ -11,7 +11,7 @@ module pd_driver
   use pd_scene_types, only: scene_type, is_set, material_group
   use pd_scene_write, only: scene_text
   use pd_body_body, only: body_type, in_point_order
-  use pd_body_generate, only: generate_body, touch
+  use pd_body_generate, only: generate_body, horizon_of, touch
   use pd_body_initial, only: initial_state
   use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
   use pd_body_shapes, only: inside
@@ -29,10 +29,12 @@ module pd_driver
   use pd_motion_plan, only: plan_type, make_plan, depth_of
   use pd_motion_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, start_system, evaluate
+  use pd_motion_time_step, only: horizon_volume
   use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, &
     & planned_outputs, planned_rows
   use pd_output_results, only: refuse_existing
   use pd_output_summary, only: summary_before, summary_after
+  use pd_study_machine, only: available_memory
   implicit none (type, external)
   private
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type
@@ -144,6 +146,38 @@ contains
     end select
   end function evaluations
 
+  !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a run
+  !> takes at its peak, while families are built, about 400 bytes a point with a lattice; a list adds
+  !> about 10 bytes a bond.
+  subroutine check_memory(scene, error)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: per_point = 400.0_wp, per_bond = 10.0_wp
+    real(wp) :: points, spacing, delta, need, there
+    integer :: i, dim
+
+    dim = scene%header%dimension
+    points = 0.0_wp
+    spacing = 0.0_wp
+    do i = 1, size(scene%bodies)
+      if (scene%bodies(i)%file /= '') cycle
+      points = points + product(real(scene%bodies(i)%points(:dim), wp))
+      spacing = max(spacing, (scene%bodies(i)%upper(1) - scene%bodies(i)%lower(1)) &
+        & /scene%bodies(i)%points(1))
+    end do
+    if (points <= 0.0_wp) return
+    need = points*per_point
+    if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
+      delta = horizon_of(scene, spacing)
+      need = need + points*per_bond*horizon_volume(dim, delta, 1.0_wp)/spacing**dim
+    end if
+    there = real(available_memory(), wp)
+    if (need <= there) return
+    call fail(error, 'the scene has '//to_text(int(points, i8))//' points and needs about '// &
+      & with_unit(need, 'B', 3)//' of memory, but only '//with_unit(there, 'B', 3)// &
+      & ' are available')
+  end subroutine check_memory
+
   !> Points, families, corrections, cracks, conditions and the plan of a scene.
   subroutine prepare(scene, set_up, error)
     type(scene_type), intent(in) :: scene
@@ -153,6 +187,8 @@ contains
     real(wp), allocatable :: temperature_change(:)
     real(wp) :: delta
 
+    call check_memory(scene, error)
+    if (allocated(error)) return
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
       call generate_body(scene, system%body, delta, error)

@@ -99,7 +99,7 @@ contains
       & cell(numeral(scale*timing%seconds), 8)//' ('//cell(numeral(scale*timing%least), 7)// &
       & ' ..'//cell(numeral(scale*timing%most), 7)//')'// &
       & cell(numeral(scale*timing%processor), 8)// &
-      & cell(numeral(1.0e9_wp*timing%forces/real(timing%bonds, wp)), 8)//' |'// &
+      & cell(numeral(scale*timing%forces*timing%steps), 8)//' |'// &
       & cell(numeral(1/step), 9)//' |'//cell(to_text(nint(real(timing%bytes, wp)/points)), 6)// &
       & cell(numeral(1.0e9_wp*timing%build/points), 8)//' |'// &
       & cell(numeral(1.0e-9_wp*timing%traffic/step), 6)// &
