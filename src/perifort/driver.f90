@@ -146,9 +146,9 @@ contains
     end select
   end function evaluations
 
-  !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a run
-  !> takes at its peak, while families are built, about 400 bytes a point with a lattice; a list adds
-  !> about 10 bytes a bond.
+  !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a
+  !> run takes at its peak, while families are built, about 400 bytes a point with a lattice; a list
+  !> adds about 10 bytes a bond.
   subroutine check_memory(scene, error)
     type(scene_type), intent(in) :: scene
     type(error_type), allocatable, intent(out) :: error
@@ -404,7 +404,8 @@ contains
       if (allocated(error)) return
       call put_points(scene, body, recorder, error)
       if (allocated(error)) return
-      call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet)
+      call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet, &
+        & load=plan%relaxes)
     end associate
   end subroutine open_recorder
 

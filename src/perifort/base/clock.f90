@@ -43,6 +43,7 @@ module pd_base_clock
     integer :: unit = output_unit
     logical :: quiet = .true.
     logical :: terminal = .false.
+    logical :: load = .false.                  !! times are parts of the load
     logical :: open_line = .false.             !! the cursor stands at the end of a rewritten line
     integer(i8) :: stride = 1                  !! calls from one look at the clock to the next
     integer(i8) :: calls_left = 0
@@ -231,12 +232,13 @@ contains
   end function find_phase
 
   !> Begin. `is_terminal`: rewrite the line in place; `quiet`: show nothing at all.
-  subroutine start_progress(self, total_steps, is_terminal, quiet, unit, first_step)
+  subroutine start_progress(self, total_steps, is_terminal, quiet, unit, first_step, load)
     class(progress_type), intent(inout) :: self
     integer(i8), intent(in) :: total_steps
     logical, intent(in) :: is_terminal, quiet
     integer, intent(in), optional :: unit             !! default: standard output
     integer(i8), intent(in), optional :: first_step   !! steps that were done before, default 0
+    logical, intent(in), optional :: load             !! the time told is the part of the load
 
     self%total = total_steps
     self%terminal = is_terminal
@@ -245,6 +247,8 @@ contains
     if (present(unit)) self%unit = unit
     self%first = 0
     if (present(first_step)) self%first = first_step
+    self%load = .false.
+    if (present(load)) self%load = load
     self%open_line = .false.
     self%stride = 1
     self%calls_left = 0
@@ -277,7 +281,8 @@ contains
     interval = merge(terminal_interval, log_interval, self%terminal)
     if (now - self%shown < interval .and. step < self%total) return
     self%shown = now
-    line = progress_text(step, self%total, time, bonds_broken, now - self%started, self%first)
+    line = progress_text(step, self%total, time, bonds_broken, now - self%started, self%first, &
+      & self%load)
     if (present(note)) line = line//'  '//note
     if (self%terminal) then
       line = line(:min(len(line), line_width))
@@ -300,21 +305,27 @@ contains
 
   !> The progress line: percent, step, simulated time, bonds broken, steps per second and time left,
   !> the last two from the mean of the `elapsed` seconds.
-  pure function progress_text(step, total, time, bonds_broken, elapsed, first) result(text)
+  pure function progress_text(step, total, time, bonds_broken, elapsed, first, load) result(text)
     integer(i8), intent(in) :: step, total, bonds_broken
     real(wp), intent(in) :: time, elapsed      !! [s]
     integer(i8), intent(in), optional :: first !! step at which the clock was started, default 0
+    logical, intent(in), optional :: load      !! `time` is the part of the load, 0 to 1
     character(:), allocatable :: text
+    character(:), allocatable :: clock
     character(8) :: percent
     real(wp) :: rate
     integer(i8) :: begun
 
     begun = 0
     if (present(first)) begun = first
+    clock = with_unit(time, 's', 4)
+    if (present(load)) then
+      if (load) clock = 'load '//to_text(time, 4)
+    end if
     ! Rounded down: 100 % is only said when all is done.
     write (percent, '(f5.1)') floor(1000.0_wp*real(step, wp)/real(max(total, 1_i8), wp))/10.0_wp
     text = trim(percent)//' %  step '//to_text(step)//'/'//to_text(total)//'  '// &
-      & with_unit(time, 's', 4)//'  broken '//to_text(bonds_broken)
+      & clock//'  broken '//to_text(bonds_broken)
     if (step <= begun .or. elapsed <= 0.0_wp) return
     rate = real(step - begun, wp)/elapsed
     text = text//'  '//to_text(rate, 3)//' steps/s'

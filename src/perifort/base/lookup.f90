@@ -16,8 +16,8 @@ module pd_base_lookup
 
 contains
 
-  !> `key` with one more value mixed in, all of its 64 bits. Rotation and exclusive or cannot overflow;
-  !> products of 22 bits with a factor of 40 spread the value without overflow either.
+  !> `key` with one more value mixed in, all of its 64 bits. Rotation and exclusive or cannot
+  !> overflow; products of 22 bits with a factor of 40 spread the value without overflow either.
   elemental integer(i8) function mix(key, value)
     integer(i8), intent(in) :: key, value
     integer(i8), parameter :: spread = 679535556991_i8  ! 2^40 over the golden ratio, odd

@@ -68,8 +68,8 @@ module pd_family_family
 
 contains
 
-  !> A slot, the same for all slots whose families are known to be alike (same material, same members
-  !> at the same offsets), so that what follows from the family alone is computed once.
+  !> A slot, the same for all slots whose families are known to be alike (same material, same
+  !> members at the same offsets), so that what follows from the family alone is computed once.
   pure integer function alike(family, k)
     class(family_type), intent(in) :: family
     integer, intent(in) :: k

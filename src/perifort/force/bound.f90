@@ -28,7 +28,8 @@ contains
       !$omp do schedule(static)
       do b = 1, size(family%block)
         if (family%weights(b) > 0) then
-          call add(family, model, pass, family%block(b), family%table(family%weights(b)), inverse, bound)
+          call add(family, model, pass, family%block(b), family%table(family%weights(b)), inverse, &
+            & bound)
         else
           call block_weights(family, model, family%block(b), scratch)
           call add(family, model, pass, family%block(b), scratch, inverse, bound)
@@ -74,8 +75,8 @@ contains
     end do
   end subroutine add
 
-  !> The sum of 7.25 as printed for every slot [N/m4]: no surface factors, a with its sign, everything
-  !> of the slot's own material.
+  !> The sum of 7.25 as printed for every slot [N/m4]: no surface factors, a with its sign, and
+  !> everything of the slot's own material.
   subroutine lattice_printed_bound(family, model, printed)
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
