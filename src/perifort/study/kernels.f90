@@ -243,7 +243,7 @@ contains
   !>
   !> Lattice, both loops: eta d, x and e 2(2d - 1), 2x + g e 3, polynomial 15. Dilatation: sum 4.
   !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. List, both loops: geometry
-  !> 13d + 19, weight 8. Dilatation: sum 4. Force: magnitude 2, sums 3d, with a dilatation 5 more.
+  !> 12d + 15, weight 4. Dilatation: sum 4. Force: magnitude 2, sums 3d, with a dilatation 5 more.
   pure real(wp) function flops_of_bond(family, dilatation) result(flops)
     class(family_type), intent(in) :: family
     logical, intent(in) :: dilatation      !! there is a pass for it
@@ -252,8 +252,8 @@ contains
     d = family%dim
     select type (family)
     type is (list_family_type)
-      flops = (13*d + 19 + 8) + 2 + 3*d
-      if (dilatation) flops = flops + 5 + (13*d + 19 + 8) + 4
+      flops = (12*d + 15 + 4) + 2 + 3*d
+      if (dilatation) flops = flops + 5 + (12*d + 15 + 4) + 4
     class default
       flops = (d + 2*(2*d - 1) + 3 + 15) + 1 + 4*d
       if (dilatation) flops = flops + 8 + (d + 2*(2*d - 1) + 3 + 15) + 4
@@ -263,8 +263,9 @@ contains
   !> Bytes that a step must move between memory and processor at least, if every array is read or
   !> written once by every pass that needs it. Force pass: u, p read, force written; dilatation
   !> pass: u read, p written; motion: force, v, u read, v, u written. Where bonds can break: the
-  !> bits read by each pass, the marks written and read. Lists: number and flag of every bond,
-  !> positions, volumes and spacings read by each pass.
+  !> bits read by each pass, the marks written and read. Lists, by each pass: number and flag
+  !> of every bond, positions and volumes, spacings read, displacements written and read once more
+  !> where each point's stand together.
   pure real(wp) function bytes_of_step(system) result(bytes)
     type(system_type), intent(in) :: system
     integer :: d, passes
@@ -278,7 +279,7 @@ contains
     if (system%model%breaking) bytes = bytes + 2*points
     select type (family => system%family)
     type is (list_family_type)
-      bytes = bytes + passes*(5*real(family%n_bonds, wp) + points*8*(d + 2))
+      bytes = bytes + passes*(5*real(family%n_bonds, wp) + points*8*(4 + 4 + 4 + 1))
       if (allocated(family%fraction)) bytes = bytes + passes*8*real(family%n_bonds, wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
@@ -296,7 +297,7 @@ contains
     real(wp) :: points
 
     points = real(kernel%points, wp)**kernel%dimension
-    bytes = 350*points
+    bytes = 400*points
     if (kernel%family == 'list') bytes = bytes + 13*bonds(kernel%dimension)*points
   end function bytes_needed
 
