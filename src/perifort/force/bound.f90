@@ -28,11 +28,10 @@ contains
       !$omp do schedule(static)
       do b = 1, size(family%block)
         if (family%weights(b) > 0) then
-          call add(family, model, pass, family%block(b), family%table(family%weights(b)), inverse, &
-            & bound)
+          call add(model, pass, family%block(b), family%table(family%weights(b)), inverse, bound)
         else
           call block_weights(family, model, family%block(b), scratch)
-          call add(family, model, pass, family%block(b), scratch, inverse, bound)
+          call add(model, pass, family%block(b), scratch, inverse, bound)
         end if
       end do
     end do
@@ -40,8 +39,7 @@ contains
   end subroutine lattice_bound
 
   !> Pass 1: m_k I_k of a block into `inverse`; pass 2: its M_k.
-  pure subroutine add(family, model, pass, first, weights, inverse, bound)
-    type(lattice_family_type), intent(in) :: family
+  pure subroutine add(model, pass, first, weights, inverse, bound)
     type(model_type), intent(in) :: model
     integer, intent(in) :: pass
     integer(i8), intent(in) :: first
