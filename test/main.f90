@@ -9,13 +9,16 @@ program main
   use testdrive, only: collect_interface, new_testsuite, run_selected, select_suite, &
     & testsuite_type, unittest_type
   use test_base_clock, only: collect_base_clock
+  use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
   use test_body_generate, only: collect_body_generate
   use test_body_material, only: collect_body_material
   use test_command_line, only: collect_command_line
+  use test_driver, only: collect_driver
   use test_family_cells, only: collect_family_cells
   use test_family_cracks, only: collect_family_cracks
+  use test_family_lattice, only: collect_family_lattice
   use test_family_surface, only: collect_family_surface
   use test_family_volume, only: collect_family_volume
   use test_force_breaking, only: collect_force_breaking
@@ -26,6 +29,7 @@ program main
   use test_motion_system, only: collect_motion_system
   use test_motion_time_step, only: collect_motion_time_step
   use test_output_base64, only: collect_output_base64
+  use test_output_contact, only: collect_output_contact
   use test_output_files, only: collect_output_files
   use test_output_layout, only: collect_output_layout
   use test_output_results, only: collect_output_results
@@ -49,13 +53,16 @@ program main
   character(:), allocatable :: suite_name, test_name
 
   call register('base_clock', collect_base_clock)
+  call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)
   call register('body_generate', collect_body_generate)
   call register('body_material', collect_body_material)
   call register('command_line', collect_command_line)
+  call register('driver', collect_driver)
   call register('family_cells', collect_family_cells)
   call register('family_cracks', collect_family_cracks)
+  call register('family_lattice', collect_family_lattice)
   call register('family_surface', collect_family_surface)
   call register('family_volume', collect_family_volume)
   call register('force_breaking', collect_force_breaking)
@@ -66,6 +73,7 @@ program main
   call register('motion_system', collect_motion_system)
   call register('motion_time_step', collect_motion_time_step)
   call register('output_base64', collect_output_base64)
+  call register('output_contact', collect_output_contact)
   call register('output_files', collect_output_files)
   call register('output_layout', collect_output_layout)
   call register('output_results', collect_output_results)

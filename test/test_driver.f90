@@ -1,0 +1,396 @@
+!> Whole runs: from a scene to its files.
+module test_driver
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
+  use pd_base_kinds, only: wp, i8
+  use pd_driver, only: check_scene, run_options_type, run_scene
+  use pd_output_datasets, only: get_shape, read_rows
+  use pd_output_files, only: directory_exists, file_bytes, file_exists, make_directory, remove_file
+  use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
+  use pd_output_sink, only: sink_type
+  use pd_scene_file, only: line_type, read_text_file, split_lines
+  use pd_scene_types, only: scene_type
+  use pd_scene_write, only: scene_text
+  use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
+  use bodies, only: box_scene, density_of_steel, expect, expect_true
+  implicit none (type, external)
+  private
+  public :: collect_driver
+
+  character(*), parameter :: here = 'build/test_driver'
+  real(wp), parameter :: spacing = 1.0e-2_wp
+
+contains
+
+  subroutine collect_driver(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('a flying plate arrives in its files', test_flight), &
+      & new_unittest('results are not overwritten unasked', test_refuses), &
+      & new_unittest('other formats are written as asked', test_formats), &
+      & new_unittest('a relaxation leaves its history', test_relaxation), &
+      & new_unittest('a run without an answer keeps its history', test_unstable), &
+      & new_unittest('a scene that cannot be leaves no files', test_impossible), &
+      & new_unittest('checking a scene leaves no files', test_check), &
+      & new_unittest('quiet prints nothing', test_quiet)]
+  end subroutine collect_driver
+
+  !> A plate of 6 x 5 points that flies at 3 and -2 m/s: 12 steps of 1 us, a row every third, an
+  !> output every fifth. `name` is that of the scene file.
+  subroutine flight(name, scene)
+    character(*), intent(in) :: name
+    type(scene_type), intent(out) :: scene
+
+    call box_scene([6, 5], spacing, 0.25_wp, scene)
+    scene%file = 'somewhere/'//name//'.nml'
+    deallocate (scene%initial, scene%probes, scene%output%fields, scene%regions)
+    allocate (scene%initial(1), scene%probes(1), scene%regions(1))
+    scene%initial(1)%velocity(:2) = [3.0_wp, -2.0_wp]
+    scene%regions(1)%name = 'left'
+    scene%regions(1)%shape = 'box'
+    scene%regions(1)%upper(1) = 2*spacing
+    scene%probes(1)%name = 'corner'
+    scene%probes(1)%point = [0.0_wp, 0.0_wp, 0.0_wp]
+    scene%probes(1)%fields = [character(64) :: 'displacement']
+    scene%time%step = 1.0e-6_wp
+    scene%time%steps = 12
+    scene%output%every = 5
+    scene%output%history_every = 3
+    scene%output%fields = [character(64) :: 'displacement', 'velocity']
+  end subroutine flight
+
+  !> Run a scene without a word into a folder of its own. Small scenes choose one thread, which is
+  !> not to reach other tests.
+  subroutine run(scene, folder, fault, overwrite)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: folder
+    type(fault_type), allocatable, intent(out) :: fault
+    logical, intent(in), optional :: overwrite
+    type(run_options_type) :: options
+    integer :: threads
+
+    options%output_directory = here//'/'//folder
+    options%command = 'perifort run '//folder
+    options%quiet = .true.
+    options%overwrite = .true.
+    if (present(overwrite)) options%overwrite = overwrite
+    threads = omp_get_max_threads()
+    call run_scene(scene, options, fault)
+    call omp_set_num_threads(threads)
+  end subroutine run
+
+  !> Fail the test where a run did.
+  subroutine accept(error, fault)
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable, intent(in) :: fault
+    if (allocated(error)) return
+    if (allocated(fault)) call test_failed(error, 'refused: '//fault%message)
+  end subroutine accept
+
+  !> A column of the history; what is wrong with the file fails the test.
+  subroutine column_of(path, name, column, error)
+    character(*), intent(in) :: path, name
+    real(wp), allocatable, intent(out) :: column(:)
+    type(error_type), allocatable, intent(inout) :: error
+    type(hdf5_file) :: file
+    type(fault_type), allocatable :: fault, late
+    integer(i8) :: rows
+
+    allocate (column(0))
+    if (allocated(error)) return
+    call open_file(path, .false., file, fault)
+    if (.not. allocated(fault)) then
+      call get_attribute(file, '/history', 'rows', rows, fault)
+      if (.not. allocated(fault)) then
+        deallocate (column)
+        allocate (column(rows))
+        call read_rows(file, '/history/'//name, 0_i8, column, fault)
+      end if
+      call close_file(file, late)
+    end if
+    call accept(error, fault)
+  end subroutine column_of
+
+  !> Values of a column, to `tolerance`.
+  subroutine expect_column(error, path, name, expected, tolerance)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: path, name
+    real(wp), intent(in) :: expected(:)
+    real(wp), intent(in) :: tolerance
+    real(wp), allocatable :: column(:)
+
+    if (allocated(error)) return
+    call column_of(path, name, column, error)
+    if (allocated(error)) return
+    call check(error, size(column), size(expected), 'rows of '//name)
+    if (allocated(error)) return
+    call expect(error, maxval(abs(column - expected)), 0.0_wp, tolerance, name)
+  end subroutine expect_column
+
+  !> The lines of a text file.
+  subroutine lines_of(path, lines, error)
+    character(*), intent(in) :: path
+    type(line_type), allocatable, intent(out) :: lines(:)
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+
+    allocate (lines(0))
+    if (allocated(error)) return
+    call read_text_file(path, text, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    deallocate (lines)
+    call split_lines(text, lines)
+  end subroutine lines_of
+
+  !> Every number of the files is known: u = v t, kinetic energy rho V v^2/2 = 30 cells of 2 mm with
+  !> v^2 = 13, no strain.
+  subroutine test_flight(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: path = here//'/flight/plate.v2.vtkhdf'
+    real(wp), parameter :: times(*) = [0.0_wp, 3.0e-6_wp, 6.0e-6_wp, 9.0e-6_wp, 12.0e-6_wp]
+    real(wp), parameter :: outputs(*) = [0.0_wp, 5.0e-6_wp, 10.0e-6_wp, 12.0e-6_wp]
+    real(wp), parameter :: energy = density_of_steel*30*spacing**2*2.0e-3_wp*13/2
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    type(line_type), allocatable :: lines(:)
+    type(hdf5_file) :: file
+    real(wp), allocatable :: at(:), u(:, :)
+    integer(i8) :: n
+    integer :: components, k
+
+    call flight('plate.v2', scene)
+    call run(scene, 'flight', fault)
+    call accept(error, fault)
+    call expect_column(error, path, 'time', times, 1.0e-18_wp)
+    call expect_column(error, path, 'step', 3*[0.0_wp, 1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], 0.0_wp)
+    call expect_column(error, path, 'kinetic_energy', spread(energy, 1, 5), 1.0e-12_wp*energy)
+    call expect_column(error, path, 'strain_energy', spread(0.0_wp, 1, 5), 1.0e-12_wp*energy)
+    call expect_column(error, path, 'corner_displacement_x', 3*times, 1.0e-17_wp)
+    call expect_column(error, path, 'corner_displacement_y', -2*times, 1.0e-17_wp)
+    call lines_of(here//'/flight/history.csv', lines, error)
+    if (allocated(error)) return
+    call check(error, count_filled(lines), 1 + 5, 'lines of the table')
+    if (allocated(error)) return
+
+    call open_file(path, .false., file, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call get_shape(file, '/VTKHDF/Points', components, n, fault)
+    call check(error, int(n), 30, 'points')
+    call get_shape(file, '/VTKHDF/Steps/Values', components, n, fault)
+    allocate (at(n), u(3, 30))
+    call read_rows(file, '/VTKHDF/Steps/Values', 0_i8, at, fault)
+    if (.not. allocated(error)) call check(error, int(n), size(outputs), 'outputs')
+    if (.not. allocated(error)) then
+      call expect(error, maxval(abs(at - outputs)), 0.0_wp, 1.0e-18_wp, 'times of outputs')
+      do k = 1, size(outputs)
+        call read_rows(file, '/VTKHDF/PointData/displacement', (k - 1)*30_i8, u, fault)
+        call expect(error, maxval(abs(u(1, :) - 3*outputs(k))), 0.0_wp, 1.0e-17_wp, 'u_x')
+        call expect(error, maxval(abs(u(2, :) + 2*outputs(k))), 0.0_wp, 1.0e-17_wp, 'u_y')
+        call expect(error, maxval(abs(u(3, :))), 0.0_wp, 0.0_wp, 'u_z')
+      end do
+      call expect_true(error, object_exists(file, '/points/region_left') .and. &
+        & object_exists(file, '/VTKHDF/PointData/velocity') .and. &
+        & .not. object_exists(file, '/VTKHDF/PointData/damage'), 'what is in the file')
+    end if
+    call close_file(file, fault)
+  end subroutine test_flight
+
+  !> Lines that are not empty.
+  pure integer function count_filled(lines) result(n)
+    type(line_type), intent(in) :: lines(:)
+    integer :: i
+    n = 0
+    do i = 1, size(lines)
+      if (len_trim(lines(i)%text) > 0) n = n + 1
+    end do
+  end function count_filled
+
+  !> A second run is refused before it changes a byte, and allowed on request.
+  subroutine test_refuses(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: path = here//'/refuses/plate.vtkhdf'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: time(:)
+    integer(i8) :: before(2)
+
+    call flight('plate', scene)
+    call run(scene, 'refuses', fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    before = [file_bytes(path), file_bytes(here//'/refuses/history.csv')]
+    scene%time%steps = 600
+    call run(scene, 'refuses', fault, overwrite=.false.)
+    call expect_true(error, allocated(fault), 'results are overwritten unasked')
+    if (allocated(error)) return
+    call check(error, fault%status, status_input, 'exit status')
+    call expect_true(error, index(fault%message, path) > 0 .and. &
+      & index(fault%message, '--overwrite') > 0, fault%message)
+    call expect_true(error, all(before == [file_bytes(path), &
+      & file_bytes(here//'/refuses/history.csv')]), 'files of the refused run''s predecessor')
+    call column_of(path, 'time', time, error)
+    if (allocated(error)) return
+    call expect(error, time(size(time)), 12.0e-6_wp, 1.0e-18_wp, 'end of the old run')
+    call run(scene, 'refuses', fault)
+    call accept(error, fault)
+    call column_of(path, 'time', time, error)
+    if (allocated(error)) return
+    call expect(error, time(size(time)), 600.0e-6_wp, 1.0e-15_wp, 'end of the new run')
+  end subroutine test_refuses
+
+  subroutine test_formats(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call flight('plate', scene)
+    scene%output%format = 'both'
+    call run(scene, 'both', fault)
+    call accept(error, fault)
+    call expect_true(error, file_exists(here//'/both/plate.vtkhdf') .and. &
+      & file_exists(here//'/both/plate.pvd'), 'both formats')
+    ! what an earlier run left in the other format does not pass for results of this one
+    scene%output%format = 'vtu'
+    call run(scene, 'both', fault)
+    call accept(error, fault)
+    call expect_true(error, .not. file_exists(here//'/both/plate.vtkhdf') .and. &
+      & file_exists(here//'/both/plate.pvd'), 'one format')
+  end subroutine test_formats
+
+  !> A bar under tension: 100 MPa on both ends. Its rows carry the residual, which ends below the
+  !> tolerance, and the last row is the settled state: work done slowly is the energy stored.
+  subroutine test_relaxation(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: path = here//'/relaxation/bar.vtkhdf'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: residual(:), strain(:), work(:), load_step(:)
+    integer :: n
+
+    call box_scene([20], spacing, 0.25_wp, scene)
+    scene%file = 'bar.nml'
+    scene%horizon%surface_correction = 'energy'
+    scene%time%method = 'relaxation'
+    scene%relaxation%tolerance = 1.0e-9_wp
+    scene%relaxation%load_steps = 2
+    scene%output%fields = [character(64) :: 'displacement']
+    scene%output%history_every = 7
+    deallocate (scene%loads)
+    allocate (scene%loads(2))
+    scene%loads(1)%side = 'x_min'
+    scene%loads(2)%side = 'x_max'
+    scene%loads%pressure = -1.0e5_wp
+    call run(scene, 'relaxation', fault)
+    call accept(error, fault)
+    call column_of(path, 'residual', residual, error)
+    call column_of(path, 'load_step', load_step, error)
+    call column_of(path, 'strain_energy', strain, error)
+    call column_of(path, 'external_work', work, error)
+    if (allocated(error)) return
+    n = size(residual)
+    call expect_true(error, n > 3, 'too few rows')
+    if (allocated(error)) return
+    call expect_true(error, residual(n) <= 1.0e-9_wp .and. maxval(residual) > 1.0e-3_wp, 'residual')
+    call expect(error, load_step(n), 2.0_wp, 0.0_wp, 'load step')
+    call expect_true(error, strain(n) > 0.0_wp, 'no energy')
+    ! the strain is 5e-7: in an elastic line both agree but for terms of that order
+    call expect(error, work(n), strain(n), 1.0e-5_wp*strain(n), 'work')
+  end subroutine test_relaxation
+
+  !> A step far beyond the stable one: status 3, and the rows before it can be read.
+  subroutine test_unstable(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: path = here//'/unstable/plate.vtkhdf'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    type(line_type), allocatable :: lines(:)
+    real(wp), allocatable :: time(:)
+
+    call flight('plate', scene)
+    scene%initial(1)%velocity_gradient(1, 1) = 100.0_wp
+    scene%time%step = 1.0e-4_wp
+    scene%time%steps = 3000
+    scene%output%history_every = 1
+    call run(scene, 'unstable', fault)
+    call expect_true(error, allocated(fault), 'an unstable run ended as if it were sound')
+    if (allocated(error)) return
+    call check(error, fault%status, status_no_answer, 'exit status')
+    call column_of(path, 'time', time, error)
+    call lines_of(here//'/unstable/history.csv', lines, error)
+    if (allocated(error)) return
+    call expect_true(error, size(time) > 1 .and. size(time) < 3001, 'rows of the file')
+    call check(error, count_filled(lines), 1 + size(time), 'lines of the table')
+  end subroutine test_unstable
+
+  subroutine test_impossible(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call flight('plate', scene)
+    scene%bodies = [scene%bodies(1), scene%bodies(1)]
+    call run(scene, 'impossible', fault)
+    call expect_true(error, allocated(fault), 'two bodies in one place')
+    if (allocated(error)) return
+    call check(error, fault%status, status_input, 'exit status')
+    call expect_true(error, .not. directory_exists(here//'/impossible'), 'a folder is left behind')
+  end subroutine test_impossible
+
+  subroutine test_check(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(run_options_type) :: options
+    type(fault_type), allocatable :: fault
+    integer :: threads
+
+    call flight('plate', scene)
+    options%output_directory = here//'/check'
+    options%quiet = .true.
+    threads = omp_get_max_threads()
+    call check_scene(scene, options, fault)
+    call accept(error, fault)
+    call expect_true(error, .not. directory_exists(here//'/check'), 'a folder is left behind')
+    scene%bodies = [scene%bodies(1), scene%bodies(1)]
+    call check_scene(scene, options, fault)
+    call omp_set_num_threads(threads)
+    call expect_true(error, allocated(fault), 'two bodies in one place')
+  end subroutine test_check
+
+  !> The program itself, for what it prints: with --quiet not a byte, without it a summary.
+  subroutine test_quiet(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: scene_file = here//'/quiet.nml', printed = here//'/printed.txt'
+    character(*), parameter :: silent(2) = [character(7) :: '--quiet', '']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    type(sink_type) :: sink
+    character(1000) :: program
+    integer :: i, status
+
+    call get_environment_variable('PERIFORT', program, status=status)
+    if (status /= 0) then
+      call skip_test(error, 'PERIFORT does not name the program')
+      return
+    end if
+    call flight('quiet', scene)
+    call make_directory(here, fault)
+    if (.not. allocated(fault)) call sink%open(scene_file, fault)
+    if (.not. allocated(fault)) call sink%put(scene_text(scene), fault)
+    if (.not. allocated(fault)) call sink%close(fault)
+    call accept(error, fault)
+    do i = 1, 2
+      if (allocated(error)) return
+      call remove_file(printed)
+      call execute_command_line('"'//trim(program)//'" run '//scene_file//' --overwrite '// &
+        & '--output '//here//'/quiet '//trim(silent(i))//' >'//printed//' 2>&1', exitstat=status)
+      call check(error, status, 0, 'exit status')
+      call expect_true(error, (file_bytes(printed) == 0_i8) .eqv. i == 1, &
+        & 'what is printed with "'//trim(silent(i))//'"')
+    end do
+    call expect_true(error, file_exists(here//'/quiet/quiet.vtkhdf'), 'no results')
+  end subroutine test_quiet
+
+end module test_driver
