@@ -545,7 +545,7 @@ contains
     type(subject_type) :: subject
     integer :: n
 
-    do n = 20, 34
+    do n = 25, 32
       call porous([n, 1, 1], ratio, 0.0_wp, 'lattice', .false., subject)
       call expect_theory(error, subject, 'a chain')
     end do

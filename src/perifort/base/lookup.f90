@@ -18,14 +18,15 @@ contains
 
   !> `key` with one more value mixed in, all of its 64 bits. Rotation and exclusive or cannot
   !> overflow; products of 22 bits with a factor of 40 spread the value without overflow either.
+  !> Turned by 22 bits each, one goes on where the one before ends: no bit stands for another.
   elemental integer(i8) function mix(key, value)
     integer(i8), intent(in) :: key, value
     integer(i8), parameter :: spread = 679535556991_i8  ! 2^40 over the golden ratio, odd
     integer(i8), parameter :: low = 4194303_i8          ! 22 bits
 
     mix = ieor(ishftc(key, 23), iand(value, low)*spread)
-    mix = ieor(mix, ishftc(iand(ishft(value, -22), low)*spread, 21))
-    mix = ieor(mix, ishftc(iand(ishft(value, -44), low)*spread, 43))
+    mix = ieor(mix, ishftc(iand(ishft(value, -22), low)*spread, 22))
+    mix = ieor(mix, ishftc(iand(ishft(value, -44), low)*spread, 44))
     mix = ieor(mix, ishftc(iand(mix, low)*spread, 29))
   end function mix
 
