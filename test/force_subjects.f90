@@ -245,7 +245,7 @@ contains
   !> Forces and dilatation coefficients by the fast loops.
   subroutine fast_force(subject, u, force, p)
     type(subject_type), intent(inout) :: subject
-    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in), contiguous :: u(:, :)
     real(wp), allocatable, intent(out) :: force(:, :), p(:)
     integer(i1), allocatable :: strained(:)
 
