@@ -448,7 +448,8 @@ contains
         call expect_true(error, system%broken > 0_i8 .and. system%dissipated > 0.0_wp, &
           & 'nothing broke')
         ! the layers pulled with the force there was before the bonds broke
-        call expect_true(error, system%external_work > system%dissipated, 'no one paid for the cracks')
+        call expect_true(error, system%external_work > system%dissipated, &
+          & 'no one paid for the cracks')
       end associate
     end do
   end subroutine test_torn
