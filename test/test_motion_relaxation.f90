@@ -447,6 +447,9 @@ contains
           & *20*spacing*3.0e-4_wp, 'strain energy')
         call expect_true(error, system%broken > 0_i8 .and. system%dissipated > 0.0_wp, &
           & 'nothing broke')
+        ! the layers pulled with the force there was before the bonds broke
+        call expect_true(error, system%external_work > system%dissipated, &
+          & 'no one paid for the cracks')
       end associate
     end do
   end subroutine test_torn

@@ -52,7 +52,8 @@ contains
       if (allocated(error)) return
     end do
     call evaluate(system, 0.0_wp, breaking=.false.)
-    call account(system, 0.0_wp)
+    system%state%v = 0.0_wp
+    call account(system, 0.0_wp, at_rest=.true.)
     instant%settled = .true.
     call observer%observe(system, instant, error)
     if (allocated(error)) return
@@ -62,13 +63,15 @@ contains
       do
         call relax(system, relaxation, instant, observer, error)
         if (allocated(error)) return
+        ! the forces that did the work are those before the bonds break
+        call account(system, instant%time, at_rest=.true.)
         call break_now(system, number)
         if (number == 0) exit
       end do
       call remove_free_motions(system, rigid, system%state%u)
       call evaluate(system, instant%time, breaking=.false.)
       system%state%v = 0.0_wp
-      call account(system, instant%time)
+      call account(system, instant%time, at_rest=.true.)
       instant%settled = .true.
       instant%last = i == relaxation%load_steps
       call observer%observe(system, instant, error)
@@ -86,7 +89,7 @@ contains
     real(wp), allocatable :: rate(:, :), a(:, :), a_before(:, :)
     type(sums_type) :: sums
     real(wp) :: damping, reference
-    integer :: iteration, fault
+    integer :: iteration, fault, m
 
     allocate (rate, a, a_before, mold=system%state%u)
     rate = 0.0_wp
@@ -114,6 +117,10 @@ contains
           & '''frame_invariant'' is stable, with others raise safety)', status_no_answer)
         return
       end if
+      ! imposing sets the speed of imposed motion, which isn't one here
+      do m = 1, size(system%motions)
+        system%state%v(system%motions(m)%slots, :) = 0.0_wp
+      end do
       call observer%observe(system, instant, error)
       if (allocated(error)) return
       if (instant%residual <= relaxation%tolerance .and. &

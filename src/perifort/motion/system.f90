@@ -40,8 +40,9 @@ module pd_motion_system
     integer(i8) :: broken = 0_i8                !! bonds broken during the run
     real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking [J]
     real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
-    real(wp), allocatable :: last_u(:)          !! work accounting: place and force of each
-    real(wp), allocatable :: last_force(:)      !! component that does work, at the last step
+    real(wp), allocatable :: last_u(:)          !! work accounting: place, force and imposed
+    real(wp), allocatable :: last_force(:)      !! velocity (0 of loads) of each component that
+    real(wp), allocatable :: last_v(:)          !! does work, at the last step
     logical :: break_late = .false.             !! bonds break after the step's forces
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
   end type system_type
@@ -226,15 +227,21 @@ contains
   end function inverse_density
 
   !> Work of loads and imposed motion since the last call, by the trapezoidal rule, and the
-  !> reactions at time `t`. To be called once per step, after `evaluate`.
-  subroutine account(system, t)
+  !> reactions at time `t`. To be called once per step, after `evaluate`. What accelerates the
+  !> imposed points enters as their gain in kinetic energy: that is exact, and it holds where an
+  !> imposed velocity jumps (at the end of a ramped displacement), too. With `at_rest` (relaxation,
+  !> where imposed motion has no speed) nothing is accelerated.
+  subroutine account(system, t, at_rest)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
+    logical, intent(in), optional :: at_rest
     real(wp), allocatable :: applied(:, :)
-    real(wp) :: force, acceleration
-    logical :: first
+    real(wp) :: force, acceleration, mass
+    logical :: first, moving
     integer :: m, l, c, i, k, n
 
+    moving = .true.
+    if (present(at_rest)) moving = .not. at_rest
     first = .not. allocated(system%last_u)
     if (first) call allocate_account(system)
     if (system%loaded_and_held) then
@@ -247,16 +254,18 @@ contains
         motion%reaction = 0.0_wp
         do c = 1, system%body%dim
           acceleration = 0.0_wp
-          if (motion%kind(c) == moved_by_velocity) &
+          if (moving .and. motion%kind(c) == moved_by_velocity) &
             & acceleration = motion%amplitude(c)*motion%curve%slope(t)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)
-            force = acceleration/inverse_density(system%model, k) - system%state%force(k, c)
-            if (allocated(applied)) force = force - applied(k, c)
-            force = force*system%body%volume(k)
-            motion%reaction(c) = motion%reaction(c) + force
-            call add_work(system, n, first, system%state%u(k, c), force)
+            mass = 0.0_wp
+            if (moving) mass = system%body%volume(k)/inverse_density(system%model, k)
+            force = system%state%force(k, c)
+            if (allocated(applied)) force = force + applied(k, c)
+            force = -force*system%body%volume(k)
+            motion%reaction(c) = motion%reaction(c) + mass*acceleration + force
+            call add_work(system, n, first, system%state%u(k, c), force, mass, system%state%v(k, c))
           end do
         end do
       end associate
@@ -276,17 +285,23 @@ contains
   end subroutine account
 
   !> One component's share of the work since its last force and place; `n` counts the components.
-  pure subroutine add_work(system, n, first, u, force)
+  !> With `mass` and the imposed velocity `v` its gain in kinetic energy comes on top.
+  pure subroutine add_work(system, n, first, u, force, mass, v)
     type(system_type), intent(inout) :: system
     integer, intent(inout) :: n
     logical, intent(in) :: first
     real(wp), intent(in) :: u, force
+    real(wp), intent(in), optional :: mass, v
 
     n = n + 1
     if (.not. first) system%external_work = system%external_work &
       & + (system%last_force(n) + force)/2*(u - system%last_u(n))
     system%last_u(n) = u
     system%last_force(n) = force
+    if (.not. present(v)) return
+    if (.not. first) system%external_work = system%external_work &
+      & + mass/2*(v - system%last_v(n))*(v + system%last_v(n))
+    system%last_v(n) = v
   end subroutine add_work
 
   !> Room for the last force and place of every component that does work.
@@ -302,7 +317,8 @@ contains
       n = n + size(system%loads(l)%slots)
       if (any(system%held(system%loads(l)%slots, :) == 1_i1)) system%loaded_and_held = .true.
     end do
-    allocate (system%last_u(n*system%body%dim), system%last_force(n*system%body%dim), source=0.0_wp)
+    n = n*system%body%dim
+    allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
   end subroutine allocate_account
 
   !> Kinetic and strain energy [J]; `v` are the velocities at the instant of the displacements.
