@@ -3,7 +3,7 @@ module pd_output_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
   use pd_base_text, only: to_text, with_unit, newline
-  use pd_scene_types, only: scene_type
+  use pd_scene_types, only: scene_type, is_set
   use pd_motion_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_recorder, only: recorder_type, probe_type
@@ -44,6 +44,9 @@ contains
       text = text//line('relaxation', to_text(plan%relaxation%load_steps)// &
         & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', density matrix '// &
         & trim(scene%relaxation%density_matrix))
+      if (scene%time%steps > 0 .or. is_set(scene%time%step) .or. is_set(scene%time%duration)) &
+        & text = text//line('note', '&time steps, step and duration mean nothing here; see '// &
+        & '&relaxation load_steps')
     else
       text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
         & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &
