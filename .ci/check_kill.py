@@ -80,13 +80,14 @@ def main():
         fresh = number % 2 == 1
         if fresh:
             shutil.rmtree(folder)
+        older = path.exists()
         program = subprocess.Popen(options.command, **quiet)
         time.sleep(moments.uniform(0.0, 1.02 * duration))
         program.kill()
         program.wait()
         what = f"kill {number}"
         if not path.exists():
-            assert fresh, f"{what}: older results are gone and there are no new ones"
+            assert not older, f"{what}: older results are gone and there are no new ones"
             folder.mkdir(parents=True, exist_ok=True)
             none_yet += 1
             continue
