@@ -10,7 +10,8 @@ module test_study_bench
   use pd_study_bench, only: plan_kernels, run_bench, thread_counts
   use pd_study_kernels, only: bytes_needed, bytes_of_step, flops_of_bond, kernel_type, &
     & measure_kernel, standard_scene, timing_type
-  use pd_study_machine, only: available_memory, machine_type, measure_machine, processor_name
+  use pd_base_system, only: available_memory, processor_name
+  use pd_study_machine, only: machine_type, measure_machine
   use pd_study_options, only: bench_options_type, check_options
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)

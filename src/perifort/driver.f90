@@ -34,7 +34,7 @@ module pd_driver
     & planned_outputs, planned_rows
   use pd_output_results, only: refuse_existing
   use pd_output_summary, only: summary_before, summary_after
-  use pd_study_machine, only: available_memory
+  use pd_base_system, only: available_memory
   implicit none (type, external)
   private
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type

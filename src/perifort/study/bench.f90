@@ -7,7 +7,8 @@ module pd_study_bench
   use pd_base_text, only: to_text, with_unit
   use pd_output_files, only: rename_file
   use pd_study_kernels, only: bytes_needed, kernel_type, measure_kernel, timing_type
-  use pd_study_machine, only: available_memory, machine_type, measure_machine
+  use pd_base_system, only: available_memory
+  use pd_study_machine, only: machine_type, measure_machine
   use pd_study_options, only: bench_options_type, check_options, chosen, families, given, models, &
     & switches
   use pd_study_report, only: csv_head, csv_row, kernel_label, table_head, table_row

@@ -4,7 +4,8 @@ module pd_study_report
   use pd_base_text, only: to_text, with_unit
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_study_kernels, only: kernel_type, timing_type
-  use pd_study_machine, only: machine_type, processor_name
+  use pd_base_system, only: processor_name
+  use pd_study_machine, only: machine_type
   implicit none (type, external)
   private
   public :: csv_columns, csv_head, csv_row, table_head, table_row, machine_row, kernel_label
