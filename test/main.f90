@@ -9,6 +9,7 @@ program main
   use testdrive, only: collect_interface, new_testsuite, run_selected, select_suite, &
     & testsuite_type, unittest_type
   use test_base_clock, only: collect_base_clock
+  use test_base_interrupt, only: collect_base_interrupt
   use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
@@ -53,6 +54,7 @@ program main
   character(:), allocatable :: suite_name, test_name
 
   call register('base_clock', collect_base_clock)
+  call register('base_interrupt', collect_base_interrupt)
   call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)

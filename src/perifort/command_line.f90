@@ -425,7 +425,7 @@ contains
         & '  perifort help COMMAND        more on a command, as does COMMAND --help', &
         & '', &
         & 'Exit status: 0 done; 1 the input or the environment is at fault; 2 wrong command', &
-        & 'line; 3 no valid answer (unstable or not converged).'], newline)
+        & 'line; 3 no valid answer (unstable or not converged); 4 interrupted.'], newline)
     end select
     text = text//newline
   end function help_text

@@ -6,6 +6,7 @@ module pd_driver
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_clock, only: duration_text, output_is_terminal, phase_timer_type, wall_time
   use pd_base_error, only: error_type, fail
+  use pd_base_interrupt, only: watch_for_interrupt
   use pd_base_text, only: to_text, with_unit
   use pd_base_version, only: program_version
   use pd_scene_types, only: scene_type, is_set, material_group
@@ -86,6 +87,7 @@ contains
         & set_up%lonely, omp_get_max_threads()))
       call open_recorder(scene, options, set_up, directory, stem, recorder, error)
       if (allocated(error)) return
+      call watch_for_interrupt()
       call recorder%timer%start('time stepping')
       if (plan%relaxes) then
         call run_relaxation(system, plan%relaxation, recorder, error)

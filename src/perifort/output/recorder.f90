@@ -4,7 +4,8 @@ module pd_output_recorder
   use, intrinsic :: iso_fortran_env, only: error_unit
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_clock, only: phase_timer_type, progress_type
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail, status_interrupted
+  use pd_base_interrupt, only: interrupted
   use pd_base_text, only: to_text
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
@@ -156,7 +157,7 @@ contains
     type(system_type), intent(inout) :: system
     type(instant_type), intent(in) :: instant
     type(error_type), allocatable, intent(out) :: error
-    logical :: row, output
+    logical :: row, output, stopping
     real(wp), allocatable :: v(:, :)
 
     associate (schedule => observer%schedule)
@@ -175,6 +176,9 @@ contains
         call observer%progress%update(int(instant%step, i8), instant%time, system%broken)
       end if
     end associate
+    stopping = interrupted() .and. .not. instant%last
+    row = row .or. stopping
+    output = output .or. stopping
     if (.not. (row .or. output)) return
     call observer%timer%stop('time stepping')
     call velocities_now(system, instant, v)
@@ -191,6 +195,8 @@ contains
       if (allocated(error)) return
     end if
     call observer%timer%start('time stepping')
+    if (stopping) call fail(error, 'interrupted at step '//to_text(instant%step)//', t = '// &
+      & to_text(instant%time)//': this state is the last output', status_interrupted)
   end subroutine observe
 
   !> What the progress line adds in relaxation.

@@ -1,0 +1,46 @@
+!> The user's interrupt (Ctrl-C) or a termination request: the first is noted, so that a run can end
+!> in order; the second ends the program at once, as it would without this module.
+module pd_base_interrupt
+  use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int, c_null_funptr
+  implicit none (type, external)
+  private
+  public :: watch_for_interrupt, interrupted
+
+  integer(c_int), parameter :: sigint = 2_c_int, sigterm = 15_c_int  ! POSIX
+  logical, volatile :: noted = .false.
+
+  interface
+    !> POSIX: call `handler` at a signal; a null pointer is the default action.
+    function posix_signal(number, handler) bind(c, name='signal') result(before)
+      import :: c_funptr, c_int
+      implicit none (type, external)
+      integer(c_int), value :: number
+      type(c_funptr), value :: handler
+      type(c_funptr) :: before
+    end function posix_signal
+  end interface
+
+contains
+
+  !> From now on the first interrupt is noted.
+  subroutine watch_for_interrupt()
+    type(c_funptr) :: before
+    noted = .false.
+    before = posix_signal(sigint, c_funloc(note))
+    before = posix_signal(sigterm, c_funloc(note))
+  end subroutine watch_for_interrupt
+
+  !> Whether an interrupt has been noted.
+  logical function interrupted()
+    interrupted = noted
+  end function interrupted
+
+  !> Note the first signal and give the second its usual effect.
+  subroutine note(number) bind(c)
+    integer(c_int), value :: number
+    type(c_funptr) :: before
+    noted = .true.
+    before = posix_signal(number, c_null_funptr)
+  end subroutine note
+
+end module pd_base_interrupt
