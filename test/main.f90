@@ -20,6 +20,7 @@ program main
   use test_family_cells, only: collect_family_cells
   use test_family_cracks, only: collect_family_cracks
   use test_family_lattice, only: collect_family_lattice
+  use test_family_slabs, only: collect_family_slabs
   use test_family_surface, only: collect_family_surface
   use test_family_volume, only: collect_family_volume
   use test_force_breaking, only: collect_force_breaking
@@ -65,6 +66,7 @@ program main
   call register('family_cells', collect_family_cells)
   call register('family_cracks', collect_family_cracks)
   call register('family_lattice', collect_family_lattice)
+  call register('family_slabs', collect_family_slabs)
   call register('family_surface', collect_family_surface)
   call register('family_volume', collect_family_volume)
   call register('force_breaking', collect_force_breaking)

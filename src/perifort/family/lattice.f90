@@ -16,42 +16,28 @@ module pd_family_lattice
   use pd_body_body, only: body_type, arrange
   use pd_family_cells, only: cells_type, sort_into_cells, joins_labels
   use pd_family_family, only: family_type, bonds_type
-  use pd_family_volume, only: volume_rule_type, volume_correction, reach
+  use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, first_cell, &
+    & whole_blocks, both_ends, lanes, word_bits
+  use pd_family_slabs, only: slabs_type, find_slabs
+  use pd_family_volume, only: volume_rule_type, reach
   implicit none (type, external)
   private
   public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, &
-    & grid_at, lanes, word_bits
+    & grid_at, both_ends, lanes, word_bits
 
-  integer, parameter :: lanes = 8        !! slots of a block: one 512-bit register of reals
-  integer, parameter :: word_bits = 64   !! bonds in one word of bits
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers
 
-  !> Weights of the bonds of one block, or of many that are alike.
+  !> Weights of the bonds of one block, or of many that are alike, in the order of `offsets_type`.
   type :: weights_type
     integer :: n = 0                           !! offsets that any lane has
+    integer :: n_forward = 0                   !! forward ones among them, which come first
     integer(i4), allocatable :: offset(:)      !! their numbers (n)
     integer(i8), allocatable :: shift(:)       !! their shifts (n)
     real(wp), allocatable :: geometry(:, :)    !! their geometry (4, n)
     real(wp), allocatable :: dilatation(:, :)  !! Gd v_c V_j (lanes, n)
     real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (lanes, n)
   end type weights_type
-
-  !> One grid: its box of slots and its table of offsets.
-  type :: offsets_type
-    integer :: n = 0                           !! offsets
-    integer :: reach_cells = 0                 !! farthest offset along an axis
-    integer :: stride(3) = 0                   !! from one cell to the next along x, y, z [slots]
-    integer(i8) :: first = 0_i8                !! first slot of the box
-    integer(i8) :: last = 0_i8                 !! its last slot
-    real(wp) :: spacing = 0.0_wp               !! [m]
-    real(wp) :: cell_volume = 0.0_wp           !! of every point [m3]
-    integer(i8), allocatable :: shift(:)       !! from a slot to the member (n) [slots]
-    real(wp), allocatable :: xi(:, :)          !! bond vectors (n, dim) [m]
-    real(wp), allocatable :: length(:)         !! |xi| [m]
-    real(wp), allocatable :: fraction(:)       !! v_c
-    real(wp), allocatable :: geometry(:, :)    !! xi/|xi|^2 (rows 1:3) and 1/|xi|^2 (4, n)
-  end type offsets_type
 
   type, extends(family_type) :: lattice_family_type
     type(offsets_type), allocatable :: grids(:)
@@ -61,6 +47,7 @@ module pd_family_lattice
     integer(i4), allocatable :: first_of(:)    !! the first slot of each class
     integer(i8), allocatable :: broken(:, :)   !! 1-bits: broken bonds (n_slots, words), if any can
     integer(i8), allocatable :: block(:)       !! first slot of each block
+    type(slabs_type) :: slabs                  !! which blocks can be worked on at once
     integer(i4), allocatable :: weights(:)     !! which weights each block has; 0: made on the fly
     integer(i1), allocatable :: large(:)       !! 1: the block is strained beyond the fast formula
     type(weights_type), allocatable :: table(:)
@@ -147,6 +134,7 @@ contains
     if (allocated(error)) return
     call classify(body, family)
     call find_blocks(family)
+    call find_slabs(family%grids, family%dim, family%block, family%slabs)
     if (breakable) call family%allow_breaking()
   end subroutine new_lattice_family
 
@@ -183,44 +171,9 @@ contains
         grid%shift(o) = grid%shift(o) + nint(grid%xi(o, c)/grid%spacing)*int(grid%stride(c), i8)
       end do
     end do
+    call order_offsets(grid)
     family%grids = [family%grids, grid]
   end subroutine add_grid
-
-  !> The bond vectors of a grid: all offsets within the rule's reach, x fastest.
-  subroutine make_offsets(rule, dim, grid)
-    type(volume_rule_type), intent(in) :: rule
-    integer, intent(in) :: dim
-    type(offsets_type), intent(inout) :: grid
-    real(wp) :: xi(3), farthest
-    integer :: i, j, k, n, pass, high(3)
-
-    farthest = reach(rule, grid%spacing, dim)
-    grid%reach_cells = floor(farthest/grid%spacing)
-    high = 0
-    high(:dim) = grid%reach_cells
-    do pass = 1, 2
-      n = 0
-      do k = -high(3), high(3)
-        do j = -high(2), high(2)
-          do i = -high(1), high(1)
-            if (i == 0 .and. j == 0 .and. k == 0) cycle
-            xi = grid%spacing*[i, j, k]
-            if (norm2(xi) > farthest) cycle
-            n = n + 1
-            if (pass == 1) cycle
-            grid%xi(n, :) = xi(:dim)
-            grid%length(n) = norm2(xi)
-            grid%fraction(n) = volume_correction(rule, xi(:dim), norm2(xi), grid%spacing)
-            grid%geometry(:3, n) = xi/sum(xi**2)
-            grid%geometry(4, n) = 1/sum(xi**2)
-          end do
-        end do
-      end do
-      if (pass == 1) allocate (grid%xi(n, dim), grid%length(n), grid%fraction(n), grid%shift(n), &
-        & grid%geometry(4, n))
-    end do
-    grid%n = n
-  end subroutine make_offsets
 
   !> Put every point into its cell.
   subroutine place_points(body, family, error)
@@ -253,8 +206,7 @@ contains
     do k = 1, body%n_points
       g = body%grid(k)
       associate (grid => family%grids(number(g)))
-        ! as much room before the first point as the farthest offset reaches back
-        at = grid%first + whole_blocks(int(grid%reach_cells*sum(int(grid%stride, i8))))
+        at = first_cell(grid)
         do c = 1, body%dim
           at = at + nint((body%x(k, c) - lower(c, g))/grid%spacing)*int(grid%stride(c), i8)
         end do
@@ -281,12 +233,6 @@ contains
       if (k <= family%grids(g)%last) exit
     end do
   end function grid_at
-
-  !> The next multiple of `lanes`.
-  pure integer function whole_blocks(slots)
-    integer, intent(in) :: slots
-    whole_blocks = (slots + lanes - 1)/lanes*lanes
-  end function whole_blocks
 
   !> Number the kinds of surroundings: slots of the same grid and material with the same members are
   !> alike. Counts the bonds on the way.

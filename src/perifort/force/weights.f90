@@ -103,8 +103,8 @@ contains
     allocate (weights%stretch(lanes, n), weights%dilatation(lanes, merge(n, 0, model%dilatation)))
   end subroutine allocate_weights
 
-  !> Weights of the block that begins at slot `first`, as if no bond were broken. Offsets that no
-  !> lane has are left out.
+  !> Weights of the block that begins at slot `first`, as if no bond were broken, in the grid's
+  !> order of offsets. Offsets that no lane has are left out.
   pure subroutine block_weights(family, model, first, weights)
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
@@ -112,15 +112,18 @@ contains
     type(weights_type), intent(inout) :: weights
     real(wp) :: weight, n(family%dim)
     integer(i8) :: k, j
-    integer :: o, l, m
+    integer :: i, o, l, m
 
     m = 0
+    weights%n_forward = 0
     associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
-      do o = 1, grid%n
+      do i = 1, grid%n
+        o = grid%order(i)
         j = first + grid%shift(o)
         if (.not. any(alive(first:first + lanes - 1) == 1_i1 &
           & .and. alive(j:j + lanes - 1) == 1_i1)) cycle
         m = m + 1
+        if (grid%shift(o) > 0_i8) weights%n_forward = m
         weights%offset(m) = int(o, i4)
         weights%shift(m) = grid%shift(o)
         weights%geometry(:, m) = grid%geometry(:, o)

@@ -8,7 +8,7 @@ module pd_study_kernels
   use pd_base_numbers, only: pi
   use pd_driver, only: prepare, set_up_type
   use pd_family_family, only: family_type
-  use pd_family_lattice, only: lattice_family_type
+  use pd_family_lattice, only: both_ends, lattice_family_type
   use pd_family_list, only: list_family_type
   use pd_motion_explicit, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
@@ -242,8 +242,10 @@ contains
   !> counted again.
   !>
   !> Lattice, both loops: eta d, x and e 2(2d - 1), 2x + g e 3, polynomial 15. Dilatation: sum 4.
-  !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. List, both loops: geometry
-  !> 12d + 15, weight 4. Dilatation: sum 4. Force: magnitude 2, sums 3d, with a dilatation 5 more.
+  !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. Where a bond is computed
+  !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
+  !> directed bonds. List, both loops: geometry 12d + 15, weight 4. Dilatation: sum 4. Force:
+  !> magnitude 2, sums 3d, with a dilatation 5 more.
   pure real(wp) function flops_of_bond(family, dilatation) result(flops)
     class(family_type), intent(in) :: family
     logical, intent(in) :: dilatation      !! there is a pass for it
@@ -257,15 +259,17 @@ contains
     class default
       flops = (d + 2*(2*d - 1) + 3 + 15) + 1 + 4*d
       if (dilatation) flops = flops + 8 + (d + 2*(2*d - 1) + 3 + 15) + 4
+      if (both_ends(d)) flops = (flops + merge(d + 1, d, dilatation))/2
     end select
   end function flops_of_bond
 
   !> Bytes that a step must move between memory and processor at least, if every array is read or
   !> written once by every pass that needs it. Force pass: u, p read, force written; dilatation
   !> pass: u read, p written; motion: force, v, u read, v, u written. Where bonds can break: the
-  !> bits read by each pass, the marks written and read. Lists, by each pass: number and flag
-  !> of every bond, positions and volumes, spacings read, displacements written and read once more
-  !> where each point's stand together.
+  !> bits read by each pass, the marks written and read. Where loops add to both ends of a bond, the
+  !> sums are set to zero and read, and p is made of theta in a loop of its own. Lists, by each
+  !> pass: number and flag of every bond, positions and volumes, spacings read, displacements
+  !> written and read once more where each point's stand together.
   pure real(wp) function bytes_of_step(system) result(bytes)
     type(system_type), intent(in) :: system
     integer :: d, passes
@@ -283,6 +287,7 @@ contains
       if (allocated(family%fraction)) bytes = bytes + passes*8*real(family%n_bonds, wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
+      if (both_ends(d)) bytes = bytes + points*8*(2*d + merge(3, 0, system%model%dilatation))
     class default
       continue
     end select

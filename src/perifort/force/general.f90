@@ -1,0 +1,181 @@
+!> The general formulas of lattice families, for any strain and with every term: roots, divisions,
+!> temperature, unprojected dilatation, and the marks of strained slots.
+module pd_force_general
+  use pd_base_kinds, only: wp, i1, i8
+  use pd_family_lattice, only: weights_type, lanes
+  use pd_force_model, only: model_type
+  implicit none (type, external)
+  private
+  public :: general_dilatation, general_force, general_energy
+
+  !> Squared length, over the undeformed one, below which a bond is crushed to a point and has no
+  !> direction but that of rounding: it pulls nowhere, rather than anywhere or NaN.
+  real(wp), parameter :: crushed = 1.0e-24_wp
+
+contains
+
+  !> Add Gd s Lambda vc V of the first `n` offsets' bonds to `theta` (n_slots), of both ends if
+  !> `both`. `weight` (lanes, n) may be less than all bonds.
+  subroutine general_dilatation(model, both, n, weights, weight, first, u, theta, strained)
+    type(model_type), intent(in) :: model
+    logical, intent(in) :: both
+    integer, intent(in) :: n
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in) :: weight(:, :)
+    integer(i8), intent(in) :: first
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: theta(:)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp), dimension(lanes) :: s, lambda, r, share
+    real(wp) :: along(lanes, 3)
+    integer(i8) :: j
+    integer :: m
+
+    do m = 1, n
+      call deform(model, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, r, along)
+      share = weight(:, m)*s*lambda
+      theta(first:first + lanes - 1) = theta(first:first + lanes - 1) + share
+      j = first + weights%shift(m)
+      if (both) theta(j:j + lanes - 1) = theta(j:j + lanes - 1) + share
+      if (model%breaking) call mark(model, both, first, j, s, weight(:, m), strained)
+    end do
+  end subroutine general_dilatation
+
+  !> Add what the first `n` offsets' bonds pull to `force` (n_slots, dim), at both ends if `both`.
+  !> `stretch` (lanes, n) may be less than all bonds.
+  subroutine general_force(model, both, n, weights, stretch, first, u, p, force, strained)
+    type(model_type), intent(in) :: model
+    logical, intent(in) :: both
+    integer, intent(in) :: n
+    type(weights_type), intent(in) :: weights
+    real(wp), intent(in) :: stretch(:, :)
+    integer(i8), intent(in) :: first
+    real(wp), intent(in), contiguous :: u(:, :), p(:)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp), dimension(lanes) :: s, lambda, r, magnitude
+    real(wp) :: along(lanes, 3)
+    integer(i8) :: j
+    integer :: m, c
+
+    do m = 1, n
+      call deform(model, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, r, along)
+      magnitude = stretch(:, m)*s
+      j = first + weights%shift(m)
+      if (model%dilatation) magnitude = magnitude + (p(first:first + lanes - 1) &
+        & + p(j:j + lanes - 1))*weights%dilatation(:, m)*lambda
+      magnitude = magnitude*r
+      do c = 1, model%dim
+        along(:, c) = magnitude*along(:, c)
+        force(first:first + lanes - 1, c) = force(first:first + lanes - 1, c) + along(:, c)
+        if (both) force(j:j + lanes - 1, c) = force(j:j + lanes - 1, c) - along(:, c)
+      end do
+      if (model%breaking) call mark(model, both, first, j, s, stretch(:, m), strained)
+    end do
+  end subroutine general_force
+
+  !> Strain energy density of one block, by the general formulas.
+  subroutine general_energy(model, weights, first, u, energy)
+    type(model_type), intent(in) :: model
+    type(weights_type), intent(in) :: weights
+    integer(i8), intent(in) :: first
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    real(wp), dimension(lanes) :: s, lambda, r, theta, stretches
+    real(wp) :: along(lanes, 3)
+    integer(i8) :: j
+    integer :: m, l
+
+    theta = 0.0_wp
+    stretches = 0.0_wp
+    do m = 1, weights%n
+      call deform(model, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, r, along)
+      if (model%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
+      if (size(model%materials) > 1) then
+        ! the weights hold q_k + q_j, the energy takes q_k/2 of the slot's own material
+        j = first + weights%shift(m)
+        do l = 1, lanes
+          associate (q => model%materials(model%material(first + l - 1))%q)
+            s(l) = s(l)*sqrt(2*q/(q + model%materials(model%material(j + l - 1))%q))
+          end associate
+        end do
+      end if
+      stretches = stretches + weights%stretch(:, m)*s**2
+    end do
+    do l = 1, lanes
+      associate (mat => model%materials(model%material(first + l - 1)))
+        energy(first + l - 1) = stretches(l)/4 + mat%a*(mat%t*theta(l))**2
+      end associate
+    end do
+  end subroutine general_energy
+
+  !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda,
+  !> r = |xi|/|y| and the bond's direction over |xi|.
+  pure subroutine deform(model, first, shift, g, u, s, lambda, r, along)
+    type(model_type), intent(in) :: model
+    integer(i8), intent(in) :: first, shift
+    real(wp), intent(in) :: g(4)
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), along(lanes, 3)
+    real(wp) :: x(lanes), e(lanes), y(lanes), eta(lanes)
+    integer(i8) :: j
+    integer :: c
+
+    j = first + shift
+    x = 0.0_wp
+    e = 0.0_wp
+    y = 0.0_wp
+    do c = 1, model%dim
+      eta = u(j:j + lanes - 1, c) - u(first:first + lanes - 1, c)
+      x = x + g(c)*eta
+      e = e + eta**2
+      along(:, c) = g(c) + g(4)*eta
+      y = y + along(:, c)**2/g(4)
+    end do
+    e = 2*x + g(4)*e
+    s = e/(1 + sqrt(y))
+    r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
+    lambda = (1 + x)*r
+    if (.not. model%projected) lambda = 1.0_wp
+    if (model%thermal) then
+      s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
+    end if
+  end subroutine deform
+
+  !> Mark the slots of the bonds between the lanes at `first` and those at `j` that are at their
+  !> limit, a hair's breadth early: what breaks is decided elsewhere. Slots in no-fail zones lose no
+  !> bond.
+  pure subroutine mark(model, both, first, j, s, weight, strained)
+    type(model_type), intent(in) :: model
+    logical, intent(in) :: both
+    integer(i8), intent(in) :: first, j
+    real(wp), intent(in) :: s(lanes), weight(lanes)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp) :: limit
+    integer :: l
+
+    limit = model%least_critical*(1 - 1.0e-9_wp)
+    if (all(abs(s) <= limit)) return
+    do l = 1, lanes
+      if (weight(l) <= 0.0_wp .or. abs(s(l)) <= limit) cycle
+      call mark_slot(model, first + l - 1, s(l), strained)
+      if (both) call mark_slot(model, j + l - 1, s(l), strained)
+    end do
+  end subroutine mark
+
+  !> Mark slot `k`, one of whose bonds has the stretch `s` beyond the limit.
+  pure subroutine mark_slot(model, k, s, strained)
+    type(model_type), intent(in) :: model
+    integer(i8), intent(in) :: k
+    real(wp), intent(in) :: s
+    integer(i1), intent(inout), contiguous :: strained(:)
+
+    if (model%critical(k) < 0.0_wp) return
+    if (s < 0.0_wp) then
+      if (.not. model%compression) return
+      if (model%compressed(k) == 0_i1) return
+    end if
+    strained(k) = 1_i1
+  end subroutine mark_slot
+
+end module pd_force_general

@@ -1,0 +1,213 @@
+!> Slabs of lattices: what threads may work on at once.
+module test_family_slabs
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_kinds, only: wp, i1, i8
+  use pd_driver, only: set_up_type
+  use pd_family_lattice, only: grid_at, lanes, lattice_family_type
+  use pd_force_forces, only: dilatation_pass, force_pass
+  use pd_force_reference, only: reference_force
+  use pd_motion_system, only: system_type
+  use pd_scene_types, only: scene_type
+  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
+  use bodies, only: box_scene, expect, expect_true, ready, shake, text_of
+  use force_subjects, only: some_gradient
+  implicit none (type, external)
+  private
+  public :: collect_family_slabs
+
+  real(wp), parameter :: spacing = 1.0e-3_wp  !! [m]
+
+  !> Bodies that must be cut across each of their axes: many points along one, few along the others.
+  integer, parameter :: shapes(3, 4) = reshape([24, 24, 40, 9, 70, 5, 200, 4, 4, 65, 40, 3], [3, 4])
+
+contains
+
+  subroutine collect_family_slabs(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('slabs of one colour never add to the same slot', test_apart), &
+      & new_unittest('every block lies in one slab', test_whole), &
+      & new_unittest('loops that add to both ends give the same bits on any number of threads', &
+      & test_threads), &
+      & new_unittest('bonds on either side of the fast formula are added once', test_once)]
+  end subroutine collect_family_slabs
+
+  !> A box of `points`, ready; with `twice` a second one far away.
+  subroutine box(points, breaking, twice, set_up, error)
+    integer, intent(in) :: points(:)
+    logical, intent(in) :: breaking, twice
+    type(set_up_type), intent(out) :: set_up
+    type(error_type), allocatable, intent(inout) :: error
+    type(scene_type) :: scene
+
+    call box_scene(points, spacing, 0.3_wp, scene)
+    scene%horizon%family = 'lattice'
+    if (breaking) scene%materials(1)%critical_stretch = 0.06_wp
+    if (twice) then
+      scene%bodies = [scene%bodies(1), scene%bodies(1)]
+      scene%bodies(2)%name = 'other'
+      scene%bodies(2)%lower(3) = 2*scene%bodies(1)%upper(3) + spacing/3
+      scene%bodies(2)%upper(3) = scene%bodies(2)%lower(3) + scene%bodies(1)%upper(3)
+    end if
+    call ready(scene, set_up, error)
+  end subroutine box
+
+  !> The loops add to the slots of a block and to those one forward offset away. Every slot is noted
+  !> with the slab that adds to it.
+  subroutine test_apart(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    integer, allocatable :: owner(:)
+    integer :: shape, colour, s, b, o
+
+    do shape = 1, size(shapes, 2)
+      call box(shapes(:, shape), .false., shape == 1, set_up, error)
+      if (allocated(error)) return
+      select type (family => set_up%system%family)
+      type is (lattice_family_type)
+        do colour = 1, 2
+          associate (first => family%slabs%colour)
+            call expect_true(error, first(colour + 1) - first(colour) > 1, &
+              & 'only one slab of a colour in shape '//text_of(real(shape, wp)))
+          end associate
+          owner = [(0, s=1, family%n_slots)]
+          do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
+            do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
+              call claim(family%block(b))
+              associate (grid => family%grids(grid_at(family, family%block(b))))
+                do o = 1, grid%n
+                  ! the loops leave out offsets that none of the block's slots has
+                  if (grid%shift(o) > 0 .and. any(family%alive(family%block(b):family%block(b) &
+                    & + lanes - 1) == 1_i1 .and. family%alive(family%block(b) + grid%shift(o): &
+                    & family%block(b) + grid%shift(o) + lanes - 1) == 1_i1)) &
+                    & call claim(family%block(b) + grid%shift(o))
+                end do
+              end associate
+              if (allocated(error)) return
+            end do
+          end do
+        end do
+      class default
+        call test_failed(error, 'not a lattice')
+      end select
+    end do
+
+  contains
+
+    subroutine claim(first)
+      integer(i8), intent(in) :: first
+      if (any(owner(first:first + lanes - 1) /= 0 .and. owner(first:first + lanes - 1) /= s)) &
+        & call expect_true(error, .false., 'two slabs of one colour add to one slot')
+      owner(first:first + lanes - 1) = s
+    end subroutine claim
+  end subroutine test_apart
+
+  !> Slabs hold all blocks in ascending order within each slab, and every live slot has its block.
+  subroutine test_whole(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    integer, allocatable :: covered(:)
+    integer :: shape, s, b
+
+    do shape = 1, size(shapes, 2)
+      call box(shapes(:, shape), .false., shape == 1, set_up, error)
+      if (allocated(error)) return
+      select type (family => set_up%system%family)
+      type is (lattice_family_type)
+        associate (slabs => family%slabs)
+          covered = [(0, s=1, family%n_slots)]
+          call expect_true(error, slabs%colour(3) == size(slabs%first), 'slabs without colour')
+          call expect_true(error, slabs%first(1) == 1 .and. slabs%first(size(slabs%first)) &
+            & == size(family%block) + 1, 'blocks outside all slabs')
+          do s = 1, size(slabs%first) - 1
+            do b = slabs%first(s), slabs%first(s + 1) - 1
+              covered(family%block(b):family%block(b) + lanes - 1) = &
+                & covered(family%block(b):family%block(b) + lanes - 1) + 1
+              if (b > slabs%first(s)) call expect_true(error, &
+                & family%block(b) > family%block(b - 1), 'blocks out of order')
+            end do
+          end do
+        end associate
+        call expect_true(error, all(covered == 1 .or. (family%alive == 0_i1 .and. covered == 0)), &
+          & 'a live slot in no block, or in two')
+      end select
+    end do
+  end subroutine test_whole
+
+  !> Strains from nothing to well beyond the fast formula, so that both kinds of loops add.
+  subroutine test_threads(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: force(:, :), p(:)
+    integer(i1), allocatable :: strained(:)
+    integer :: shape, threads, before
+
+    before = omp_get_max_threads()
+    do shape = 1, size(shapes, 2)
+      call box(shapes(:, shape), .true., shape == 1, set_up, error)
+      if (allocated(error)) exit
+      associate (system => set_up%system)
+        call shake(system%body, some_gradient(0.02_wp), 0.03_wp*spacing, 7, system%state%u)
+        do threads = 1, 4
+          call omp_set_num_threads(threads)
+          call both_passes(system)
+          if (threads == 1) then
+            force = system%state%force
+            p = system%state%p
+            strained = system%strained
+            call expect_true(error, any(strained == 1_i1) .and. any(strained == 0_i1), &
+              & 'no slot, or every one, is strained')
+          end if
+          ! differences of equal bits are exactly zero
+          call expect(error, maxval(abs(system%state%force - force)), 0.0_wp, 0.0_wp, 'force')
+          call expect(error, maxval(abs(system%state%p - p)), 0.0_wp, 0.0_wp, 'dilatation')
+          call expect_true(error, all(system%strained == strained), 'marks')
+        end do
+      end associate
+    end do
+    call omp_set_num_threads(before)
+  end subroutine test_threads
+
+  !> Every bond just below or just above the strain up to which the fast formula serves, |e| = 0.02:
+  !> a bond that both loops took, or none, would change the force by the size of a bond's own force.
+  !> The tolerance is that of `test_force_contract`.
+  subroutine test_once(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: f_ref(:, :)
+    real(wp) :: gradient(3, 3), stretch
+    integer, parameter :: small(3) = [12, 10, 11]
+    integer :: i, dim
+
+    do dim = 2, 3
+      call box(small(:dim), .false., .false., set_up, error)
+      if (allocated(error)) return
+      associate (system => set_up%system)
+        do i = -3, 3
+          ! |e| is within a few units in the last place of the limit for all bonds at once
+          stretch = sqrt(1.02_wp*(1 + i*epsilon(stretch))) - 1
+          gradient = 0.0_wp
+          gradient(1, 1) = stretch
+          gradient(2, 2) = stretch
+          gradient(3, 3) = stretch
+          call shake(system%body, gradient, 0.0_wp, 7, system%state%u)
+          call both_passes(system)
+          allocate (f_ref, mold=system%state%force)
+          call reference_force(system%family, system%model, system%state%u, f_ref)
+          call expect(error, maxval(abs(system%state%force - f_ref)), 0.0_wp, &
+            & 1.0e-12_wp*maxval(abs(f_ref)), 'force')
+          deallocate (f_ref)
+        end do
+      end associate
+    end do
+  end subroutine test_once
+
+  subroutine both_passes(system)
+    type(system_type), intent(inout) :: system
+    associate (state => system%state)
+      call dilatation_pass(system%family, system%model, state%u, state%p, system%strained)
+      call force_pass(system%family, system%model, state%u, state%p, state%force, system%strained)
+    end associate
+  end subroutine both_passes
+
+end module test_family_slabs
