@@ -29,6 +29,7 @@ program main
   use test_motion_explicit, only: collect_motion_explicit
   use test_motion_relaxation, only: collect_motion_relaxation
   use test_motion_system, only: collect_motion_system
+  use test_motion_tangent, only: collect_motion_tangent
   use test_motion_time_step, only: collect_motion_time_step
   use test_output_base64, only: collect_output_base64
   use test_output_contact, only: collect_output_contact
@@ -75,6 +76,7 @@ program main
   call register('motion_explicit', collect_motion_explicit)
   call register('motion_relaxation', collect_motion_relaxation)
   call register('motion_system', collect_motion_system)
+  call register('motion_tangent', collect_motion_tangent)
   call register('motion_time_step', collect_motion_time_step)
   call register('output_base64', collect_output_base64)
   call register('output_contact', collect_output_contact)
