@@ -2,6 +2,7 @@
 module bodies
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_error, only: fault_type => error_type
+  use pd_base_numbers, only: noise
   use pd_body_body, only: body_type
   use pd_body_material, only: material_type, new_material
   use pd_driver, only: set_up_type, prepare
@@ -106,15 +107,6 @@ contains
     write (buffer, '(es24.15e3)') value
     text = trim(adjustl(buffer))
   end function text_of
-
-  !> The next number in (-1, 1) of a sequence that is the same on every machine.
-  real(wp) function noise(state)
-    integer, intent(inout) :: state
-    ! Schrage's way to keep 16807*state mod 2^31-1 within 32 bits
-    state = 16807*mod(state, 127773) - 2836*(state/127773)
-    if (state <= 0) state = state + 2147483647
-    noise = 2*real(state, wp)/2147483647.0_wp - 1
-  end function noise
 
   !> Displacements of all points: a given gradient and a random part, its components up to `size`
   !> [m].

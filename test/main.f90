@@ -28,6 +28,7 @@ program main
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_explicit, only: collect_motion_explicit
   use test_motion_relaxation, only: collect_motion_relaxation
+  use test_motion_spectrum, only: collect_motion_spectrum
   use test_motion_system, only: collect_motion_system
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_time_step, only: collect_motion_time_step
@@ -75,6 +76,7 @@ program main
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_explicit', collect_motion_explicit)
   call register('motion_relaxation', collect_motion_relaxation)
+  call register('motion_spectrum', collect_motion_spectrum)
   call register('motion_system', collect_motion_system)
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_time_step', collect_motion_time_step)

@@ -109,8 +109,8 @@ contains
               if (pass == 1) then
                 p(k) = p(k) + m%p*m%t*joined(n, model%D(k, :), model%D(j, :))*s*bonds%weight(i)
               else
-                kw(k, :) = kw(k, :) - ((p(k) + p(j))*joined(n, model%D(k, :), model%D(j, :))/length &
-                  & + 2*m%q*joined(n, model%S(k, :), model%S(j, :))*s)*n*bonds%weight(i)
+                kw(k, :) = kw(k, :) - ((p(k) + p(j))*joined(n, model%D(k, :), model%D(j, :)) &
+                  & /length + 2*m%q*joined(n, model%S(k, :), model%S(j, :))*s)*n*bonds%weight(i)
               end if
             end associate
           end do

@@ -1,5 +1,6 @@
 !> What the user typed: one command, its file or name, and options; and the texts of `--help`.
 module pd_command_line
+  use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_usage
   use pd_base_text, only: join, nearest_name, newline, to_text
   use pd_study_options, only: bench_options_type, check_options
@@ -8,8 +9,8 @@ module pd_command_line
   public :: command_line_type, parse_command_line, read_command_line, help_text, command_names
 
   integer, parameter :: word_length = 16
-  character(word_length), parameter :: command_names(7) = [character(word_length) :: &
-    & 'run', 'check', 'template', 'reference', 'bench', 'version', 'help']
+  character(word_length), parameter :: command_names(8) = [character(word_length) :: &
+    & 'run', 'check', 'limits', 'template', 'reference', 'bench', 'version', 'help']
   character(word_length), parameter :: option_names(13) = [character(word_length) :: &
     & '--output', '--threads', '--overwrite', '--quiet', '--points', '--dimension', '--model', &
     & '--family', '--breaking', '--surface', '--seconds', '--csv', '--help']
@@ -23,6 +24,7 @@ module pd_command_line
     logical :: overwrite = .false.                 !! `--overwrite`
     logical :: quiet = .false.                     !! `--quiet`
     type(bench_options_type) :: bench              !! the options of `bench`
+    real(wp) :: seconds = 60.0_wp                  !! `--seconds` of `limits`
     logical :: help = .false.                      !! `--help`: only the text is wanted
     character(:), allocatable :: text              !! the command line as it was typed
   end type command_line_type
@@ -163,13 +165,16 @@ contains
       end if
     end do
     select case (line%command)
-    case ('run', 'check')
+    case ('run', 'check', 'limits')
       if (len(line%argument) == 0) then
         call usage(error, line, "'"//line%command//"' needs the scene file")
       else if (allocated(line%bench%threads)) then
         if (size(line%bench%threads) > 1) call usage(error, line, "'"//line%command// &
           & "' takes one number of '--threads', found "//to_text(size(line%bench%threads)))
       end if
+      if (allocated(error)) return
+      if (.not. (line%seconds >= 1.0_wp .and. line%seconds <= 86400.0_wp)) call usage(error, line, &
+        & "'--seconds' must be between 1 and 86400, found "//to_text(line%seconds))
     case ('bench', 'version')
       if (len(line%argument) > 0) call usage(error, line, "'"//line%command// &
         & "' takes no argument, found '"//line%argument//"'")
@@ -241,6 +246,7 @@ contains
       status = 1
       if (len(value) > 0 .and. verify(value, '0123456789.') == 0) &
         & read (value, *, iostat=status) line%bench%seconds
+      line%seconds = line%bench%seconds
       if (status /= 0) call usage(error, line, "'--seconds' needs a number, as in "// &
         & "--seconds 0.5, found '"//value//"'")
     case ('--csv')
@@ -308,9 +314,11 @@ contains
     case ('--help')
       belongs = .true.
     case ('--threads')
-      belongs = command == 'run' .or. command == 'check' .or. command == 'bench'
-    case ('--points', '--dimension', '--model', '--family', '--breaking', '--surface', &
-      & '--seconds', '--csv')
+      belongs = command == 'run' .or. command == 'check' .or. command == 'limits' .or. &
+        & command == 'bench'
+    case ('--seconds')
+      belongs = command == 'limits' .or. command == 'bench'
+    case ('--points', '--dimension', '--model', '--family', '--breaking', '--surface', '--csv')
       belongs = command == 'bench'
     case default
       belongs = command == 'run'
@@ -372,6 +380,17 @@ contains
         & 'run would take.', &
         & '', &
         & threads], newline)
+    case ('limits')
+      text = join([character(w) :: &
+        & 'perifort limits FILE [--seconds S] [--threads N]', &
+        & '', &
+        & 'Measure how far the scene in FILE can be pushed: its largest stable time step from the', &
+        & 'largest frequency of its body, beside equation 7.25; what rounding does to a run, for', &
+        & 'displacements of any size, far from the origin, in nanometres and kilometres; and what', &
+        & 'each integrator does to the energy. No results are written.', &
+        & '', &
+        & '  --seconds S     time for all runs together (default: 60)', &
+        & threads], newline)
     case ('template')
       text = join([character(w) :: &
         & 'perifort template [NAME]', &
@@ -418,6 +437,7 @@ contains
         & '', &
         & '  perifort run FILE            compute a scene', &
         & '  perifort check FILE          check a scene and tell what it costs', &
+        & '  perifort limits FILE         measure its largest stable step, rounding, energy drift', &
         & '  perifort template [NAME]     print a commented scene to start from', &
         & '  perifort reference [GROUP]   print the groups and keys of a scene', &
         & '  perifort bench               measure the speed on this machine', &

@@ -12,6 +12,7 @@ module pd_commands
   use pd_scene_template, only: write_template
   use pd_scene_types, only: scene_type
   use pd_study_bench, only: run_bench
+  use pd_study_limits, only: run_limits
   implicit none (type, external)
   private
   public :: execute, hdf5_version
@@ -32,7 +33,7 @@ contains
     end if
 
     select case (line%command)
-    case ('run', 'check')
+    case ('run', 'check', 'limits')
       options%output_directory = line%output_directory
       options%command = line%text
       options%threads = line%threads
@@ -40,11 +41,14 @@ contains
       options%quiet = line%quiet
       call read_scene(line%argument, scene, error)
       if (allocated(error)) return
-      if (line%command == 'run') then
+      select case (line%command)
+      case ('run')
         call run_scene(scene, options, error)
-      else
+      case ('check')
         call check_scene(scene, options, error)
-      end if
+      case default
+        call run_limits(scene, options, line%seconds, error)
+      end select
     case ('template')
       call write_template(output_unit, line%argument, error)
     case ('reference')

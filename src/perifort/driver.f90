@@ -30,7 +30,7 @@ module pd_driver
   use pd_motion_plan, only: plan_type, make_plan, depth_of
   use pd_motion_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, start_system, evaluate
-  use pd_motion_time_step, only: horizon_volume
+  use pd_motion_time_step, only: evaluations, horizon_volume
   use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, &
     & planned_outputs, planned_rows
   use pd_output_results, only: refuse_existing
@@ -38,7 +38,7 @@ module pd_driver
   use pd_base_system, only: available_memory
   implicit none (type, external)
   private
-  public :: run_scene, check_scene, run_options_type, prepare, set_up_type
+  public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads
 
   !> How to run, from the command line.
   type :: run_options_type
@@ -137,16 +137,6 @@ contains
       end if
     end associate
   end subroutine check_scene
-
-  !> Force evaluations of one step.
-  pure integer function evaluations(integrator)
-    character(*), intent(in) :: integrator
-    select case (integrator)
-    case ('runge_kutta'); evaluations = 4
-    case ('adams_moulton'); evaluations = 2
-    case default; evaluations = 1
-    end select
-  end function evaluations
 
   !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a
   !> run takes at its peak, while families are built, about 400 bytes a point with a lattice; a list

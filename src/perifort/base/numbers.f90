@@ -3,7 +3,7 @@ module pd_base_numbers
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: pi, total, inner, block_length
+  public :: pi, total, inner, block_length, noise
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   !> Terms in one partial sum: the blocks are fixed, so the sum's rounding is too.
@@ -45,5 +45,15 @@ contains
     end do
     sum_of_all = sum(part)
   end function inner
+
+  !> The next number in (-1, 1) of a sequence that is the same on every machine. `state` starts it,
+  !> from 1 to 2147483646, and is changed.
+  real(wp) function noise(state)
+    integer, intent(inout) :: state
+    ! Schrage's way to keep 16807*state mod 2^31-1 within 32 bits
+    state = 16807*mod(state, 127773) - 2836*(state/127773)
+    if (state <= 0) state = state + 2147483647
+    noise = 2*real(state, wp)/2147483647.0_wp - 1
+  end function noise
 
 end module pd_base_numbers

@@ -10,8 +10,8 @@ module pd_motion_time_step
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: stiffness_bound, stable_step, printed_step, book_step, chapter_stiffness, &
-    & integrator_limit
+  public :: stiffness_bound, stable_step, printed_step, printed_stiffness, book_step, &
+    & chapter_stiffness, integrator_limit, evaluations
   public :: constant_stiffness, horizon_volume
 
 contains
@@ -109,12 +109,7 @@ contains
     integer :: k
 
     allocate (printed(body%n_slots), source=0.0_wp)
-    select type (family)
-    type is (lattice_family_type)
-      call lattice_printed_bound(family, model, printed)
-    class default
-      call printed_bound(body, family, model, printed)
-    end select
+    call printed_stiffness(body, family, model, printed)
     squared = huge(squared)
     do k = 1, body%n_slots
       ! a sum that is exactly 0 has no bonds
@@ -125,8 +120,23 @@ contains
     step = sqrt(squared)
   end subroutine printed_step
 
-  !> The sum of 7.25 as printed for every slot [N/m4], 0 without bonds. Its inner sum has the plain
-  !> volumes in the book, and is all but the same with v_c.
+  !> The sum of 7.25 as printed for every slot [N/m4], 0 without bonds: no surface factors, a with
+  !> its sign. Its inner sum has the plain volumes in the book, and is all but the same with v_c.
+  subroutine printed_stiffness(body, family, model, printed)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(inout), contiguous :: printed(:)
+
+    select type (family)
+    type is (lattice_family_type)
+      call lattice_printed_bound(family, model, printed)
+    class default
+      call printed_bound(body, family, model, printed)
+    end select
+  end subroutine printed_stiffness
+
+  !> `printed_stiffness`, bond by bond.
   subroutine printed_bound(body, family, model, printed)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
@@ -240,5 +250,15 @@ contains
     case default; limit = 2.0_wp
     end select
   end function integrator_limit
+
+  !> Force evaluations of one step of an integrator.
+  pure integer function evaluations(integrator)
+    character(*), intent(in) :: integrator
+    select case (integrator)
+    case ('runge_kutta'); evaluations = 4
+    case ('adams_moulton'); evaluations = 2
+    case default; evaluations = 1
+    end select
+  end function evaluations
 
 end module pd_motion_time_step

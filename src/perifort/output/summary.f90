@@ -44,13 +44,20 @@ contains
       text = text//line('relaxation', to_text(plan%relaxation%load_steps)// &
         & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', density matrix '// &
         & trim(scene%relaxation%density_matrix))
-      if (scene%time%steps > 0 .or. is_set(scene%time%step) .or. is_set(scene%time%duration)) &
-        & text = text//line('note', '&time steps, step and duration mean nothing here; see '// &
+      if (scene%time%steps > 0 .or. is_set(scene%time%step) .or. is_set(scene%time%duration) &
+        & .or. scene%time%limit == 'spectral') &
+        & text = text//line('note', '&time steps, step, limit and duration mean nothing here; see '// &
         & '&relaxation load_steps')
     else
       text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
         & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &
-        & ' (7.25, '//plan%integrator//')')
+        & ' ('//trim(merge('spectral', '7.25    ', plan%spectral))//', '//plan%integrator//')')
+      if (plan%spectral) text = text//line('', 'the largest frequency, measured in '// &
+        & to_text(plan%evaluations)//' evaluations, allows '// &
+        & to_text(plan%limit/plan%equation, 3)//' of 7.25 ('//with_unit(plan%equation, 's', 6)// &
+        & ')'//trim(merge(', whatever breaks', repeat(' ', 17), system%model%breaking)))
+      if (scene%time%limit == 'spectral' .and. .not. plan%spectral) text = text//line('', &
+        & '7.25, because the largest frequency allows no more here')
       text = text//line('', '7.25 as printed '//printed(plan)//', the book''s estimate '// &
         & with_unit(plan%book, 's', 6))
       if (plan%step > plan%limit) &

@@ -122,7 +122,8 @@ module pd_scene_types
     character(name_length) :: method = 'explicit'             !! 'relaxation'
     character(name_length) :: integrator = 'forward_backward'
     real(wp) :: step = unset                     !! [s], instead of safety
-    real(wp) :: safety = 0.8_wp                  !! fraction of 7.25 [-]
+    real(wp) :: safety = 0.8_wp                  !! fraction of the limit [-]
+    character(name_length) :: limit = 'equation' !! 7.25, or 'spectral'
     integer :: steps = 0
     real(wp) :: duration = unset                 !! [s], instead of steps
     character(name_length) :: breaking = 'before_forces'      !! 'after_forces'
