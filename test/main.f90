@@ -48,6 +48,7 @@ program main
   use test_scene_values, only: collect_scene_values
   use test_scene_write, only: collect_scene_write
   use test_study_bench, only: collect_study_bench
+  use test_study_limits, only: collect_study_limits
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -96,6 +97,7 @@ program main
   call register('scene_values', collect_scene_values)
   call register('scene_write', collect_scene_write)
   call register('study_bench', collect_study_bench)
+  call register('study_limits', collect_study_limits)
 
   call read_arguments()
   if (len(suite_name) > 0) then

@@ -89,8 +89,8 @@ contains
     call expect(error, stable_step_of(found), 2/sqrt(expected), 1.0e-6_wp*2/sqrt(expected), 'step')
   end subroutine test_pair
 
-  !> The largest omega of the infinite chain (doc/theory.md, 12) bounds every chain's from above, and
-  !> a chain of 2000 comes within 1e-5 of it: its wavenumbers lie pi/2000 apart, near a maximum.
+  !> The largest omega of the infinite chain (doc/theory.md, 12) bounds every chain's from above,
+  !> and a chain of 2000 comes within 1e-5 of it: its wavenumbers lie pi/2000 apart, near a maximum.
   subroutine test_dispersion(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -116,8 +116,8 @@ contains
       & 'with its residual never below the largest')
   end subroutine test_dispersion
 
-  !> 2/omega over 7.25 with surface factors, computed elsewhere with sparse matrices and ARPACK, given
-  !> to three decimals.
+  !> 2/omega over 7.25 with surface factors, computed elsewhere with sparse matrices and ARPACK,
+  !> given to three decimals.
   subroutine test_ratios(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

@@ -384,10 +384,10 @@ contains
       text = join([character(w) :: &
         & 'perifort limits FILE [--seconds S] [--threads N]', &
         & '', &
-        & 'Measure how far the scene in FILE can be pushed: its largest stable time step from the', &
-        & 'largest frequency of its body, beside equation 7.25; what rounding does to a run, for', &
-        & 'displacements of any size, far from the origin, in nanometres and kilometres; and what', &
-        & 'each integrator does to the energy. No results are written.', &
+        & 'Measure how far the scene in FILE can be pushed: its largest stable time step from', &
+        & 'the largest frequency of its body, beside equation 7.25; what rounding does to a run,', &
+        & 'for displacements of any size, far from the origin, in nanometres and kilometres; and', &
+        & 'what each integrator does to the energy. No results are written.', &
         & '', &
         & '  --seconds S     time for all runs together (default: 60)', &
         & threads], newline)
@@ -437,7 +437,7 @@ contains
         & '', &
         & '  perifort run FILE            compute a scene', &
         & '  perifort check FILE          check a scene and tell what it costs', &
-        & '  perifort limits FILE         measure its largest stable step, rounding, energy drift', &
+        & '  perifort limits FILE         measure its largest stable step, and more', &
         & '  perifort template [NAME]     print a commented scene to start from', &
         & '  perifort reference [GROUP]   print the groups and keys of a scene', &
         & '  perifort bench               measure the speed on this machine', &

@@ -1,10 +1,11 @@
 !> The largest frequency of a body as it is now, by the Lanczos method on its forces, and the stable
 !> step that follows from it (doc/theory.md, 6).
 !>
-!> K is minus the derivative of the forces, D the densities. With y = sqrt(rho V) u, D^-1 K becomes a
-!> symmetric matrix, and the plain three-term recurrence needs no more than three vectors. Rounding
-!> makes the vectors lose their orthogonality and largest values appear several times, but it does
-!> not harm the value itself nor its residual (C. C. Paige, J. Inst. Maths Applics 18 (1976) 341).
+!> K is minus the derivative of the forces, D the densities. With y = sqrt(rho V) u, D^-1 K becomes
+!> a symmetric matrix, and the plain three-term recurrence needs no more than three vectors.
+!> Rounding makes the vectors lose their orthogonality and largest values appear several times, but
+!> it does not harm the value itself nor its residual (C. C. Paige, J. Inst. Maths Applics 18 (1976)
+!> 341).
 module pd_motion_spectrum
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: inner, noise, pi
@@ -33,11 +34,11 @@ module pd_motion_spectrum
 contains
 
   !> The largest frequency of `system` about its present displacements, its constrained components
-  !> held, to `accuracy` of its square. Stops when the residual is small enough and when enough steps
-  !> were made for the gap-free bound of Kuczynski and Wozniakowski (SIAM J. Matrix Anal. Appl. 13
-  !> (1992) 1094): for a random start vector, the chance that the value found is more than eps below
-  !> the largest is at most 1.648 sqrt(n) exp(-sqrt(eps) (2 m - 1)) after m steps. The start vector is
-  !> random, yet always the same, and so is the result, on any number of threads.
+  !> held, to `accuracy` of its square. Stops when the residual is small enough and when enough
+  !> steps were made for the gap-free bound of Kuczynski and Wozniakowski (SIAM J. Matrix Anal.
+  !> Appl. 13 (1992) 1094): for a random start vector, the chance that the value found is more than
+  !> eps below the largest is at most 1.648 sqrt(n) exp(-sqrt(eps) (2 m - 1)) after m steps. The
+  !> start vector is random, yet always the same, and so is the result, on any number of threads.
   subroutine largest_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: accuracy              !! of omega^2, relative
@@ -74,10 +75,10 @@ contains
   end subroutine largest_frequency
 
   !> A bound of the largest frequency that no breaking of bonds can exceed, however many and in
-  !> whatever order. `squared` is that of the stretches alone, without dilatation, which every broken
-  !> bond lowers, times the largest beta_k = 1 + m_k sum(Gd^2/Gb vc V/|xi|)/q_k: by the inequality of
-  !> Cauchy the dilatation's energy at k is at most beta_k - 1 times that of k's stretches, whichever
-  !> of its bonds are left. A negative a lowers the energy and counts as 0.
+  !> whatever order. `squared` is that of the stretches alone, without dilatation, which every
+  !> broken bond lowers, times the largest beta_k = 1 + m_k sum(Gd^2/Gb vc V/|xi|)/q_k: by the
+  !> inequality of Cauchy the dilatation's energy at k is at most beta_k - 1 times that of k's
+  !> stretches, whichever of its bonds are left. A negative a lowers the energy and counts as 0.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: accuracy

@@ -5,8 +5,8 @@ module pd_study_drift
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text, with_unit
   use pd_motion_explicit, only: run_explicit
-  use pd_motion_system, only: system_type, evaluate
-  use pd_motion_time_step, only: integrator_limit, evaluations
+  use pd_motion_system, only: system_type
+  use pd_motion_time_step, only: integrator_limit
   use pd_study_vibration, only: energy_watch_type, free_body, random_shape, smoothed
   implicit none (type, external)
   private
@@ -40,18 +40,18 @@ contains
     call random_shape(body, rough)
     smooth = rough
     call smoothed(body, step, passes, smooth)
-    each = seconds_of_evaluation(body)
-    write (unit, '(/, a, 3(/, a))') 'Energy of a free vibration: the part gained (+) or lost (-) '// &
-      & 'in a million steps, extrapolated', 'from the steps made, or the steps to half of it. '// &
-      & 'smooth: high frequencies are taken out of', 'the start; rough: all frequencies alike', &
+    write (unit, '(/, a, 3(/, a))') 'Energy of a free vibration: the part gained (+) or lost '// &
+      & '(-) in a million steps, extrapolated', 'from the steps made, or the steps to half '// &
+      & 'of it. smooth: high frequencies are taken', 'out of the start; rough: all alike', &
       & '  integrator        part of its limit  steps made  smooth'// &
       & repeat(' ', 18)//'rough'
     do i = 1, size(integrators)
       do p = 1, size(parts)
         dt = parts(p)*step*integrator_limit(integrators(i))/2
-        ! what is left of the time, for this run's two starts and those to come
+        if (p == 1) each = seconds_of_step(body, integrators(i), dt, smooth)
+        ! its share of the time that is left, for the two starts of this and of those to come
         every = int(min(real(most_steps, wp), (seconds - (wall_time() - begin)) &
-          & /(2*(12 - 3*(i - 1) - (p - 1))*each*evaluations(integrators(i))))/looks)
+          & /(2*(12 - 3*(i - 1) - (p - 1))*each))/looks)
         every = max(1, every)
         call measure(body, integrators(i), dt, every, smooth, columns(1))
         call measure(body, integrators(i), dt, every, rough, columns(2))
@@ -59,24 +59,32 @@ contains
         flush (unit)
       end do
     end do
-    write (unit, '(a)') '  (velocity_verlet is the scheme of forward_backward; the smooth start '// &
-      & 'is what most runs are like)'
+    write (unit, '(a)') '  velocity_verlet is the scheme of forward_backward; most runs are '// &
+      & 'nearer to the smooth start'
   end subroutine study_drift
 
-  !> Wall time of one evaluation of the forces [s].
-  real(wp) function seconds_of_evaluation(body) result(seconds)
+  !> Wall time of a step [s].
+  real(wp) function seconds_of_step(body, integrator, dt, shape) result(seconds)
     type(system_type), intent(inout) :: body
+    character(*), intent(in) :: integrator
+    real(wp), intent(in) :: dt
+    real(wp), intent(in) :: shape(:, :)
+    type(energy_watch_type) :: nothing
+    type(error_type), allocatable :: fault
     real(wp) :: begin
-    integer :: i
+    integer :: steps
 
-    call evaluate(body, 0.0_wp, breaking=.false.)
-    begin = wall_time()
-    do i = 1, 1000
-      call evaluate(body, 0.0_wp, breaking=.false.)
-      seconds = 1.3_wp*(wall_time() - begin)/i  ! motion and looks come on top
-      if (seconds*i > 0.1_wp) exit
+    body%state%u = strain*shape
+    body%state%v = 0.0_wp
+    steps = 10
+    do
+      begin = wall_time()
+      call run_explicit(body, trim(integrator), dt, steps, nothing, fault)
+      seconds = (wall_time() - begin)/steps
+      if (seconds*steps > 0.02_wp .or. allocated(fault)) exit
+      steps = 2*steps
     end do
-  end function seconds_of_evaluation
+  end function seconds_of_step
 
   !> One run from `shape`, and in words what came of the energy.
   subroutine measure(body, integrator, dt, every, shape, result)
@@ -107,9 +115,9 @@ contains
     else if (abs(drift) <= 0.5e-6_wp) then
       result = trim(merge('+', ' ', drift > 0.0_wp))//to_text(1.0e6_wp*drift, 2)
     else if (drift < 0.0_wp) then
-      result = 'half lost in '//with_unit(0.5_wp/abs(drift), '', 2)
+      result = 'half lost in '//trim(with_unit(0.5_wp/abs(drift), '', 2))
     else
-      result = 'half as much more in '//with_unit(0.5_wp/abs(drift), '', 2)
+      result = 'half as much more in '//trim(with_unit(0.5_wp/abs(drift), '', 2))
     end if
   end subroutine measure
 

@@ -43,8 +43,8 @@ module pd_study_limits
 contains
 
   !> Measure a scene and print what was found, each part as soon as it is known, to `unit` (default:
-  !> standard output). Everything but the building and the measurement of the largest frequency takes
-  !> about `seconds`.
+  !> standard output). Everything but the building and the measurement of the largest frequency
+  !> takes about `seconds`.
   subroutine run_limits(scene, options, seconds, error, unit)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
@@ -115,8 +115,8 @@ contains
     limits%lasting = max(limits%equation, stable_step_of(lasting))
   end subroutine measure_limits
 
-  !> The least and the largest sqrt(2 rho/sum) over the points, and the slot of the least; a negative
-  !> sum has no step, 0 is given.
+  !> The least and the largest sqrt(2 rho/sum) over the points, and the slot of the least; a
+  !> negative sum has no step, 0 is given.
   subroutine least_step(system, sums, least, slot, most)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: sums(:)
@@ -180,8 +180,8 @@ contains
     text = 'point '//to_text(int(system%body%point(slot)))//' at ('//place(system, slot)//') m'
   end function where_is
 
-  !> Run just below and just above the limit, print what becomes of the disturbance, and fail if that
-  !> contradicts the limit. The two runs share about `seconds`.
+  !> Run just below and just above the limit, print what becomes of the disturbance, and fail if
+  !> that contradicts the limit. The two runs share about `seconds`.
   subroutine confirm(system, limit, seconds, unit, error)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: limit, seconds

@@ -14,8 +14,9 @@ module pd_study_rounding
   public :: study_rounding, digits_of
 
   real(wp), parameter :: without_curvature = 1.0e-20_wp  !! strain at which all is linear
+  real(wp), parameter :: tiny_strain = 1.0e-10_wp        !! up to which second order is no matter
   real(wp), parameter :: slope_strain = 1.0e-5_wp        !! at which the geometry's share is taken
-  real(wp), parameter :: usual = 1.0e-6_wp               !! strain of the moved and resized bodies
+  real(wp), parameter :: usual = 1.0e-6_wp               !! that of the moved and resized bodies
   real(wp), parameter :: strains(8) = [1.0e-12_wp, 1.0e-10_wp, 1.0e-8_wp, 1.0e-6_wp, 1.0e-4_wp, &
     & 1.0e-3_wp, 1.0e-2_wp, 1.0e-1_wp]
   integer, parameter :: most_steps = 200, least_steps = 20
@@ -33,6 +34,7 @@ contains
     real(wp), allocatable :: shape(:, :), start(:, :), linear(:, :), slope(:, :)
     real(wp), allocatable :: reference(:, :), answer(:, :)
     real(wp) :: size_of_body, begin, least
+    type(error_type), allocatable :: fault
     integer :: steps, i
 
     call free_body(system, 0.0_wp, 1.0_wp, body, error)
@@ -54,18 +56,21 @@ contains
     call vibrate(body, -start, slope_strain, step, steps, answer, error)
     if (allocated(error)) return
     slope = (slope + answer)/(2*slope_strain)
-    write (unit, '(/, a, 3(/, a))') 'Rounding: displacements of the same free vibration, smooth at '// &
-      & 'the start, after '//to_text(steps)//' steps, over the', 'displacements of the start, '// &
-      & 'beside those at a strain of 1e-20; the geometry''s share is that of first', &
-      & 'order in the strain', &
+    write (unit, '(/, a, 3(/, a))') 'Rounding: a free vibration, smooth at the start, after '// &
+      & to_text(steps)//' steps: displacements over those of the', 'start, beside a run with '// &
+      & 'strains of 1e-20. The geometry''s share is that of first order in the', 'strain', &
       & '  largest strain  apart      without the geometry''s share  digits'
     least = 16.0_wp
     do i = 1, size(strains)
-      call vibrate(body, start, strains(i), step, steps, answer, error)
-      if (allocated(error)) return
+      call vibrate(body, start, strains(i), step, steps, answer, fault)
+      if (allocated(fault)) then
+        write (unit, '(a)') '  '//to_text(strains(i), 1)//': '//fault%message
+        exit
+      end if
       write (unit, '(a)') row(to_text(strains(i), 1), answer, linear, strains(i)*slope)
       flush (unit)
-      if (strains(i) < usual) least = min(least, digits_of(apart(answer - strains(i)*slope, linear)))
+      if (strains(i) <= tiny_strain) &
+        & least = min(least, digits_of(apart(answer - strains(i)*slope, linear)))
       if (strains(i) <= usual) call move_alloc(answer, reference)
     end do
     associate (x => system%body%x(system%body%slot, :))
@@ -75,8 +80,8 @@ contains
     call twin('in nanometres', 0.0_wp, 1.0e-9_wp)
     call twin('in kilometres', 0.0_wp, 1.0e3_wp)
     if (allocated(error)) return
-    write (unit, '(a)') '  The bodies are moved and resized at a strain of '//to_text(usual, 1)// &
-      & '. All these and the strains below it agree to '//to_text(least, 3)//' digits'
+    write (unit, '(a)') '  (moved and resized at a strain of '//to_text(usual, 1)//') These and '// &
+      & 'strains up to '//to_text(tiny_strain, 1)//' agree to '//to_text(least, 3)//' digits'
 
   contains
 

@@ -24,8 +24,9 @@ module pd_study_vibration
   public :: free_body, random_shape, smoothed, in_points, put_points, energy_watch_type
 
   !> Keeps the total energy of a run. With velocities at half steps the energy of an instant swings
-  !> about a constant by as much as (omega dt)^2; with `half_steps` that constant is taken, the energy
-  !> less dt^2/8 of the sum of rho V a^2, which the scheme keeps to rounding if all is linear.
+  !> about a constant by as much as (omega dt)^2; with `half_steps` that constant is taken, the
+  !> energy less dt^2/8 of the sum of rho V a^2, which the scheme keeps to rounding if all is
+  !> linear.
   type, extends(observer_type) :: energy_watch_type
     integer :: every = 0                     !! steps between looks, 0 for none
     logical :: half_steps = .false.
@@ -38,8 +39,8 @@ module pd_study_vibration
 
 contains
 
-  !> The body of `system`, moved by `shift` [m] along each direction after it was made `factor` times
-  !> as large (thickness and cross section stay), at rest and undeformed.
+  !> The body of `system`, moved by `shift` [m] along each direction after it was made `factor`
+  !> times as large (thickness and cross section stay), at rest and undeformed.
   subroutine free_body(system, shift, factor, twin, error)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: shift
@@ -179,7 +180,7 @@ contains
         if (system%held(system%body%slot(i), c) == 1_i1) shape(system%body%slot(i), c) = 0.0_wp
       end do
     end do
-    shape = shape/largest_stretch(system, shape)
+    shape = shape/largest_gradient(system, shape)
   end subroutine random_shape
 
   !> What remains of `shape` when the high frequencies are taken out of it: each pass multiplies the
@@ -202,11 +203,12 @@ contains
         end do
       end do
     end do
-    shape = shape/largest_stretch(system, shape)
+    shape = shape/largest_gradient(system, shape)
   end subroutine smoothed
 
-  !> The largest stretch of a bond, linearised; 1 if there is none.
-  real(wp) function largest_stretch(system, u) result(largest)
+  !> The largest displacement of a bond's end against the other over its length, in any direction,
+  !> so that it counts where a motion stretches nothing (a chain in space), too; 1 if there is none.
+  real(wp) function largest_gradient(system, u) result(largest)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: u(:, :)
     type(bonds_type) :: bonds
@@ -220,13 +222,13 @@ contains
       if (system%body%point(k) == 0) cycle
       call system%family%bonds_of(k, bonds)
       do i = 1, bonds%n
-        if (bonds%intact(i)) largest = max(largest, abs(dot_product(bonds%xi(i, :), &
-          & u(bonds%j(i), :) - u(k, :)))/bonds%length(i)**2)
+        if (bonds%intact(i)) largest = max(largest, norm2(u(bonds%j(i), :) - u(k, :)) &
+          & /bonds%length(i))
       end do
     end do
     !$omp end parallel
     if (.not. largest > 0.0_wp) largest = 1.0_wp
-  end function largest_stretch
+  end function largest_gradient
 
   !> Values of slots in the order of the points.
   subroutine in_points(body, values, ordered)
