@@ -18,6 +18,7 @@ contains
       & new_unittest('options may stand before the file and take =', test_order), &
       & new_unittest('defaults', test_defaults), &
       & new_unittest('bench with all its options', test_bench), &
+      & new_unittest('limits with its options', test_limits), &
       & new_unittest('names after -- may begin with a dash', test_dashes), &
       & new_unittest('help is there for every command', test_help), &
       & new_unittest('--help excuses what is missing', test_help_excuses), &
@@ -113,6 +114,29 @@ contains
     if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--csv', 'b'], "no option of 'run'")
   end subroutine test_bench
+
+  !> `limits` takes a scene and a time for its runs, a minute if none is given.
+  subroutine test_limits(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'limits', 'a.nml'], line, fault)
+    call check(error, .not. allocated(fault) .and. abs(line%seconds - 60.0d0) <= 0.0d0, 'default')
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'limits', 'a.nml', '--seconds', '2.5', &
+      & '--threads=2'], line, fault)
+    call check(error, .not. allocated(fault) .and. abs(line%seconds - 2.5d0) <= 0.0d0 .and. &
+      & line%threads == 2, 'options')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'limits'], 'needs the scene file')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'limits', 'a', '--seconds', '0'], 'between 1 and 86400')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--seconds', '9'], "no option of 'run'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'limits', 'a', '--overwrite'], "no option of 'limits'")
+  end subroutine test_limits
 
   subroutine test_dashes(error)
     type(error_type), allocatable, intent(out) :: error

@@ -13,8 +13,7 @@ module pd_motion_plan
   private
   public :: plan_type, make_plan, depth_of
 
-  !> Of the square of the largest frequency: half of it is lost of the step, and 1 % of the chance
-  !> of a surprise is less than the default safety covers twenty times over.
+  !> Of the square of the largest frequency; the step is at most half of it less than the largest.
   real(wp), parameter :: accuracy = 0.01_wp
   real(wp), parameter :: default_safety = 5.0_wp  !! of the masses that are not stable by themselves
 

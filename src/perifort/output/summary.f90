@@ -46,8 +46,8 @@ contains
         & trim(scene%relaxation%density_matrix))
       if (scene%time%steps > 0 .or. is_set(scene%time%step) .or. is_set(scene%time%duration) &
         & .or. scene%time%limit == 'spectral') &
-        & text = text//line('note', '&time steps, step, limit and duration mean nothing here; see '// &
-        & '&relaxation load_steps')
+        & text = text//line('note', '&time steps, step, limit and duration mean nothing here; '// &
+        & 'see &relaxation load_steps')
     else
       text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
         & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &

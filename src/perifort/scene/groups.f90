@@ -362,8 +362,8 @@ contains
     call keys%key('step', group%step, 's', 'time step, instead of safety', above=0.0_wp)
     call keys%key('safety', group%safety, '-', 'the time step as a fraction of the '// &
       & "integrator's limit", above=0.0_wp, hidden=is_set(group%step))
-    call keys%key('limit', group%limit, "explicit: the integrator's limit from equation 7.25, or "// &
-      & 'from the largest frequency of the body, which is measured at the start', &
+    call keys%key('limit', group%limit, "explicit: the integrator's limit from equation 7.25, "// &
+      & 'or from the largest frequency of the body, which is measured at the start', &
       & allowed=[character(8) :: 'equation', 'spectral'])
     call keys%key('steps', group%steps, '', 'number of steps', at_least=1, &
       & default='explicit: steps or duration is required', hidden=group%steps == 0)

@@ -93,7 +93,7 @@ contains
     real(wp), intent(in) :: dt
     integer, intent(in) :: every
     real(wp), intent(in) :: shape(:, :)
-    character(*), intent(out) :: result
+    character(24), intent(out) :: result
     type(energy_watch_type) :: watch
     type(error_type), allocatable :: fault
     real(wp) :: drift

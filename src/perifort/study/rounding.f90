@@ -80,8 +80,8 @@ contains
     call twin('in nanometres', 0.0_wp, 1.0e-9_wp)
     call twin('in kilometres', 0.0_wp, 1.0e3_wp)
     if (allocated(error)) return
-    write (unit, '(a)') '  (moved and resized at a strain of '//to_text(usual, 1)//') These and '// &
-      & 'strains up to '//to_text(tiny_strain, 1)//' agree to '//to_text(least, 3)//' digits'
+    write (unit, '(a)') '  (moved and resized at a strain of '//to_text(usual, 1)//') These '// &
+      & 'and strains up to '//to_text(tiny_strain, 1)//' agree to '//to_text(least, 3)//' digits'
 
   contains
 
