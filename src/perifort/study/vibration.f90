@@ -189,7 +189,7 @@ contains
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: step
     integer, intent(in) :: passes
-    real(wp), intent(inout) :: shape(:, :)
+    real(wp), intent(inout), contiguous :: shape(:, :)
     real(wp), allocatable :: kw(:, :), undeformed(:, :)
     integer :: i, k, c
 
