@@ -74,8 +74,8 @@ contains
       if (scene%time%method == 'relaxation') write (out, '(a)') '  The scene relaxes to rest: '// &
         & 'these are the limits of explicit steps of its body, with the', &
         & '  densities given in &material, 1 kg/m3 where none is'
-      write (out, '(a)') '  measuring the largest frequency, in a few hundred evaluations of the '// &
-        & 'forces ...'
+      write (out, '(a)') '  measuring the largest frequency, in a few hundred evaluations of '// &
+        & 'the forces ...'
       flush (out)
       call measure_limits(system, limits)
       if (.not. limits%spectral < huge(1.0_wp)) then
