@@ -108,6 +108,7 @@ contains
     real(wp) :: safety
     integer :: c
 
+    relaxation%conjugate_gradient = scene%relaxation%solver == 'conjugate_gradient'
     relaxation%load_steps = scene%relaxation%load_steps
     relaxation%maximum_iterations = scene%relaxation%maximum_iterations
     relaxation%tolerance = scene%relaxation%tolerance

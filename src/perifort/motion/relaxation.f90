@@ -5,7 +5,9 @@ module pd_motion_relaxation
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_numbers, only: block_length
   use pd_base_text, only: to_text
+  use pd_motion_conjugate_gradient, only: relax_by_conjugate_gradient
   use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_residual, only: relaxation_type, squared_force, fail_unconverged
   use pd_motion_rigid, only: rigid_type, find_free_motions, check_balance, remove_free_motions
   use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads, faulty_slot, &
     & place
@@ -14,14 +16,6 @@ module pd_motion_relaxation
   public :: relaxation_type, run_relaxation
 
   real(wp), parameter :: largest_damping = 1.9_wp  !! c dt must stay below 2
-
-  !> How to relax.
-  type :: relaxation_type
-    integer :: load_steps = 1
-    integer :: maximum_iterations = 100000    !! of each relaxation
-    real(wp) :: tolerance = 1.0e-6_wp         !! of residual force and displacement change [-]
-    real(wp), allocatable :: mass(:, :)       !! lambda for a step of 1 (n_slots, dim) [N/m4]
-  end type relaxation_type
 
   !> Sums over the free components, one pass for all.
   type :: sums_type
@@ -42,8 +36,10 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(instant_type) :: instant
     type(rigid_type) :: rigid
+    real(wp), allocatable :: before(:, :), trend(:, :)
     integer(i8) :: number
     integer :: i
+    logical :: dynamic
 
     instant%dt = 1.0_wp
     call find_free_motions(system, rigid)
@@ -57,12 +53,22 @@ contains
     instant%settled = .true.
     call observer%observe(system, instant, error)
     if (allocated(error)) return
+    allocate (trend(0, system%body%dim))
     do i = 1, relaxation%load_steps
+      before = system%state%u
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
       do
-        call relax(system, relaxation, instant, observer, error)
+        dynamic = .not. relaxation%conjugate_gradient
+        if (relaxation%conjugate_gradient) then
+          call relax_by_conjugate_gradient(system, relaxation, rigid, trend, instant, observer, &
+            & dynamic, error)
+          if (allocated(error)) return
+          instant%gave_way = dynamic
+        end if
+        if (dynamic) call relax(system, relaxation, instant, observer, error)
         if (allocated(error)) return
+        trend = trend(:0, :)
         ! the forces that did the work are those before the bonds break
         call account(system, instant%time, at_rest=.true.)
         call break_now(system, number)
@@ -70,6 +76,7 @@ contains
       end do
       call remove_free_motions(system, rigid, system%state%u)
       call evaluate(system, instant%time, breaking=.false.)
+      trend = system%state%u - before
       system%state%v = 0.0_wp
       call account(system, instant%time, at_rest=.true.)
       instant%settled = .true.
@@ -130,12 +137,8 @@ contains
         & damping = min(largest_damping, 2*sqrt(sums%stiffness/sums%displacement))
       call accelerate(rate, a, damping)                            ! 7.29a
     end do
-    call fail(error, 'not converged: after '//to_text(relaxation%maximum_iterations)// &
-      & ' iterations of load step '//to_text(instant%load_step)//' the residual force is '// &
-      & to_text(instant%residual)//' and the change of displacement '// &
-      & to_text(sqrt(sums%change/max(tiny(1.0_wp), sums%displacement)))//' (tolerance '// &
-      & to_text(relaxation%tolerance)// &
-      & '). Raise maximum_iterations or tolerance, or use more load steps', status_no_answer)
+    call fail_unconverged(relaxation, instant%load_step, instant%residual, &
+      & sqrt(sums%change/max(tiny(1.0_wp), sums%displacement)), error)
   end subroutine relax
 
   !> a = F/lambda of the free components, 0 elsewhere. `reference`, if it is 0, becomes the square
@@ -167,17 +170,6 @@ contains
       end do
     end do
   end subroutine fictitious_acceleration
-
-  !> (V F).(V F) over the free components.
-  pure real(wp) function squared_force(system, density) result(squared)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: density(:, :)
-    integer :: c
-    squared = 0.0_wp
-    do c = 1, size(density, 2)
-      squared = squared + sum((density(:, c)*system%body%volume)**2, mask=system%held(:, c) == 0_i1)
-    end do
-  end function squared_force
 
   !> u = u + rate (a step of 1).
   subroutine move(system, rate)

@@ -6,7 +6,7 @@ module pd_motion_tangent
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
-  public :: apply_tangent
+  public :: apply_tangent, forces_at
 
   !> Displacement over the spacing at which an undeformed body is probed. The loops form stretches
   !> from displacements alone, so that they are as accurate here as anywhere, and what is not linear

@@ -379,6 +379,8 @@ contains
     type(keys_type), intent(inout) :: keys
     type(relaxation_group), intent(inout) :: group
 
+    call keys%key('solver', group%solver, 'the way to rest', &
+      & allowed=[character(18) :: 'dynamic_relaxation', 'conjugate_gradient'])
     call keys%key('density_matrix', group%density_matrix, 'fictitious mass; chapter = 7.32', &
       & allowed=[character(15) :: 'frame_invariant', 'chapter', 'constant'])
     call keys%key('safety', group%safety, '-', 'factor on the fictitious mass', above=0.0_wp, &
