@@ -26,6 +26,7 @@ program main
   use test_force_breaking, only: collect_force_breaking
   use test_force_contract, only: collect_force_contract
   use test_motion_conditions, only: collect_motion_conditions
+  use test_motion_conjugate_gradient, only: collect_motion_conjugate_gradient
   use test_motion_explicit, only: collect_motion_explicit
   use test_motion_relaxation, only: collect_motion_relaxation
   use test_motion_spectrum, only: collect_motion_spectrum
@@ -75,6 +76,7 @@ program main
   call register('force_breaking', collect_force_breaking)
   call register('force_contract', collect_force_contract)
   call register('motion_conditions', collect_motion_conditions)
+  call register('motion_conjugate_gradient', collect_motion_conjugate_gradient)
   call register('motion_explicit', collect_motion_explicit)
   call register('motion_relaxation', collect_motion_relaxation)
   call register('motion_spectrum', collect_motion_spectrum)

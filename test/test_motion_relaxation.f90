@@ -93,6 +93,7 @@ contains
     scene%loads(1)%side = 'x_max'
     scene%loads(1)%pressure = pressure
     scene%time%method = 'relaxation'
+    scene%relaxation%solver = 'dynamic_relaxation'
     scene%relaxation%tolerance = 1.0e-9_wp
   end subroutine pull
 

@@ -29,11 +29,15 @@ module pd_motion_conjugate_gradient
   !> step.
   real(wp), parameter :: useful_solve = 0.9_wp
   integer, parameter :: most_halvings = 6
+  !> Where points turn about stiff neighbours, the way to rest goes over a hill: so many solves may
+  !> leave a residual up to so many times larger before they have to be taken back.
+  integer, parameter :: most_ahead = 3
+  real(wp), parameter :: farthest = 1.0e5_wp
   !> So many shortened steps that leave more than this of the residual are enough.
   integer, parameter :: most_slow = 3
   real(wp), parameter :: slow_solve = 0.5_wp
   !> A solve that makes the residual this many times larger meets points without stiffness.
-  real(wp), parameter :: diverged = 100.0_wp
+  real(wp), parameter :: diverged = 1.0e6_wp
 
   !> How a solve ended.
   integer, parameter :: at_rest = 1        !! converged
@@ -65,21 +69,24 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(krylov_type) :: krylov
     type(progress_type) :: progress
-    real(wp), allocatable :: start(:, :), loads(:, :)
-    real(wp) :: before
-    integer :: ended, slow
-    logical :: fresh, deformed
+    real(wp), allocatable :: best(:, :), loads(:, :)
+    real(wp) :: before, least
+    integer :: ended, ahead, slow
+    logical :: fresh, deformed, strict
 
     gave_way = .false.
     instant%settled = .false.
-    allocate (start, source=system%state%u)
+    allocate (best, source=system%state%u)
     call new_krylov(system, relaxation%mass, krylov)
-    allocate (loads, source=0.0_wp*start)
+    allocate (loads, source=0.0_wp*best)
     call add_loads(system, instant%time, 1.0_wp, .false., loads)
     progress%reference = squared_force(system, loads)
     call begin(system, instant%time, trend, .false., krylov, progress)
     fresh = .true.
+    least = progress%sums%residual
+    ahead = 0
     slow = 0
+    strict = .false.
     do
       before = progress%sums%residual
       call solve(system, relaxation, rigid, krylov, progress, instant, observer, ended, error)
@@ -90,27 +97,37 @@ contains
           & sqrt(progress%sums%change/max(tiny(1.0_wp), progress%sums%displacement)), error)
         return
       end if
-      ! what isn't finite fails this comparison, too
-      if (progress%sums%residual < useful_solve**2*before) then
+      ! what isn't finite fails these comparisons, too
+      deformed = .true.
+      if (progress%sums%residual < useful_solve**2*least) then
         deformed = krylov%deformed .or. ended == no_stiffness .or. &
           & progress%sums%residual > good_solve**2*before
-      else if (krylov%deformed) then
+        ahead = 0
+        strict = .false.
+      else if (.not. (strict .or. (krylov%deformed .and. ended == no_stiffness)) .and. &
+        & ahead < most_ahead .and. progress%sums%residual <= farthest**2*least) then
+        ahead = ahead + 1
+      else if (ahead > 0 .or. .not. krylov%deformed) then
+        strict = .true.
+        ahead = 0
+        system%state%u = best
+        if (fresh) then
+          call begin(system, instant%time, trend, .true., krylov, progress)
+          cycle
+        end if
+        call look(system, instant%time, krylov, progress)
+      else
         call shorten(system, instant%time, krylov, progress, gave_way)
-        if (progress%sums%residual > slow_solve**2*before) slow = slow + 1
+        if (progress%sums%residual > slow_solve**2*least) slow = slow + 1
         gave_way = gave_way .or. slow == most_slow
         if (gave_way) return
-        deformed = .true.
-      else if (fresh) then
-        system%state%u = start
-        call begin(system, instant%time, trend, .true., krylov, progress)
-        cycle
-      else
-        system%state%u = krylov%origin
-        call look(system, instant%time, krylov, progress)
-        deformed = .true.
+        strict = .false.
       end if
-      progress%reference = max(progress%reference, progress%sums%support)
       call linearise(system, deformed, krylov)
+      if (ahead > 0) cycle
+      best = system%state%u
+      least = progress%sums%residual
+      progress%reference = max(progress%reference, progress%sums%support)
       fresh = .false.
     end do
   end subroutine relax_by_conjugate_gradient
@@ -140,6 +157,7 @@ contains
       call go_along(system, 1/krylov%scale, krylov, progress%sums)
       ! to the last digit
       where (system%held == 1_i1) system%state%u = imposed
+      progress%reference = max(progress%reference, progress%sums%support)
     end if
     if (size(trend) == 0) return
     call take_direction(system, merge(trend, 0.0_wp, krylov%inverse > 0.0_wp), krylov)

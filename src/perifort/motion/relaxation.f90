@@ -67,6 +67,7 @@ contains
           instant%gave_way = dynamic
         end if
         if (dynamic) call relax(system, relaxation, instant, observer, error)
+        instant%gave_way = .false.
         if (allocated(error)) return
         trend = trend(:0, :)
         ! the forces that did the work are those before the bonds break

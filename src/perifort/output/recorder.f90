@@ -52,6 +52,8 @@ module pd_output_recorder
     integer :: steps_done = 0
     real(wp) :: time = 0.0_wp
     logical :: touched = .false.             !! contact has been reported
+    integer :: gave_way = 0                  !! load steps left to dynamic relaxation
+    integer :: gave_way_at = 0               !! the last of them
   contains
     procedure :: observe
   end type recorder_type
@@ -176,6 +178,7 @@ contains
         call observer%progress%update(int(instant%step, i8), instant%time, system%broken)
       end if
     end associate
+    if (instant%gave_way) call note_giving_way(observer, instant)
     stopping = interrupted() .and. .not. instant%last
     row = row .or. stopping
     output = output .or. stopping
@@ -198,6 +201,22 @@ contains
     if (stopping) call fail(error, 'interrupted at step '//to_text(instant%step)//', t = '// &
       & to_text(instant%time)//': this state is the last output', status_interrupted)
   end subroutine observe
+
+  !> Count the load steps that the conjugate gradient leaves to dynamic relaxation, and say so at
+  !> the first.
+  subroutine note_giving_way(recorder, instant)
+    class(recorder_type), intent(inout) :: recorder
+    type(instant_type), intent(in) :: instant
+
+    if (recorder%gave_way_at == instant%load_step) return
+    recorder%gave_way_at = instant%load_step
+    recorder%gave_way = recorder%gave_way + 1
+    if (recorder%gave_way > 1) return
+    call recorder%progress%finish()
+    write (error_unit, '(a)') 'note: in load step '//to_text(instant%load_step)// &
+      & ' the conjugate gradient finds no rest (iteration '//to_text(instant%step)// &
+      & '): dynamic relaxation goes on from there'
+  end subroutine note_giving_way
 
   !> What the progress line adds in relaxation.
   pure function relaxation_note(instant) result(note)

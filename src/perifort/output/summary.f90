@@ -42,8 +42,8 @@ contains
     text = text//line('threads', to_text(threads))
     if (plan%relaxes) then
       text = text//line('relaxation', to_text(plan%relaxation%load_steps)// &
-        & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', density matrix '// &
-        & trim(scene%relaxation%density_matrix))
+        & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', '// &
+        & solver_of(scene))
       if (scene%time%steps > 0 .or. is_set(scene%time%step) .or. is_set(scene%time%duration) &
         & .or. scene%time%limit == 'spectral') &
         & text = text//line('note', '&time steps, step, limit and duration mean nothing here; '// &
@@ -75,6 +75,15 @@ contains
         & with_unit(distance, 'm', 3)//' away')
     end do
   end function summary_before
+
+  !> The way to rest.
+  pure function solver_of(scene) result(text)
+    type(scene_type), intent(in) :: scene
+    character(:), allocatable :: text
+    text = 'conjugate gradient'
+    if (scene%relaxation%solver == 'dynamic_relaxation') &
+      & text = 'dynamic relaxation, density matrix '//trim(scene%relaxation%density_matrix)
+  end function solver_of
 
   !> The kernels chosen, each with its reason.
   function kernels(scene, system) result(text)
@@ -126,6 +135,8 @@ contains
       & /(real(system%family%n_bonds, wp)*recorder%steps_done), 3)//' ns per bond and step, '// &
       & to_text(recorder%steps_done/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
       & ' steps/s')
+    if (recorder%gave_way > 0) text = text//line('solver', to_text(recorder%gave_way)// &
+      & ' load step(s) were left to dynamic relaxation by the conjugate gradient')
     associate (now => recorder%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))

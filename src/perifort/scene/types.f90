@@ -131,7 +131,7 @@ module pd_scene_types
 
   !> `&relaxation`
   type :: relaxation_group
-    character(name_length) :: solver = 'dynamic_relaxation'      !! 'conjugate_gradient'
+    character(name_length) :: solver = 'conjugate_gradient'      !! 'dynamic_relaxation'
     character(name_length) :: density_matrix = 'frame_invariant' !! 'chapter', 'constant'
     real(wp) :: safety = unset                   !! on the mass; 1, or 5 for 'chapter', 'constant'
     real(wp) :: tolerance = 1.0e-6_wp            !! of residual force and of displacement change [-]
