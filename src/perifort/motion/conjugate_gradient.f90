@@ -1,16 +1,16 @@
 !> Rest by Newton's method with a conjugate gradient inside (doc/theory.md, 7). The residual is the
-!> force as the model has it; the linear equations take the symmetric tangent: at first that of the
-!> undeformed body with the bonds it has now, which costs one evaluation of the forces, and where that
-!> doesn't serve, the tangent at the present displacements, which costs two. What doesn't come to
-!> rest so is left to dynamic relaxation.
+!> force as the model has it; the linear equations take a symmetric stiffness: at first that of the
+!> undeformed body with the bonds it has now, which the fast formulas give, and where that doesn't
+!> serve, the tangent at the present displacements. What doesn't come to rest so is left to dynamic
+!> relaxation.
 module pd_motion_conjugate_gradient
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: error_type
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_conditions, only: impose
-  use pd_motion_krylov, only: krylov_type, sums_type, new_krylov, linearise, take_residual, first_direction, &
-    & next_direction, apply_stiffness, go_along, take_direction, &
-    & volume_inner, smallest_curvature
+  use pd_motion_krylov, only: krylov_type, sums_type, new_krylov, linearise, take_residual, &
+    & first_direction, next_direction, take_direction, apply_stiffness, go_along, volume_inner, &
+    & smallest_curvature
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_residual, only: relaxation_type, squared_force, fail_unconverged
   use pd_motion_rigid, only: rigid_type, remove_free_motions
@@ -49,7 +49,8 @@ module pd_motion_conjugate_gradient
   type :: progress_type
     integer :: iterations = 0
     real(wp) :: reference = 0.0_wp    !! square of what acts on the body, as far as it is known
-    type(sums_type) :: sums
+    real(wp) :: change = 0.0_wp       !! of displacement in the last iteration, over displacement
+    type(sums_type) :: sums           !! of the last look at the true forces
   end type progress_type
 
 contains
@@ -81,6 +82,7 @@ contains
     allocate (loads, source=0.0_wp*best)
     call add_loads(system, instant%time, 1.0_wp, .false., loads)
     progress%reference = squared_force(system, loads)
+    deallocate (loads)
     call begin(system, instant%time, trend, .false., krylov, progress)
     fresh = .true.
     least = progress%sums%residual
@@ -93,8 +95,8 @@ contains
       if (allocated(error)) return
       if (ended == at_rest) return
       if (ended == used_up) then
-        call fail_unconverged(relaxation, instant%load_step, instant%residual, &
-          & sqrt(progress%sums%change/max(tiny(1.0_wp), progress%sums%displacement)), error)
+        call fail_unconverged(relaxation, instant%load_step, instant%residual, progress%change, &
+          & error)
         return
       end if
       ! what isn't finite fails these comparisons, too
@@ -132,8 +134,8 @@ contains
     end do
   end subroutine relax_by_conjugate_gradient
 
-  !> The start of a relaxation: what is imposed now comes in as the linear equations have it, so that
-  !> no row of bonds is torn, and the trend of the last load step as far as it helps.
+  !> The start of a relaxation: what is imposed now comes in as the linear equations have it, so
+  !> that no row of bonds is torn, and the trend of the last load step as far as it helps.
   subroutine begin(system, t, trend, deformed, krylov, progress)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
@@ -219,12 +221,14 @@ contains
       progress%iterations = progress%iterations + 1
       instant%step = instant%step + 1
       instant%residual = relative(linear%residual, max(progress%reference, linear%support))
+      progress%change = relative(linear%change, linear%displacement)
       call observer%observe(system, instant, error)
       if (allocated(error)) return
       call next_direction(system, linear%rho, krylov)
     end do
     call look(system, instant%time, krylov, progress)
-    instant%residual = relative(progress%sums%residual, progress%reference)
+    instant%residual = relative(progress%sums%residual, &
+      & max(progress%reference, progress%sums%support))
   end subroutine solve
 
   !> The true forces at the present displacements, and the residual that the loads at `t` leave.
@@ -291,7 +295,7 @@ contains
     where (.not. krylov%inverse > 0.0_wp) krylov%residual = 0.0_wp
   end subroutine free_of_rigid_motion
 
-  !> The residual over what acts on the body.
+  !> The root of a sum of squares over another, 0 for 0.
   pure real(wp) function relative(squared, reference)
     real(wp), intent(in) :: squared, reference
     relative = 0.0_wp

@@ -8,8 +8,9 @@ module pd_motion_krylov
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
-  public :: krylov_type, sums_type, new_krylov, linearise, take_residual, first_direction, next_direction
-  public :: apply_stiffness, go_along, take_direction, volume_inner, smallest_curvature
+  public :: krylov_type, sums_type, new_krylov, linearise, take_residual, first_direction
+  public :: next_direction, take_direction, apply_stiffness, go_along, volume_inner
+  public :: smallest_curvature
 
   !> Directions are kept this small over the horizon: there the forces are linear to the last digit,
   !> so that one evaluation at a direction itself is the product with the undeformed stiffness.
@@ -164,7 +165,7 @@ contains
     call unprojected_forces(system, krylov%origin, krylov%forces)
   end subroutine linearise
 
-  !> Forces with the unprojected dilatation, which are a gradient, so that their tangent is symmetric.
+  !> Forces with the unprojected dilatation: they are a gradient, and their tangent is symmetric.
   subroutine unprojected_forces(system, u, force)
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: u(:, :)

@@ -1,5 +1,6 @@
-!> Adaptive dynamic relaxation (7.26-7.36): fictitious mass and damping lead to the state of rest of
-!> each load step; then bonds beyond their limit break and it relaxes again until none does.
+!> Rest of each load step; then bonds beyond their limit break and it relaxes again until none does.
+!> The way there is the conjugate gradient, or adaptive dynamic relaxation (7.26-7.36): fictitious
+!> mass and damping.
 module pd_motion_relaxation
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_error, only: error_type, fail, status_no_answer
@@ -55,7 +56,7 @@ contains
     if (allocated(error)) return
     allocate (trend(0, system%body%dim))
     do i = 1, relaxation%load_steps
-      before = system%state%u
+      if (relaxation%conjugate_gradient .and. relaxation%load_steps > 1) before = system%state%u
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
       do
@@ -77,7 +78,7 @@ contains
       end do
       call remove_free_motions(system, rigid, system%state%u)
       call evaluate(system, instant%time, breaking=.false.)
-      trend = system%state%u - before
+      if (allocated(before)) trend = system%state%u - before
       system%state%v = 0.0_wp
       call account(system, instant%time, at_rest=.true.)
       instant%settled = .true.

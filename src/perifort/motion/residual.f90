@@ -1,5 +1,5 @@
-!> What both ways to rest share: how to relax, the force that is out of balance, and what to say when
-!> it doesn't vanish.
+!> What both ways to rest share: how to relax, the force that is out of balance, and what to say
+!> when it doesn't vanish.
 module pd_motion_residual
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: error_type, fail, status_no_answer

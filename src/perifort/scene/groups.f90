@@ -83,7 +83,7 @@ contains
     case ('time')
       purpose = 'How the state moves: explicit steps in time, or relaxation to rest.'
     case ('relaxation')
-      purpose = "Settings of adaptive dynamic relaxation (time method = 'relaxation')."
+      purpose = "How a body comes to rest (time method = 'relaxation')."
     case ('output')
       purpose = 'What is written, and how often.'
     case ('probe')
@@ -379,9 +379,11 @@ contains
     type(keys_type), intent(inout) :: keys
     type(relaxation_group), intent(inout) :: group
 
-    call keys%key('solver', group%solver, 'the way to rest', &
-      & allowed=[character(18) :: 'dynamic_relaxation', 'conjugate_gradient'])
-    call keys%key('density_matrix', group%density_matrix, 'fictitious mass; chapter = 7.32', &
+    call keys%key('solver', group%solver, 'conjugate_gradient: Newton''s method with conjugate '// &
+      & 'gradients; dynamic_relaxation: adaptive, as in the book', &
+      & allowed=[character(18) :: 'conjugate_gradient', 'dynamic_relaxation'])
+    call keys%key('density_matrix', group%density_matrix, 'fictitious mass of dynamic '// &
+      & 'relaxation, scale of conjugate gradients; chapter = 7.32', &
       & allowed=[character(15) :: 'frame_invariant', 'chapter', 'constant'])
     call keys%key('safety', group%safety, '-', 'factor on the fictitious mass', above=0.0_wp, &
       & default='1; 5 for chapter and constant')
