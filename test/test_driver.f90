@@ -30,6 +30,7 @@ contains
       & new_unittest('other formats are written as asked', test_formats), &
       & new_unittest('a relaxation leaves its history', test_relaxation), &
       & new_unittest('a run without an answer keeps its history', test_unstable), &
+      & new_unittest('a relaxation without rest keeps its history', test_restless), &
       & new_unittest('a scene that cannot be leaves no files', test_impossible), &
       & new_unittest('checking a scene leaves no files', test_check), &
       & new_unittest('quiet prints nothing', test_quiet)]
@@ -277,7 +278,7 @@ contains
     scene%relaxation%tolerance = 1.0e-9_wp
     scene%relaxation%load_steps = 2
     scene%output%fields = [character(64) :: 'displacement']
-    scene%output%history_every = 7
+    scene%output%history_every = 1
     deallocate (scene%loads)
     allocate (scene%loads(2))
     scene%loads(1)%side = 'x_min'
@@ -324,6 +325,43 @@ contains
     call expect_true(error, size(time) > 1 .and. size(time) < 3001, 'rows of the file')
     call check(error, count_filled(lines), 1 + size(time), 'lines of the table')
   end subroutine test_unstable
+
+  !> Iterations that do not suffice: status 3, and the rows up to there can be read, whichever
+  !> solver was to bring rest.
+  subroutine test_restless(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(18), parameter :: solvers(2) = [character(18) :: 'conjugate_gradient', &
+      & 'dynamic_relaxation']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: residual(:)
+    integer :: i
+
+    do i = 1, size(solvers)
+      call box_scene([20, 4], spacing, 0.25_wp, scene)
+      scene%file = 'bar.nml'
+      scene%time%method = 'relaxation'
+      scene%relaxation%solver = solvers(i)
+      scene%relaxation%maximum_iterations = 6
+      scene%output%fields = [character(64) :: 'displacement']
+      scene%output%history_every = 1
+      deallocate (scene%loads)
+      allocate (scene%loads(2))
+      scene%loads(1)%side = 'x_min'
+      scene%loads(2)%side = 'x_max'
+      scene%loads%pressure = -1.0e5_wp
+      call run(scene, 'restless', fault)
+      call expect_true(error, allocated(fault), 'six iterations were enough')
+      if (allocated(error)) return
+      call check(error, fault%status, status_no_answer, 'exit status')
+      call column_of(here//'/restless/bar.vtkhdf', 'residual', residual, error)
+      if (allocated(error)) return
+      ! the start and every iteration
+      call check(error, size(residual), 7, 'rows')
+      if (allocated(error)) return
+      call expect_true(error, all(residual(2:) > 1.0e-6_wp), 'residual')
+    end do
+  end subroutine test_restless
 
   subroutine test_impossible(error)
     type(error_type), allocatable, intent(out) :: error
