@@ -140,11 +140,11 @@ contains
 
   !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a
   !> run takes at its peak, while families are built, about 400 bytes a point with a lattice; a list
-  !> adds about 10 bytes a bond.
+  !> adds about 10 bytes a bond, and conjugate gradients up to 250 bytes a point.
   subroutine check_memory(scene, error)
     type(scene_type), intent(in) :: scene
     type(error_type), allocatable, intent(out) :: error
-    real(wp), parameter :: per_point = 400.0_wp, per_bond = 10.0_wp
+    real(wp), parameter :: per_point = 400.0_wp, per_bond = 10.0_wp, per_solver = 250.0_wp
     real(wp) :: points, spacing, delta, need, there
     integer :: i, dim
 
@@ -159,6 +159,8 @@ contains
     end do
     if (points <= 0.0_wp) return
     need = points*per_point
+    if (scene%time%method == 'relaxation' .and. scene%relaxation%solver == 'conjugate_gradient') &
+      & need = need + points*per_solver
     if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
       delta = horizon_of(scene, spacing)
       need = need + points*per_bond*horizon_volume(dim, delta, 1.0_wp)/spacing**dim
