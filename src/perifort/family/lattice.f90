@@ -152,9 +152,9 @@ contains
     k = findloc(body%grid == g, .true., dim=1)
     grid%spacing = body%spacing(k)
     grid%cell_volume = body%volume(k)
-    call make_offsets(family%rule, body%dim, grid)
+    cells = extent(body, g)
+    call make_offsets(family%rule, body%dim, cells, grid)
     associate (m => grid%reach_cells)
-      cells = extent(body, g)
       grid%stride = [1, whole_blocks(cells(1) + m), 0]
       grid%stride(3) = grid%stride(2)*(cells(2) + m)
       if (body%dim < 3) grid%stride(3) = 0

@@ -31,18 +31,21 @@ module pd_family_offsets
 
 contains
 
-  !> The bond vectors of a grid: all offsets within the rule's reach, x fastest.
-  subroutine make_offsets(rule, dim, grid)
+  !> The bond vectors of a grid: all offsets within the rule's reach, x fastest, that join two of
+  !> its `cells`. The second matters for thin bodies and for horizons larger than the body, whose
+  !> tables would be mostly empty and, in space, of any size.
+  subroutine make_offsets(rule, dim, cells, grid)
     type(volume_rule_type), intent(in) :: rule
     integer, intent(in) :: dim
+    integer, intent(in) :: cells(3)
     type(offsets_type), intent(inout) :: grid
     real(wp) :: xi(3), farthest
     integer :: i, j, k, n, pass, high(3)
 
     farthest = reach(rule, grid%spacing, dim)
-    grid%reach_cells = floor(farthest/grid%spacing)
     high = 0
-    high(:dim) = grid%reach_cells
+    high(:dim) = int(min(farthest/grid%spacing, real(cells(:dim) - 1, wp)))
+    grid%reach_cells = maxval(high)
     do pass = 1, 2
       n = 0
       do k = -high(3), high(3)
