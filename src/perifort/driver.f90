@@ -374,6 +374,7 @@ contains
       recorder%probes = set_up%probes
       schedule%relaxation = plan%relaxes
       schedule%steps = plan%steps
+      if (.not. plan%relaxes) recorder%watch%stable_step = plan%limit
       schedule%every = scene%output%every
       if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
       if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)

@@ -6,10 +6,13 @@
 module pd_motion_explicit
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_text, only: to_text
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, evaluate, account, add_loads, inverse_density, &
-    & explain_fault, faulty_slot
+    & faulty_slot, place
+  use pd_motion_watch, only: cause_of_fault
+  use pd_motion_time_step, only: integrator_limit, stable_step, stiffness_bound
   implicit none (type, external)
   private
   public :: run_explicit
@@ -59,7 +62,7 @@ contains
         sound = faulty_slot(system, system%state%v, dt) == 0
       end if
       if (sound) cycle
-      call explain_fault(system, instant%time + dt, dt, error)
+      call explain_fault(system, integrator, instant%time + dt, dt, error)
       return
     end do
   end subroutine run_explicit
@@ -248,5 +251,26 @@ contains
     system%state%u = memory%u0 + dt*du
     system%state%v = memory%v0 + dt*dv
   end subroutine runge_kutta
+
+  !> The error for a motion that is none any more at time `t` [s] with steps of `dt` [s]. Whether
+  !> the step is to blame is looked up, not guessed.
+  subroutine explain_fault(system, integrator, t, dt, error)
+    type(system_type), intent(in) :: system
+    character(*), intent(in) :: integrator
+    real(wp), intent(in) :: t, dt
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: bound(:)
+    real(wp) :: stable
+    integer :: k
+
+    k = max(1, faulty_slot(system, system%state%v, dt))
+    allocate (bound(system%body%n_slots))
+    call stiffness_bound(system%body, system%family, system%model, bound)
+    stable = stable_step(system%body, system%model, bound)*integrator_limit(integrator)/2
+    call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))// &
+      & '): point '//to_text(int(system%body%point(k)))//' at ('//place(system, k)// &
+      & ') moves more than a horizon in a step of '//to_text(dt)//' s. '// &
+      & cause_of_fault(dt, stable), status_no_answer)
+  end subroutine explain_fault
 
 end module pd_motion_explicit

@@ -65,6 +65,11 @@ contains
       & depth_of(scene), minval(system%body%spacing, mask=system%body%point > 0))
     plan%step = scene%time%safety*plan%limit
     if (is_set(scene%time%step)) plan%step = scene%time%step
+    if (.not. plan%step > 0.0_wp) then
+      call fail(error, 'a time step of '//to_text(plan%step)//' s leads nowhere: it must be '// &
+        & 'above 0 (the stable step is '//to_text(plan%limit)//' s)')
+      return
+    end if
     plan%steps = scene%time%steps
     if (.not. is_set(scene%time%duration)) return
     if (scene%time%duration/plan%step > 0.9_wp*huge(1)) then

@@ -3,7 +3,7 @@
 module pd_motion_system
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_error, only: error_type
   use pd_base_numbers, only: inner
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
@@ -17,7 +17,7 @@ module pd_motion_system
   implicit none (type, external)
   private
   public :: system_type, state_type, start_system, evaluate, break_now, account, energies_type, &
-    & energies_of, add_loads, inverse_density, explain_fault, faulty_slot, place
+    & energies_of, add_loads, inverse_density, faulty_slot, place
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -368,21 +368,6 @@ contains
     if (at(1) == 0) at = maxloc(abs(rate))
     slot = at(1)
   end function faulty_slot
-
-  !> The error for a motion that is none any more at time `t` [s] with steps of `dt` [s].
-  subroutine explain_fault(system, t, dt, error)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t, dt
-    type(error_type), allocatable, intent(out) :: error
-    integer :: k
-
-    k = max(1, faulty_slot(system, system%state%v, dt))
-    call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))// &
-      & '): point '//to_text(int(system%body%point(k)))//' at ('//place(system, k)// &
-      & ') moves more than a horizon in a step of '//to_text(dt)//' s. Likely cause: a time '// &
-      & 'step above the stable one (`perifort check` prints it; lower safety or step), or an '// &
-      & 'imposed velocity beyond the wave speed', status_no_answer)
-  end subroutine explain_fault
 
   !> Position of a slot as text.
   pure function place(system, k) result(text)

@@ -12,6 +12,7 @@ module pd_output_recorder
   use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
+  use pd_motion_watch, only: watch_type
   use pd_output_contact, only: touching_points
   use pd_output_results, only: results_type
   use pd_output_types, only: column_type, field_type
@@ -46,6 +47,7 @@ module pd_output_recorder
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(energies_type) :: energies          !! of the last row
+    type(watch_type) :: watch
     real(wp) :: supply = 0.0_wp              !! energy at the first row, with breaking at t = 0 [J]
     integer :: rows = 0
     integer :: outputs = 0
@@ -274,6 +276,8 @@ contains
       end do
     end do
     call recorder%results%add_row(row, error)
+    if (.not. allocated(error)) call recorder%watch%look(system, recorder%energies, &
+      & instant, error)
   end subroutine write_row
 
   !> Greatest local damage of all points, 0 where nothing can be damaged.
