@@ -1,5 +1,6 @@
 !> Bodies that tests share, built from plain numbers, and what tests do with all of them.
 module bodies
+  use omp_lib, only: omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_error, only: fault_type => error_type
   use pd_base_numbers, only: noise
@@ -12,8 +13,8 @@ module bodies
   use testdrive, only: error_type, test_failed
   implicit none (type, external)
   private
-  public :: box_scene, ready, expect, expect_true, noise, shake, diary_type, rotation_matrix, &
-    & at_point, youngs_modulus, density_of_steel, text_of
+  public :: box_scene, ready, ready_alone, expect, expect_true, noise, shake, diary_type, &
+    & rotation_matrix, at_point, youngs_modulus, density_of_steel, text_of
 
   real(wp), parameter :: youngs_modulus = 200.0e9_wp   !! of every test's material [Pa]
   real(wp), parameter :: density_of_steel = 7850.0_wp  !! [kg/m3]
@@ -75,6 +76,17 @@ contains
     call prepare(scene, set_up, fault)
     if (allocated(fault)) call test_failed(error, 'the scene is refused: '//fault%message)
   end subroutine ready
+
+  !> As `ready`, and on one thread to the end of the test: a body of a few points gains nothing from
+  !> more, and where others compute it waits for them at every step.
+  subroutine ready_alone(scene, set_up, error)
+    type(scene_type), intent(in) :: scene
+    type(set_up_type), intent(out) :: set_up
+    type(error_type), allocatable, intent(inout) :: error
+
+    call omp_set_num_threads(1)
+    call ready(scene, set_up, error)
+  end subroutine ready_alone
 
   !> Fail unless |actual - expected| <= tolerance; a failure that stands is kept.
   subroutine expect(error, actual, expected, tolerance, what)

@@ -6,6 +6,7 @@
 !> `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such test.
 program main
   use, intrinsic :: iso_fortran_env, only: output_unit, int64, real64
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use testdrive, only: collect_interface, new_testsuite, run_selected, select_suite, &
     & testsuite_type, unittest_type
   use test_base_clock, only: collect_base_clock
@@ -17,6 +18,11 @@ program main
   use test_body_material, only: collect_body_material
   use test_command_line, only: collect_command_line
   use test_driver, only: collect_driver
+  use test_extremes_contrast, only: collect_extremes_contrast
+  use test_extremes_geometry, only: collect_extremes_geometry
+  use test_extremes_materials, only: collect_extremes_materials
+  use test_extremes_motion, only: collect_extremes_motion
+  use test_extremes_steps, only: collect_extremes_steps
   use test_family_cells, only: collect_family_cells
   use test_family_cracks, only: collect_family_cracks
   use test_family_lattice, only: collect_family_lattice
@@ -33,6 +39,7 @@ program main
   use test_motion_system, only: collect_motion_system
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_time_step, only: collect_motion_time_step
+  use test_orders, only: collect_orders
   use test_output_base64, only: collect_output_base64
   use test_output_contact, only: collect_output_contact
   use test_output_files, only: collect_output_files
@@ -67,6 +74,11 @@ program main
   call register('body_material', collect_body_material)
   call register('command_line', collect_command_line)
   call register('driver', collect_driver)
+  call register('extremes_contrast', collect_extremes_contrast)
+  call register('extremes_geometry', collect_extremes_geometry)
+  call register('extremes_materials', collect_extremes_materials)
+  call register('extremes_motion', collect_extremes_motion)
+  call register('extremes_steps', collect_extremes_steps)
   call register('family_cells', collect_family_cells)
   call register('family_cracks', collect_family_cracks)
   call register('family_lattice', collect_family_lattice)
@@ -83,6 +95,7 @@ program main
   call register('motion_system', collect_motion_system)
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_time_step', collect_motion_time_step)
+  call register('orders', collect_orders)
   call register('output_base64', collect_output_base64)
   call register('output_contact', collect_output_contact)
   call register('output_files', collect_output_files)
@@ -175,7 +188,7 @@ contains
   subroutine run_test(suite, name)
     type(testsuite_type), intent(in) :: suite
     character(*), intent(in) :: name
-    integer :: unit, stat, io
+    integer :: unit, stat, io, threads
     integer(int64) :: start, finish, rate
     character(2000) :: line
     character(12) :: seconds
@@ -186,7 +199,10 @@ contains
     open (newunit=unit, status='scratch', action='readwrite')
     stat = 0
     call system_clock(start, rate)
+    threads = omp_get_max_threads()
     call run_selected(suite%collect, name, unit, stat)
+    ! what a test sets must not reach others
+    call omp_set_num_threads(threads)
     call system_clock(finish)
     rewind (unit)
     read (unit, '(a)', iostat=io) line
