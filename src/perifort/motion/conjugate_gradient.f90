@@ -4,8 +4,10 @@
 !> serve, the tangent at the present displacements. What doesn't come to rest so is left to dynamic
 !> relaxation.
 module pd_motion_conjugate_gradient
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp, i1
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_text, only: to_text
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_conditions, only: impose
   use pd_motion_krylov, only: krylov_type, sums_type, new_krylov, linearise, take_residual, &
@@ -82,6 +84,11 @@ contains
     allocate (loads, source=0.0_wp*best)
     call add_loads(system, instant%time, 1.0_wp, .false., loads)
     progress%reference = squared_force(system, loads)
+    if (.not. ieee_is_finite(progress%reference)) then
+      call fail(error, 'no rest: the loads of up to '//to_text(maxval(abs(loads)))//' N/m3 are '// &
+        & 'beyond what numbers hold when squared', status_no_answer)
+      return
+    end if
     deallocate (loads)
     call begin(system, instant%time, trend, .false., krylov, progress)
     fresh = .true.
