@@ -1,19 +1,21 @@
 !> What the user typed: one command, its file or name, and options; and the texts of `--help`.
 module pd_command_line
-  use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_usage
+  use pd_base_kinds, only: wp
   use pd_base_text, only: join, nearest_name, newline, to_text
+  use pd_scene_values, only: parse_real
   use pd_study_options, only: bench_options_type, check_options
   implicit none (type, external)
   private
   public :: command_line_type, parse_command_line, read_command_line, help_text, command_names
 
   integer, parameter :: word_length = 16
-  character(word_length), parameter :: command_names(8) = [character(word_length) :: &
-    & 'run', 'check', 'limits', 'template', 'reference', 'bench', 'version', 'help']
-  character(word_length), parameter :: option_names(13) = [character(word_length) :: &
+  character(word_length), parameter :: command_names(10) = [character(word_length) :: &
+    & 'run', 'check', 'limits', 'study', 'choose', 'template', 'reference', 'bench', 'version', &
+    & 'help']
+  character(word_length), parameter :: option_names(15) = [character(word_length) :: &
     & '--output', '--threads', '--overwrite', '--quiet', '--points', '--dimension', '--model', &
-    & '--family', '--breaking', '--surface', '--seconds', '--csv', '--help']
+    & '--family', '--breaking', '--surface', '--seconds', '--csv', '--error', '--time', '--help']
 
   !> A command line, understood and checked.
   type :: command_line_type
@@ -25,6 +27,8 @@ module pd_command_line
     logical :: quiet = .false.                     !! `--quiet`
     type(bench_options_type) :: bench              !! the options of `bench`
     real(wp) :: seconds = 60.0_wp                  !! `--seconds` of `limits`
+    real(wp) :: error = 0.0_wp                     !! `--error` of `choose`; 0 = not given
+    real(wp) :: time = 0.0_wp                      !! `--time` of `choose` [s]; 0 = not given
     logical :: help = .false.                      !! `--help`: only the text is wanted
     character(:), allocatable :: text              !! the command line as it was typed
   end type command_line_type
@@ -165,7 +169,7 @@ contains
       end if
     end do
     select case (line%command)
-    case ('run', 'check', 'limits')
+    case ('run', 'check', 'limits', 'study', 'choose')
       if (len(line%argument) == 0) then
         call usage(error, line, "'"//line%command//"' needs the scene file")
       else if (allocated(line%bench%threads)) then
@@ -175,6 +179,9 @@ contains
       if (allocated(error)) return
       if (.not. (line%seconds >= 1.0_wp .and. line%seconds <= 86400.0_wp)) call usage(error, line, &
         & "'--seconds' must be between 1 and 86400, found "//to_text(line%seconds))
+      if (allocated(error)) return
+      if (line%command == 'choose' .and. line%error <= 0.0_wp) &
+        & call usage(error, line, "'choose' needs the error to be met, as in --error 1e-3")
     case ('bench', 'version')
       if (len(line%argument) > 0) call usage(error, line, "'"//line%command// &
         & "' takes no argument, found '"//line%argument//"'")
@@ -252,6 +259,11 @@ contains
     case ('--csv')
       line%bench%csv = value
       if (len(value) == 0) call usage(error, line, "'--csv' needs a file, as in --csv bench.csv")
+    case ('--error', '--time')
+      if (name == '--error') call read_positive(value, line%error, status)
+      if (name == '--time') call read_positive(value, line%time, status)
+      if (status /= 0) call usage(error, line, "'"//name//"' needs a number above 0, as in "// &
+        & trim(merge('--error 1e-3', '--time 60   ', name == '--error'))//", found '"//value//"'")
     case ('--overwrite')
       line%overwrite = .true.
     case ('--quiet')
@@ -262,6 +274,17 @@ contains
       call usage(error, line, "option '"//name//"' has no meaning")
     end select
   end subroutine set_option
+
+  !> A number above 0; `status` is not 0 if there is none.
+  subroutine read_positive(text, value, status)
+    character(*), intent(in) :: text
+    real(wp), intent(out) :: value
+    integer, intent(out) :: status
+    character(:), allocatable :: note
+
+    call parse_real(text, value, note)
+    status = merge(0, 1, len(note) == 0 .and. value > 0.0_wp)
+  end subroutine read_positive
 
   !> Whole numbers above 0, parted by commas; none if there is anything else.
   subroutine read_numbers(text, numbers)
@@ -314,14 +337,16 @@ contains
     case ('--help')
       belongs = .true.
     case ('--threads')
-      belongs = command == 'run' .or. command == 'check' .or. command == 'limits' .or. &
-        & command == 'bench'
+      belongs = any(command == [character(6) :: 'run', 'check', 'limits', 'bench', 'study', &
+        & 'choose'])
     case ('--seconds')
       belongs = command == 'limits' .or. command == 'bench'
+    case ('--error', '--time')
+      belongs = command == 'choose'
     case ('--points', '--dimension', '--model', '--family', '--breaking', '--surface', '--csv')
       belongs = command == 'bench'
     case default
-      belongs = command == 'run'
+      belongs = any(command == [character(6) :: 'run', 'study', 'choose'])
     end select
   end function belongs
 
@@ -391,6 +416,37 @@ contains
         & '', &
         & '  --seconds S     time for all runs together (default: 60)', &
         & threads], newline)
+    case ('study')
+      text = join([character(w) :: &
+        & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
+        & '', &
+        & 'Run the scene in FILE with all the values that its groups &study name, and tell for', &
+        & 'each run error, time, points, bonds, steps, memory and energy drift, which runs are on', &
+        & 'the Pareto front, and the observed orders of convergence. Writes study.csv (complete', &
+        & 'after every run) and study.txt; ./pf plot draws them. The results of the runs are not', &
+        & 'kept.', &
+        & '', &
+        & '  --output DIR    folder of the tables (default: out/ and the name of the file)', &
+        & '  --threads N     number of threads, the same for all runs (default: OMP_NUM_THREADS', &
+        & '                  or all; one if even the largest run is small)', &
+        & '  --overwrite     replace a study that is there', &
+        & '  --quiet         print errors only'], newline)
+    case ('choose')
+      text = join([character(w) :: &
+        & 'perifort choose FILE --error E [--time T] [--output DIR] [--threads N] [--overwrite]', &
+        & '                [--quiet]', &
+        & '', &
+        & 'Run the study in FILE, extrapolate error and time, and print the cheapest settings that', &
+        & 'meet an error; then run them and tell how far off the prediction was. Exit status 1 if', &
+        & 'the error is missed.', &
+        & '', &
+        & '  --error E       the error to be met, in the norm and unit of the study', &
+        & '  --time T        the longest that the chosen run may take [s]; if the error cannot be', &
+        & '                  met within it, the best settings that keep it', &
+        & '  --output DIR    folder of the tables (default: out/ and the name of the file)', &
+        & '  --threads N     number of threads, the same for all runs', &
+        & '  --overwrite     replace a study that is there', &
+        & '  --quiet         print errors only'], newline)
     case ('template')
       text = join([character(w) :: &
         & 'perifort template [NAME]', &
@@ -438,6 +494,8 @@ contains
         & '  perifort run FILE            compute a scene', &
         & '  perifort check FILE          check a scene and tell what it costs', &
         & '  perifort limits FILE         measure its largest stable step, and more', &
+        & '  perifort study FILE          vary keys of a scene: error against time', &
+        & '  perifort choose FILE --error E   the cheapest settings that meet an error', &
         & '  perifort template [NAME]     print a commented scene to start from', &
         & '  perifort reference [GROUP]   print the groups and keys of a scene', &
         & '  perifort bench               measure the speed on this machine', &

@@ -12,7 +12,9 @@ module pd_commands
   use pd_scene_template, only: write_template
   use pd_scene_types, only: scene_type
   use pd_study_bench, only: run_bench
+  use pd_study_choose, only: run_choose
   use pd_study_limits, only: run_limits
+  use pd_study_study, only: run_study
   implicit none (type, external)
   private
   public :: execute, hdf5_version
@@ -33,12 +35,19 @@ contains
     end if
 
     select case (line%command)
-    case ('run', 'check', 'limits')
+    case ('run', 'check', 'limits', 'study', 'choose')
       options%output_directory = line%output_directory
       options%command = line%text
       options%threads = line%threads
       options%overwrite = line%overwrite
       options%quiet = line%quiet
+      if (line%command == 'study') then
+        call run_study(line%argument, options, error)
+        return
+      else if (line%command == 'choose') then
+        call run_choose(line%argument, options, line%error, line%time, error)
+        return
+      end if
       call read_scene(line%argument, scene, error)
       if (allocated(error)) return
       select case (line%command)

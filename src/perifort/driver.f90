@@ -38,7 +38,8 @@ module pd_driver
   use pd_base_system, only: available_memory
   implicit none (type, external)
   private
-  public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads
+  public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads, &
+    & check_memory, output_directory, history_interval
 
   !> How to run, from the command line.
   type :: run_options_type
@@ -72,10 +73,7 @@ contains
     character(:), allocatable :: directory, stem
 
     stem = stem_of(scene)
-    directory = 'out/'//stem
-    if (allocated(options%output_directory)) then
-      if (options%output_directory /= '') directory = options%output_directory
-    end if
+    directory = output_directory(scene, options)
     call refuse_existing(directory, stem, options%overwrite, error)
     if (allocated(error)) return
     if (options%threads > 0) call omp_set_num_threads(options%threads)
@@ -378,9 +376,7 @@ contains
       schedule%every = scene%output%every
       if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
       if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
-      schedule%history_every = scene%output%history_every
-      if (schedule%history_every == 0) schedule%history_every = max(1, merge( &
-        & plan%relaxation%maximum_iterations, plan%steps, plan%relaxes)/2000)
+      schedule%history_every = history_interval(scene, plan)
       allocate (recorder%fields(size(scene%output%fields)))
       do f = 1, size(recorder%fields)
         recorder%fields(f) = field_of(trim(scene%output%fields(f)))
@@ -434,6 +430,26 @@ contains
         & merge(1_i1, 0_i1, mask(body%slot)), error)
     end do
   end subroutine put_points
+
+  !> Steps (iterations in relaxation) between rows of the history.
+  pure integer function history_interval(scene, plan) result(every)
+    type(scene_type), intent(in) :: scene
+    type(plan_type), intent(in) :: plan
+    every = scene%output%history_every
+    if (every == 0) every = max(1, merge(plan%relaxation%maximum_iterations, plan%steps, &
+      & plan%relaxes)/2000)
+  end function history_interval
+
+  !> The folder of the results: the one asked for, or out/ and the scene file's name.
+  pure function output_directory(scene, options) result(directory)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    character(:), allocatable :: directory
+
+    directory = 'out/'//stem_of(scene)
+    if (.not. allocated(options%output_directory)) return
+    if (options%output_directory /= '') directory = options%output_directory
+  end function output_directory
 
   !> The scene file's name without folder and ending.
   pure function stem_of(scene) result(stem)

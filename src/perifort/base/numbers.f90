@@ -1,9 +1,9 @@
-!> Sums that do not depend on the number of threads, and a few constants.
+!> Sums that do not depend on the number of threads, orders and medians, and a few constants.
 module pd_base_numbers
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: pi, total, inner, block_length, noise
+  public :: pi, total, inner, block_length, noise, ascending, median
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   !> Terms in one partial sum: the blocks are fixed, so the sum's rounding is too.
@@ -55,5 +55,30 @@ contains
     if (state <= 0) state = state + 2147483647
     noise = 2*real(state, wp)/2147483647.0_wp - 1
   end function noise
+
+  !> The numbers of `values` in ascending order of value.
+  pure function ascending(values) result(order)
+    real(wp), intent(in) :: values(:)
+    integer :: order(size(values))
+    integer :: i, j, this
+
+    order = [(i, i=1, size(values))]
+    do i = 2, size(values)
+      this = order(i)
+      do j = i - 1, 1, -1
+        if (values(order(j)) <= values(this)) exit
+        order(j + 1) = order(j)
+      end do
+      order(j + 1) = this
+    end do
+  end function ascending
+
+  !> The middle value, of an even number the lower of the two.
+  pure real(wp) function median(values)
+    real(wp), intent(in) :: values(:)
+    integer :: order(size(values))
+    order = ascending(values)
+    median = values(order((size(values) + 1)/2))
+  end function median
 
 end module pd_base_numbers

@@ -4,7 +4,7 @@ module pd_family_cells
   implicit none (type, external)
   private
   public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, neighbours_of, &
-    & joins_labels, brute_force_neighbours
+    & joins_labels, brute_force_neighbours, cell_of, cells_around
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
   type :: cells_type
@@ -79,6 +79,40 @@ contains
     end do
     at = 1 + i(1) + cells%count(1)*(i(2) + cells%count(2)*i(3))
   end function cell_at
+
+  !> Where a position lies among the cells, from 0 along each direction; positions outside are taken
+  !> to the nearest cell.
+  pure function cell_of(cells, x) result(at)
+    type(cells_type), intent(in) :: cells
+    real(wp), intent(in) :: x(:)
+    integer :: at(3)
+    integer :: c
+
+    at = 0
+    do c = 1, size(x)
+      at(c) = int(max(0.0_wp, min(real(cells%count(c) - 1, wp), &
+        & (x(c) - cells%lower(c))/cells%size(c))))
+    end do
+  end function cell_of
+
+  !> The points in the cell of a position and in those around it.
+  pure subroutine cells_around(cells, x, points)
+    type(cells_type), intent(in) :: cells
+    real(wp), intent(in) :: x(:)
+    integer(i4), allocatable, intent(out) :: points(:)
+    integer :: at(3), low(3), high(3), j, k, row
+
+    at = cell_of(cells, x)
+    low = max(0, at - 1)
+    high = min(cells%count - 1, at + 1)
+    allocate (points(0))
+    do k = low(3), high(3)
+      do j = low(2), high(2)
+        row = 1 + cells%count(1)*(j + cells%count(2)*k)
+        points = [points, cells%order(cells%first(row + low(1)):cells%first(row + high(1) + 1) - 1)]
+      end do
+    end do
+  end subroutine cells_around
 
   !> Number of points within `reach(spacing_k, spacing_j)` of each point (itself not counted).
   !> `half_reach(k)` [m]: two points are neighbours if they are no further apart than the sum.

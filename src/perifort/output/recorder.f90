@@ -18,8 +18,8 @@ module pd_output_recorder
   use pd_output_types, only: column_type, field_type
   implicit none (type, external)
   private
-  public :: recorder_type, schedule_type, probe_type, field_of, history_columns, planned_outputs, &
-    & planned_rows
+  public :: recorder_type, schedule_type, probe_type, field_of, history_columns, history_row, &
+    & planned_outputs, planned_rows, probe_values, velocities_now
 
   character(*), parameter :: xyz(3) = ['x', 'y', 'z']
 
@@ -255,30 +255,42 @@ contains
     type(instant_type), intent(in) :: instant
     real(wp), intent(in) :: v(:, :)
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: row(:)
-    integer :: m, p, f
 
     call energies_of(system, v, recorder%energies)
     if (recorder%rows == 0) recorder%supply = recorder%energies%kinetic + recorder%energies%strain &
       & + system%dissipated
     recorder%rows = recorder%rows + 1
-    row = [real(instant%step, wp), instant%time, recorder%energies%kinetic, &
-      & recorder%energies%strain, system%dissipated, system%external_work, &
-      & real(system%broken, wp), greatest_damage(system), instant%dt]
-    if (recorder%schedule%relaxation) row = [row, instant%residual, real(instant%load_step, wp)]
-    do m = 1, size(system%motions)
-      if (system%motions(m)%name /= '') row = [row, system%motions(m)%reaction(:system%body%dim)]
-    end do
-    do p = 1, size(recorder%probes)
-      do f = 1, size(recorder%probes(p)%fields)
-        row = [row, probe_values(system, recorder%probes(p)%fields(f), &
-          & int(recorder%probes(p)%slot), v)]
-      end do
-    end do
-    call recorder%results%add_row(row, error)
+    call recorder%results%add_row(history_row(system, recorder%probes, &
+      & recorder%schedule%relaxation, instant, v, recorder%energies), error)
     if (.not. allocated(error)) call recorder%watch%look(system, recorder%energies, &
       & instant, error)
   end subroutine write_row
+
+  !> The values of `history_columns` at an instant; `v` are the velocities and `energies` the
+  !> energies then.
+  function history_row(system, probes, relaxation, instant, v, energies) result(row)
+    type(system_type), intent(in) :: system
+    type(probe_type), intent(in) :: probes(:)
+    logical, intent(in) :: relaxation
+    type(instant_type), intent(in) :: instant
+    real(wp), intent(in) :: v(:, :)
+    type(energies_type), intent(in) :: energies
+    real(wp), allocatable :: row(:)
+    integer :: m, p, f
+
+    row = [real(instant%step, wp), instant%time, energies%kinetic, energies%strain, &
+      & system%dissipated, system%external_work, real(system%broken, wp), &
+      & greatest_damage(system), instant%dt]
+    if (relaxation) row = [row, instant%residual, real(instant%load_step, wp)]
+    do m = 1, size(system%motions)
+      if (system%motions(m)%name /= '') row = [row, system%motions(m)%reaction(:system%body%dim)]
+    end do
+    do p = 1, size(probes)
+      do f = 1, size(probes(p)%fields)
+        row = [row, probe_values(system, probes(p)%fields(f), int(probes(p)%slot), v)]
+      end do
+    end do
+  end function history_row
 
   !> Greatest local damage of all points, 0 where nothing can be damaged.
   pure real(wp) function greatest_damage(system)

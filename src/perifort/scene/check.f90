@@ -69,6 +69,8 @@ contains
       if (allocated(error)) return
     end do
     call check_output(scene, error, source)
+    if (allocated(error)) return
+    call check_studies(scene, error, source)
   end subroutine check_scene
 
   !> Lists that nobody has filled get size 0, so that loops need no question.
@@ -87,6 +89,7 @@ contains
     if (.not. allocated(scene%boundaries)) allocate (scene%boundaries(0))
     if (.not. allocated(scene%loads)) allocate (scene%loads(0))
     if (.not. allocated(scene%probes)) allocate (scene%probes(0))
+    if (.not. allocated(scene%studies)) allocate (scene%studies(0))
   end subroutine allocate_groups
 
   !> The groups that stand once, and the two without which there is nothing to compute.
@@ -201,5 +204,26 @@ contains
       end associate
     end do
   end subroutine check_output
+
+  !> Every `&study` varies something, and where it measures a field in a region there is one.
+  subroutine check_studies(scene, error, source)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i, r
+
+    do i = 1, size(scene%studies)
+      associate (study => scene%studies(i))
+        if (study%vary == '' .or. .not. allocated(study%values)) then
+          call rule_fault(error, 'study', i, '', "group &study lacks the key 'vary' or 'values'", &
+            & 'expected a key and its values', source)
+        else
+          call check_known(study%region, [character(name_length) :: (scene%regions(r)%name, &
+            & r=1, size(scene%regions))], 'region', 'study', i, 'region', error, source)
+        end if
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine check_studies
 
 end module pd_scene_check

@@ -7,18 +7,19 @@ module pd_scene_groups
   use pd_scene_keys, only: keys_type, mode_describe, mode_write
   use pd_scene_types, only: header_type, body_group, shape_group, material_group, horizon_group, &
     & crack_group, initial_group, boundary_group, load_group, time_group, relaxation_group, &
-    & output_group, probe_group, is_set
+    & output_group, probe_group, study_group, is_set
   implicit none (type, external)
   private
   public :: visit_scene_header, visit_body, visit_remove, visit_region, visit_material, &
     & visit_horizon, visit_crack, visit_no_fail, visit_initial, visit_boundary, visit_load, &
-    & visit_time, visit_relaxation, visit_output, visit_probe
-  public :: group_names, shape_names, field_names, sides, default_fields, default_probe_fields
+    & visit_time, visit_relaxation, visit_output, visit_probe, visit_study
+  public :: group_names, shape_names, field_names, sides, default_fields, default_probe_fields, &
+    & closed_forms
   public :: group_repeatable, group_purpose, describe_group
 
-  character(10), parameter :: group_names(15) = [character(10) :: 'scene', 'body', 'remove', &
+  character(10), parameter :: group_names(16) = [character(10) :: 'scene', 'body', 'remove', &
     & 'region', 'material', 'horizon', 'crack', 'no_fail', 'initial', 'boundary', 'load', 'time', &
-    & 'relaxation', 'output', 'probe']  !! in the order of the reference
+    & 'relaxation', 'output', 'probe', 'study']  !! in the order of the reference
 
   !> Fields that can be written and probed.
   character(14), parameter :: field_names(6) = [character(14) :: 'displacement', 'velocity', &
@@ -33,6 +34,9 @@ module pd_scene_groups
     & 'z_min', 'z_max']
   !> Kinds of shapes.
   character(8), parameter :: shape_names(3) = [character(8) :: 'box', 'sphere', 'cylinder']
+  !> Answers that a study knows in closed form.
+  character(15), parameter :: closed_forms(6) = [character(15) :: 'bar_vibration', 'bar_tension', &
+    & 'uniaxial_stress', 'plate_hole', 'chain_wave', 'linear_field']
   character(1), parameter :: axes(3) = ['x', 'y', 'z']
 
 contains
@@ -88,6 +92,10 @@ contains
       purpose = 'What is written, and how often.'
     case ('probe')
       purpose = 'The values of the nearest point in every row of the history.'
+    case ('study')
+      purpose = 'A key that `perifort study` and `choose` vary. Several groups make the product '// &
+        & 'of their values; what is measured need stand in one of them only. '// &
+        & '`run` passes over it.'
     case default
       purpose = ''
     end select
@@ -110,6 +118,7 @@ contains
     type(relaxation_group) :: relaxation
     type(output_group) :: output
     type(probe_group) :: probe
+    type(study_group) :: study
 
     call keys%start(mode_describe)
     select case (name)
@@ -143,6 +152,8 @@ contains
       call visit_output(keys, output)
     case ('probe')
       call visit_probe(keys, probe)
+    case ('study')
+      call visit_study(keys, study)
     case default
       continue  ! callers know the names of all groups
     end select
@@ -426,5 +437,31 @@ contains
       & required=.true.)
     call keys%list('fields', group%fields, 'fields to note', field_names, default="'displacement'")
   end subroutine visit_probe
+
+  !> `&study`
+  subroutine visit_study(keys, group)
+    type(keys_type), intent(inout) :: keys
+    type(study_group), intent(inout) :: group
+
+    call keys%key('vary', group%vary, 'the key that is varied: group%key, or key alone where it '// &
+      & 'is the only one of its name; group(2)%key where a group is repeated, key(2) for an '// &
+      & 'element', required=.true.)
+    call keys%words('values', group%values, 'its values, one for each run; of body%points the '// &
+      & 'count along x, the other counts follow in proportion', required=.true.)
+    call keys%key('together', group%together, 'goes in step with the group before it instead of '// &
+      & 'making the product')
+    call keys%key('measure', group%measure, 'a probe, a column of the history, or a field in '// &
+      & 'the final state', default='required in one group')
+    call keys%key('against', group%against, 'what it is compared with: analytic, a closed form; '// &
+      & 'finest, the run with the smallest spacing; or the name of a file, history.csv, a table '// &
+      & 'of positions and values, or results (.vtkhdf)', default='required in one group')
+    call keys%key('analytic', group%analytic, 'the closed form', allowed=closed_forms, &
+      & default='the one that fits the scene')
+    call keys%key('norm', group%norm, 'root mean square of the differences, the largest, or the '// &
+      & "root of their squares over the answer's", &
+      & allowed=[character(8) :: 'rms', 'maximum', 'relative'], default="'relative'")
+    call keys%key('region', group%region, 'field: name of a region whose points count', &
+      & default='all points of the bodies')
+  end subroutine visit_study
 
 end module pd_scene_groups

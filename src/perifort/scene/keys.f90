@@ -49,6 +49,7 @@ module pd_scene_keys
     procedure :: start_reading
     procedure :: finish_reading
     procedure :: triple
+    procedure :: words
     procedure, private :: text_key, integer_key, real_key, logical_key
     procedure, private :: integers_key, reals_key, matrix_key
     procedure, private :: real_list, text_list
@@ -400,6 +401,41 @@ contains
       end if
     end do
   end subroutine text_list
+
+  !> Values of any kind, as many as are given, kept as they are written: texts with their quotes.
+  subroutine words(keys, name, value, meaning, required)
+    class(keys_type), intent(inout) :: keys
+    character(*), intent(in) :: name
+    ! allow(C072): a text is assigned only after its length has been checked.
+    character(*), allocatable, intent(inout) :: value(:)
+    character(*), intent(in) :: meaning
+    logical, intent(in), optional :: required
+    integer, allocatable :: slots(:)
+    character(:), allocatable :: shown, word
+    integer :: i
+
+    shown = ''
+    if (allocated(value)) shown = join(value, ', ')
+    call keys%note_key(name, 'list', '', meaning, shown, '', required)
+    if (keys%mode /= mode_read) return
+    call keys%find(name, growing, slots)
+    call keys%note_missing(name, size(slots) == 0, required)
+    if (size(slots) == 0 .or. allocated(keys%fault)) return
+    call check_gaps(keys, name, slots)
+    if (allocated(keys%fault)) return
+    if (allocated(value)) deallocate (value)
+    allocate (value(size(slots)))
+    do i = 1, size(slots)
+      word = keys%source%tokens(slots(i))%text
+      if (keys%source%tokens(slots(i))%quoted) word = quoted_text(word)
+      if (len(word) > len(value)) then
+        call keys%complain(slots(i), "the text for key '"//name//"' is too long", &
+          & to_text(len(word))//' characters, at most '//to_text(len(value)))
+        return
+      end if
+      value(i) = word
+    end do
+  end subroutine words
 
   !> Keep what is known of a key.
   subroutine note_key(keys, name, kind, unit, meaning, shown, allowed, required, default)

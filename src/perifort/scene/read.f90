@@ -7,13 +7,13 @@ module pd_scene_read
   use pd_scene_groups, only: group_names, group_repeatable, visit_scene_header, visit_body, &
     & visit_remove, visit_region, visit_material, visit_horizon, visit_crack, visit_no_fail, &
     & visit_initial, visit_boundary, visit_load, visit_time, visit_relaxation, visit_output, &
-    & visit_probe
+    & visit_probe, visit_study
   use pd_scene_keys, only: keys_type
   use pd_scene_source, only: source_type, scan_source, source_fault
   use pd_scene_types, only: scene_type
   implicit none (type, external)
   private
-  public :: read_scene, read_scene_text
+  public :: read_scene, read_scene_text, read_scene_source
 
 contains
 
@@ -35,15 +35,25 @@ contains
     character(*), intent(in) :: name
     type(scene_type), intent(out) :: scene
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), target :: source
-    integer :: s
+    type(source_type) :: source
 
     call scan_source(text, name, source, error)
     if (allocated(error)) return
+    call read_scene_source(source, scene, error)
+    scene%text = text
+  end subroutine read_scene_text
+
+  !> Read a scene from a scanned file; its text is left empty.
+  subroutine read_scene_source(source, scene, error)
+    type(source_type), intent(in), target :: source
+    type(scene_type), intent(out) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    integer :: s
+
     call check_groups(source, error)
     if (allocated(error)) return
-    scene%file = name
-    scene%text = text
+    scene%file = source%file
+    scene%text = ''
     allocate (scene%bodies(number_of('body', source%section_count)))
     allocate (scene%removed(number_of('remove', source%section_count)))
     allocate (scene%regions(number_of('region', source%section_count)))
@@ -54,6 +64,7 @@ contains
     allocate (scene%boundaries(number_of('boundary', source%section_count)))
     allocate (scene%loads(number_of('load', source%section_count)))
     allocate (scene%probes(number_of('probe', source%section_count)))
+    allocate (scene%studies(number_of('study', source%section_count)))
     do s = 1, source%section_count
       call read_group(source, s, number_of(source%sections(s)%name, s), scene, error)
       if (allocated(error)) return
@@ -74,7 +85,7 @@ contains
       end do
     end function number_of
 
-  end subroutine read_scene_text
+  end subroutine read_scene_source
 
   !> Every group is a known one, and only repeatable ones are repeated.
   subroutine check_groups(source, error)
@@ -150,6 +161,8 @@ contains
       call visit_output(keys, scene%output)
     case ('probe')
       call visit_probe(keys, scene%probes(number))
+    case ('study')
+      call visit_study(keys, scene%studies(number))
     case default
       continue  ! callers know the names of all groups
     end select

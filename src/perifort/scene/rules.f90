@@ -11,7 +11,7 @@ module pd_scene_rules
   implicit none (type, external)
   private
   public :: rule_fault, given, check_known, check_unique, check_components, check_vector, &
-    & check_finite_box
+    & check_finite_box, find_section, find_entry
 
 contains
 

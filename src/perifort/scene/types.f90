@@ -7,7 +7,7 @@ module pd_scene_types
   private
   public :: scene_type, header_type, body_group, shape_group, material_group, horizon_group, &
     & crack_group, initial_group, boundary_group, load_group, time_group, relaxation_group, &
-    & output_group, probe_group, name_length, path_length, unset, is_set
+    & output_group, probe_group, study_group, name_length, path_length, unset, is_set
 
   integer, parameter :: name_length = 64    !! longest name of a body, region, ... [characters]
   integer, parameter :: path_length = 1024  !! longest file name [characters]
@@ -156,6 +156,18 @@ module pd_scene_types
     character(name_length), allocatable :: fields(:)
   end type probe_group
 
+  !> `&study`: one key that a study varies; what is measured stands in the first group that says so.
+  type :: study_group
+    character(name_length) :: vary = ''          !! `group%key`, `group(2)%key`, `key(1)`, ...
+    character(path_length), allocatable :: values(:)  !! as written, texts with their quotes
+    logical :: together = .false.                !! in step with the group before
+    character(name_length) :: measure = ''       !! a probe, a column of the history or a field
+    character(path_length) :: against = ''       !! 'analytic', 'finest' or the name of a file
+    character(name_length) :: analytic = ''      !! name of a closed form; '' = the one that fits
+    character(name_length) :: norm = ''          !! '' = 'relative'
+    character(name_length) :: region = ''        !! a field is measured here; '' = all body points
+  end type study_group
+
   !> Everything a scene file says.
   type :: scene_type
     character(:), allocatable :: file            !! where it was read from ('' = built in memory)
@@ -175,6 +187,7 @@ module pd_scene_types
     type(relaxation_group) :: relaxation
     type(output_group) :: output
     type(probe_group), allocatable :: probes(:)
+    type(study_group), allocatable :: studies(:)
   end type scene_type
 
 contains

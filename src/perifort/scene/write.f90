@@ -6,7 +6,7 @@ module pd_scene_write
   use pd_scene_groups, only: describe_group, group_purpose, group_names, visit_scene_header, &
     & visit_body, visit_remove, visit_region, visit_material, visit_horizon, visit_crack, &
     & visit_no_fail, visit_initial, visit_boundary, visit_load, visit_time, visit_relaxation, &
-    & visit_output, visit_probe
+    & visit_output, visit_probe, visit_study
   use pd_scene_keys, only: keys_type, key_info, mode_write
   use pd_scene_types, only: scene_type
   implicit none (type, external)
@@ -83,6 +83,8 @@ contains
       if (allocated(scene%loads)) number = size(scene%loads)
     case ('probe')
       if (allocated(scene%probes)) number = size(scene%probes)
+    case ('study')
+      if (allocated(scene%studies)) number = size(scene%studies)
     case default
       number = 1
     end select
@@ -126,6 +128,8 @@ contains
       call visit_output(keys, scene%output)
     case ('probe')
       call visit_probe(keys, scene%probes(i))
+    case ('study')
+      call visit_study(keys, scene%studies(i))
     case default
       continue  ! callers know the names of all groups
     end select

@@ -5,7 +5,7 @@ module pd_study_kernels
   use pd_base_clock, only: wall_time
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i8
-  use pd_base_numbers, only: pi
+  use pd_base_numbers, only: median, pi
   use pd_driver, only: prepare, set_up_type
   use pd_family_family, only: family_type
   use pd_family_lattice, only: both_ends, lattice_family_type
@@ -305,30 +305,5 @@ contains
     bytes = 400*points
     if (kernel%family == 'list') bytes = bytes + 13*bonds(kernel%dimension)*points
   end function bytes_needed
-
-  !> The numbers of `values` in ascending order of value.
-  pure function ascending(values) result(order)
-    real(wp), intent(in) :: values(:)
-    integer :: order(size(values))
-    integer :: i, j, this
-
-    order = [(i, i=1, size(values))]
-    do i = 2, size(values)
-      this = order(i)
-      do j = i - 1, 1, -1
-        if (values(order(j)) <= values(this)) exit
-        order(j + 1) = order(j)
-      end do
-      order(j + 1) = this
-    end do
-  end function ascending
-
-  !> The middle value, of an even number the lower of the two.
-  pure real(wp) function median(values)
-    real(wp), intent(in) :: values(:)
-    integer :: order(size(values))
-    order = ascending(values)
-    median = values(order((size(values) + 1)/2))
-  end function median
 
 end module pd_study_kernels

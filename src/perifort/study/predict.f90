@@ -1,0 +1,154 @@
+!> From the runs of a study to what has not been run (doc/theory.md, 11): error and time along one
+!> line, the runs that differ in one step h alone.
+!>
+!> The error is fitted by C (h^p - r^p), where r is the step of the run that all are compared with,
+!> 0 if they are compared with something exact; the time by c h^-q. Finer runs count twice as much
+!> as the next coarser ones.
+module pd_study_predict
+  use pd_base_kinds, only: wp
+  use pd_base_numbers, only: ascending
+  implicit none (type, external)
+  private
+  public :: law_type, fit_law, error_at, seconds_at
+
+  real(wp), parameter :: least_order = 0.15_wp   !! below it the error does not fall with the step
+  real(wp), parameter :: most_order = 8.0_wp
+
+  !> What the runs of a line say. Runs are kept from coarse to fine.
+  type :: law_type
+    integer :: n = 0
+    real(wp), allocatable :: h(:), error(:), seconds(:)
+    real(wp) :: reference = 0.0_wp        !! r
+    real(wp) :: log_factor = 0.0_wp       !! log C
+    real(wp) :: order = 0.0_wp            !! p
+    logical :: extrapolates = .false.     !! the fit holds beyond the finest run
+    real(wp) :: margin = 1.1_wp           !! the scatter of the runs about the fit, as a factor
+    real(wp) :: slope = 0.0_wp            !! q
+    real(wp) :: log_cost = 0.0_wp         !! log c
+  end type law_type
+
+contains
+
+  !> Fit runs of steps `h` with their errors and times. With a single run there is no fit.
+  pure subroutine fit_law(h, error, seconds, reference, law)
+    real(wp), intent(in) :: h(:), error(:), seconds(:)
+    real(wp), intent(in) :: reference
+    type(law_type), intent(out) :: law
+    integer :: order(size(h)), i
+    real(wp) :: p, misfit, least, log_factor
+
+    law%n = size(h)
+    order = ascending(-h)
+    law%h = h(order)
+    law%error = error(order)
+    law%seconds = max(seconds(order), tiny(1.0_wp))
+    law%reference = reference
+    if (law%n < 2) return
+    law%extrapolates = all(law%error > 0.0_wp) .and. all(law%h > reference)
+    call line(log(law%h), log(law%seconds), law%log_cost, law%slope)
+    ! never cheaper when finer, whatever a restless clock says
+    law%slope = max(0.0_wp, -law%slope)
+    law%log_cost = log(law%seconds(law%n)) + law%slope*log(law%h(law%n))
+    if (.not. law%extrapolates) return
+    least = huge(least)
+    do i = 1, 400
+      p = most_order*i/400
+      call misfit_of(law, p, log_factor, misfit)
+      if (misfit >= least) cycle
+      least = misfit
+      law%order = p
+      law%log_factor = log_factor
+    end do
+    law%extrapolates = law%order >= least_order
+    law%margin = min(1.5_wp, max(1.1_wp, exp(sqrt(least))))
+  end subroutine fit_law
+
+  !> The best factor for an order, and the mean square of what is left of the errors' logarithms.
+  pure subroutine misfit_of(law, p, log_factor, misfit)
+    type(law_type), intent(in) :: law
+    real(wp), intent(in) :: p
+    real(wp), intent(out) :: log_factor, misfit
+    real(wp) :: rest(law%n), weight(law%n)
+
+    rest = log(law%error) - log(law%h**p - law%reference**p)
+    weight = weights(law%n)
+    log_factor = sum(weight*rest)
+    misfit = sum(weight*(rest - log_factor)**2)
+  end subroutine misfit_of
+
+  !> Twice as much for each finer run; their sum is 1.
+  pure function weights(n) result(weight)
+    integer, intent(in) :: n
+    real(wp) :: weight(n)
+    integer :: i
+    weight = [(2.0_wp**(i - n), i=1, n)]
+    weight = weight/sum(weight)
+  end function weights
+
+  !> The line y = start + slope x by weighted least squares.
+  pure subroutine line(x, y, start, slope)
+    real(wp), intent(in) :: x(:), y(:)
+    real(wp), intent(out) :: start, slope
+    real(wp) :: weight(size(x)), mean_x, mean_y
+
+    weight = weights(size(x))
+    mean_x = sum(weight*x)
+    mean_y = sum(weight*y)
+    slope = sum(weight*(x - mean_x)*(y - mean_y))/max(sum(weight*(x - mean_x)**2), tiny(1.0_wp))
+    start = mean_y - slope*mean_x
+  end subroutine line
+
+  !> The error to be expected at a step. Between runs it is interpolated, where a run counts no
+  !> better than any finer one: what a coarse run does better, it owes to chance. Beyond the finest
+  !> run it is the fit's, moved up to that run if the fit lies below it; huge where nothing is
+  !> known, and at steps coarser than the coarsest run's, which may be unstable.
+  pure real(wp) function error_at(law, h) result(error)
+    type(law_type), intent(in) :: law
+    real(wp), intent(in) :: h
+    real(wp) :: part, above
+    integer :: i
+
+    error = huge(1.0_wp)
+    if (law%n == 0) return
+    do i = 1, law%n
+      if (abs(h - law%h(i)) > 1.0e-9_wp*h) cycle
+      error = maxval(law%error(i:))
+      return
+    end do
+    if (h > law%h(1)) return
+    if (h > law%h(law%n)) then
+      do i = 1, law%n - 1
+        if (h > law%h(i + 1)) exit
+      end do
+      if (minval(law%error(i:)) <= 0.0_wp) return
+      part = log(law%h(i)/h)/log(law%h(i)/law%h(i + 1))
+      error = exp((1 - part)*log(maxval(law%error(i:))) + part*log(maxval(law%error(i + 1:))))
+    else if (law%extrapolates .and. h > law%reference) then
+      above = max(0.0_wp, log(law%error(law%n)) - log_fit(law, law%h(law%n)))
+      error = exp(above + log_fit(law, h))
+    end if
+  end function error_at
+
+  pure real(wp) function log_fit(law, h)
+    type(law_type), intent(in) :: law
+    real(wp), intent(in) :: h
+    log_fit = law%log_factor + log(h**law%order - law%reference**law%order)
+  end function log_fit
+
+  !> The time to be expected at a step [s]: interpolated between runs, and by the fit beyond.
+  pure real(wp) function seconds_at(law, h) result(seconds)
+    type(law_type), intent(in) :: law
+    real(wp), intent(in) :: h
+    real(wp) :: part
+    integer :: i
+
+    seconds = exp(law%log_cost - law%slope*log(h))
+    if (law%n == 1) seconds = law%seconds(1)
+    do i = 1, law%n - 1
+      if (h > law%h(i) .or. h < law%h(i + 1)) cycle
+      part = log(law%h(i)/h)/log(law%h(i)/law%h(i + 1))
+      seconds = exp((1 - part)*log(law%seconds(i)) + part*log(law%seconds(i + 1)))
+    end do
+  end function seconds_at
+
+end module pd_study_predict
