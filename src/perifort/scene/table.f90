@@ -30,7 +30,7 @@ contains
   !> Read the table at `path`.
   !>
   !> `columns`: how many there must be (default: as many as in the first row). `allowed`: the names
-  !> that a header may use, of size 0 for any; with it a header is required, without it none may
+  !> that a header may use, '*' for any; with it a header is required, without it none may
   !> stand.
   subroutine read_table(path, table, error, columns, allowed)
     character(*), intent(in) :: path
@@ -118,7 +118,7 @@ contains
         call next_word(text(:last), final, first)
         word = lower_case(text(first:final))
         names(i) = word
-        if (size(allowed) > 0 .and. all(allowed /= word)) then
+        if (all(allowed /= word .and. allowed /= '*')) then
           note = 'allowed: '//join(allowed, ', ')
           nearest = nearest_name(word, allowed)
           if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note

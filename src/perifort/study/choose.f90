@@ -12,8 +12,8 @@ module pd_study_choose
   use pd_driver, only: run_options_type
   use pd_scene_types, only: path_length
   use pd_scene_values, only: exact_text
-  use pd_study_front, only: step_variable
-  use pd_study_plan, only: plan_type, scene_of, size_up, trial_type
+  use pd_study_front, only: is_step, step_variable
+  use pd_study_plan, only: plan_type, scene_of, size_up, trial_type, variable_type
   use pd_study_predict, only: error_at, fit_law, law_type, seconds_at
   use pd_study_study, only: add_trial, begin_study, run_all, run_one, say, session_type
   use pd_study_table, only: settings_text, table_text
@@ -138,12 +138,7 @@ contains
       if (plan%variables(free)%refines .and. follows(free)) return
     end do
     do free = 1, size(plan%variables)
-      associate (target => plan%variables(free)%target)
-        if (target%group == 'time' .and. (target%key == 'step' .or. target%key == 'safety') .or. &
-          & target%group == 'relaxation' .and. target%key == 'tolerance') then
-          if (follows(free)) return
-        end if
-      end associate
+      if (is_step(plan, free) .and. follows(free)) return
     end do
     free = 0
 
@@ -220,10 +215,11 @@ contains
     real(wp), parameter :: fine = 1.01_wp   ! factor from step to step
     character(path_length), allocatable :: words(:)
     real(wp) :: h, expected
-    integer :: i
+    integer :: i, multiple
     logical :: refines
 
     refines = plan%variables(free)%refines
+    multiple = count_step(plan%variables(free))
     ! the runs themselves: what they gave is known
     do i = 1, law%n
       words = words_at(plan, free, t, law%h(i))
@@ -233,8 +229,7 @@ contains
     h = law%h(1)
     do while (h > law%h(law%n)/reach)
       if (refines) then
-        h = 1/(plan%variables(free)%step*max(1.0_wp, real(ceiling(fine/h &
-          & /plan%variables(free)%step - 1.0e-9_wp), wp)))
+        h = 1/real(multiple*ceiling(fine/h/multiple - 1.0e-9_wp), wp)
       else
         h = h/fine
       end if
@@ -245,6 +240,14 @@ contains
       if (expected <= target/law%margin .and. h < law%h(law%n)) exit
     end do
   end subroutine search_line
+
+  !> Counts of points are multiples of this: whole in all directions, and even where all listed ones
+  !> are, since the middle of a body lies on a point or between two by that.
+  pure integer function count_step(variable) result(step)
+    type(variable_type), intent(in) :: variable
+    step = variable%step
+    if (modulo(step, 2) == 1 .and. all(modulo(nint(variable%numbers), 2) == 0)) step = 2*step
+  end function count_step
 
   !> The words of run `t` with another step on the axis of `free`; what goes in step with it follows
   !> a power law through the nearest two of its values.

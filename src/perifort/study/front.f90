@@ -5,7 +5,7 @@ module pd_study_front
   use pd_study_trial, only: outcome_type
   implicit none (type, external)
   private
-  public :: mark_front, on_front, order_type, observed_orders, step_variable
+  public :: mark_front, on_front, order_type, observed_orders, step_variable, is_step
 
   !> Observed order of convergence between two runs that differ in one variable (and in what goes in
   !> step with it).
@@ -54,8 +54,21 @@ contains
     if (plan%variables(variable)%refines) step = 1/value
   end function step_variable
 
+  !> Whether the error ought to vanish with a variable: points, the time step and its safety, the
+  !> tolerance.
+  pure logical function is_step(plan, v)
+    type(plan_type), intent(in) :: plan
+    integer, intent(in) :: v
+    associate (variable => plan%variables(v))
+      is_step = variable%refines .or. variable%target%group == 'time' .and. &
+        & (variable%target%key == 'step' .or. variable%target%key == 'safety') .or. &
+        & variable%target%group == 'relaxation' .and. variable%target%key == 'tolerance'
+      is_step = is_step .and. variable%numeric
+    end associate
+  end function is_step
+
   !> Orders between neighbouring values of each axis, everything else the same. Of variables that
-  !> go in step the first numeric one counts.
+  !> go in step the first one counts.
   pure subroutine observed_orders(plan, outcomes, orders)
     type(plan_type), intent(in) :: plan
     type(outcome_type), intent(in) :: outcomes(:)
@@ -65,10 +78,10 @@ contains
 
     allocate (orders(0))
     do v = 1, size(plan%variables)
-      if (.not. plan%variables(v)%numeric) cycle
+      if (.not. is_step(plan, v)) cycle
       if (v > 1) then
-        if (any(plan%variables(:v - 1)%axis == plan%variables(v)%axis .and. &
-          & plan%variables(:v - 1)%numeric)) cycle
+        if (any([(is_step(plan, i) .and. plan%variables(i)%axis == plan%variables(v)%axis, &
+          & i=1, v - 1)])) cycle
       end if
       do i = 1, size(outcomes)
         if (.not. usable(outcomes(i))) cycle

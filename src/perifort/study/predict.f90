@@ -2,8 +2,8 @@
 !> line, the runs that differ in one step h alone.
 !>
 !> The error is fitted by C (h^p - r^p), where r is the step of the run that all are compared with,
-!> 0 if they are compared with something exact; the time by c h^-q. Finer runs count twice as much
-!> as the next coarser ones.
+!> 0 if they are compared with something exact; the time by c h^-q. A run counts half as much again
+!> as the next coarser one.
 module pd_study_predict
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: ascending
@@ -12,7 +12,9 @@ module pd_study_predict
   public :: law_type, fit_law, error_at, seconds_at
 
   real(wp), parameter :: least_order = 0.15_wp   !! below it the error does not fall with the step
+  real(wp), parameter :: least_with_reference = 0.5_wp  !! the error falls to 0 there in any case
   real(wp), parameter :: most_order = 8.0_wp
+  real(wp), parameter :: favour = 1.5_wp         !! weight of a run over that of the next coarser
 
   !> What the runs of a line say. Runs are kept from coarse to fine.
   type :: law_type
@@ -22,7 +24,7 @@ module pd_study_predict
     real(wp) :: log_factor = 0.0_wp       !! log C
     real(wp) :: order = 0.0_wp            !! p
     logical :: extrapolates = .false.     !! the fit holds beyond the finest run
-    real(wp) :: margin = 1.1_wp           !! the scatter of the runs about the fit, as a factor
+    real(wp) :: margin = 1.1_wp           !! what the scatter of the runs about the fit asks for
     real(wp) :: slope = 0.0_wp            !! q
     real(wp) :: log_cost = 0.0_wp         !! log c
   end type law_type
@@ -35,7 +37,8 @@ contains
     real(wp), intent(in) :: reference
     type(law_type), intent(out) :: law
     integer :: order(size(h)), i
-    real(wp) :: p, misfit, least, log_factor
+    real(wp) :: p, misfit, log_factor
+    integer :: last
 
     law%n = size(h)
     order = ascending(-h)
@@ -50,38 +53,53 @@ contains
     law%slope = max(0.0_wp, -law%slope)
     law%log_cost = log(law%seconds(law%n)) + law%slope*log(law%h(law%n))
     if (.not. law%extrapolates) return
-    least = huge(least)
-    do i = 1, 400
-      p = most_order*i/400
-      call misfit_of(law, p, log_factor, misfit)
-      if (misfit >= least) cycle
-      least = misfit
-      law%order = p
-      law%log_factor = log_factor
-    end do
+    call fit_order(law, 1, law%order, law%log_factor, misfit)
+    law%margin = min(2.0_wp, max(1.1_wp, exp(2*sqrt(misfit))))
+    ! an error that has begun to level off goes on as the last runs do
+    last = law%n - 2
+    if (last > 1) then
+      call fit_order(law, last, p, log_factor, misfit)
+      if (p < law%order) then
+        law%order = p
+        law%log_factor = log_factor
+      end if
+    end if
     law%extrapolates = law%order >= least_order
-    law%margin = min(1.5_wp, max(1.1_wp, exp(sqrt(least))))
   end subroutine fit_law
 
-  !> The best factor for an order, and the mean square of what is left of the errors' logarithms.
-  pure subroutine misfit_of(law, p, log_factor, misfit)
+  !> The order that fits runs `first` .. best, with its factor, and the mean square of what is left of
+  !> the errors' logarithms.
+  pure subroutine fit_order(law, first, order, log_factor, misfit)
     type(law_type), intent(in) :: law
-    real(wp), intent(in) :: p
-    real(wp), intent(out) :: log_factor, misfit
-    real(wp) :: rest(law%n), weight(law%n)
+    integer, intent(in) :: first
+    real(wp), intent(out) :: order, log_factor, misfit
+    integer, parameter :: tries = 400
+    real(wp) :: rest(law%n - first + 1), weight(law%n - first + 1), p, factor, square
+    integer :: i
 
-    rest = log(law%error) - log(law%h**p - law%reference**p)
-    weight = weights(law%n)
-    log_factor = sum(weight*rest)
-    misfit = sum(weight*(rest - log_factor)**2)
-  end subroutine misfit_of
+    misfit = huge(misfit)
+    order = 0.0_wp
+    log_factor = 0.0_wp
+    weight = weights(size(weight))
+    do i = 1, tries
+      p = most_order*i/tries
+      if (law%reference > 0.0_wp .and. p < least_with_reference) cycle
+      rest = log(law%error(first:)) - log(law%h(first:)**p - law%reference**p)
+      factor = sum(weight*rest)
+      square = sum(weight*(rest - factor)**2)
+      if (square >= misfit) cycle
+      misfit = square
+      order = p
+      log_factor = factor
+    end do
+  end subroutine fit_order
 
-  !> Twice as much for each finer run; their sum is 1.
+  !> More for each finer run; their sum is 1.
   pure function weights(n) result(weight)
     integer, intent(in) :: n
     real(wp) :: weight(n)
     integer :: i
-    weight = [(2.0_wp**(i - n), i=1, n)]
+    weight = [(favour**(i - n), i=1, n)]
     weight = weight/sum(weight)
   end function weights
 
@@ -100,8 +118,9 @@ contains
 
   !> The error to be expected at a step. Between runs it is interpolated, where a run counts no
   !> better than any finer one: what a coarse run does better, it owes to chance. Beyond the finest
-  !> run it is the fit's, moved up to that run if the fit lies below it; huge where nothing is
-  !> known, and at steps coarser than the coarsest run's, which may be unstable.
+  !> run it is the fit's, moved up to that run if the fit lies below it, but no nearer to the run
+  !> that all are compared with than twice its step: there that run says more of itself. Huge where
+  !> nothing is known, and at steps coarser than the coarsest run's, which may be unstable.
   pure real(wp) function error_at(law, h) result(error)
     type(law_type), intent(in) :: law
     real(wp), intent(in) :: h
@@ -123,7 +142,7 @@ contains
       if (minval(law%error(i:)) <= 0.0_wp) return
       part = log(law%h(i)/h)/log(law%h(i)/law%h(i + 1))
       error = exp((1 - part)*log(maxval(law%error(i:))) + part*log(maxval(law%error(i + 1:))))
-    else if (law%extrapolates .and. h > law%reference) then
+    else if (law%extrapolates .and. h > 2*law%reference*(1 - 1.0e-9_wp)) then
       above = max(0.0_wp, log(law%error(law%n)) - log_fit(law, law%h(law%n)))
       error = exp(above + log_fit(law, h))
     end if

@@ -5,8 +5,7 @@ module pd_study_reference
   use pd_base_text, only: lower_case, to_text
   use pd_family_cells, only: cells_type
   use pd_output_datasets, only: get_shape, read_rows
-  use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
-  use pd_scene_file, only: resolve_path
+  use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file, start_hdf5
   use pd_scene_table, only: column_of, read_table, table_type
   use pd_scene_types, only: name_length
   use pd_study_closed_form, only: closed_form_type, components_of, field_at
@@ -115,22 +114,15 @@ contains
   !> What a file says of the measure: `.vtkhdf` results, or a table whose first line names its
   !> columns. Histories need `time` and the column itself or the probe's columns; fields need
   !> `x` .. and the field's columns.
-  subroutine read_reference(name, scene_file, measure, probe, dim, record, error)
-    character(*), intent(in) :: name, scene_file
+  subroutine read_reference(path, measure, probe, dim, record, error)
+    character(*), intent(in) :: path
     type(measure_type), intent(in) :: measure
     character(*), intent(in) :: probe            !! name of the probe, '' without
     integer, intent(in) :: dim
     type(record_type), intent(out) :: record
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: path
-    logical :: exists
 
-    path = resolve_path(name, scene_file)
-    inquire (file=path, exist=exists)
-    if (.not. exists) then
-      call fail(error, "cannot find the file '"//path//"' that &study compares 'against'; "// &
-        & "expected 'analytic', 'finest' or the name of a file")
-    else if (ending(path) == '.vtkhdf') then
+    if (ending(path) == '.vtkhdf') then
       call read_results(path, measure, probe, dim, record, error)
     else
       call read_columns(path, measure, probe, dim, record, error)
@@ -181,7 +173,7 @@ contains
     integer, allocatable :: number(:)
     integer :: c, n, first
 
-    call read_table(path, table, error, allowed=[character(1) ::])
+    call read_table(path, table, error, allowed=['*'])
     if (allocated(error)) return
     first = 1
     names = [[character(name_length) :: 'time'], columns_of(measure, probe, dim)]
@@ -233,6 +225,8 @@ contains
     type(hdf5_file) :: file
     type(error_type), allocatable :: late
 
+    call start_hdf5(error)
+    if (allocated(error)) return
     call open_file(path, .false., file, error)
     if (allocated(error)) return
     if (measure%kind == of_field) then

@@ -10,12 +10,13 @@ module pd_study_study
   use pd_base_text, only: to_text, with_unit
   use pd_driver, only: output_directory, run_options_type
   use pd_output_files, only: file_exists, in_directory, make_directory
+  use pd_scene_file, only: resolve_path
   use pd_scene_rules, only: find_entry, find_section, rule_fault
   use pd_scene_types, only: is_set, scene_type
   use pd_study_analytic, only: find_form
   use pd_study_closed_form, only: closed_form_type
   use pd_study_front, only: mark_front
-  use pd_study_measure, only: measure_type, measure_unit, record_type, resolve_measure
+  use pd_study_measure, only: measure_type, measure_unit, of_column, record_type, resolve_measure
   use pd_study_plan, only: plan_study, plan_type, trial_type
   use pd_study_reference, only: judge_by_form, judge_by_record, read_reference
   use pd_study_table, only: csv_text, head_text, put_file, row_text, settings_text, table_text
@@ -127,12 +128,17 @@ contains
     type(session_type), intent(inout) :: session
     type(error_type), allocatable, intent(out) :: error
     type(closed_form_type) :: form
-    character(:), allocatable :: reason, probe
+    character(:), allocatable :: reason, probe, path
     integer :: t
 
     associate (plan => session%plan)
       select case (plan%against)
       case ('analytic')
+        if (session%measure%kind == of_column) then
+          call at_key(plan, 'measure', "no closed form knows the column '"//plan%measure//"'", &
+            & 'closed forms are compared with a probe or a field', error)
+          return
+        end if
         do t = 1, size(plan%trials)
           call find_form(plan%analytic, plan%trials(t)%scene, form, reason)
           if (len(reason) == 0) cycle
@@ -148,7 +154,13 @@ contains
       case default
         probe = ''
         if (session%measure%probe > 0) probe = trim(plan%scene%probes(session%measure%probe)%name)
-        call read_reference(plan%against, plan%scene%file, session%measure, probe, &
+        path = resolve_path(plan%against, plan%scene%file)
+        if (.not. file_exists(path)) then
+          call at_key(plan, 'against', "cannot find the file '"//path//"'", &
+            & "expected 'analytic', 'finest' or the name of a file", error)
+          return
+        end if
+        call read_reference(path, session%measure, probe, &
           & plan%scene%header%dimension, session%truth, error)
       end select
     end associate
