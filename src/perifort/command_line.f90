@@ -421,9 +421,9 @@ contains
         & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
         & '', &
         & 'Run the scene in FILE with all the values that its groups &study name, and tell for', &
-        & 'each run error, time, points, bonds, steps, memory and energy drift, which runs are on', &
-        & 'the Pareto front, and the observed orders of convergence. Writes study.csv (complete', &
-        & 'after every run) and study.txt; ./pf plot draws them. The results of the runs are not', &
+        & 'each run error, time, points, bonds, steps, memory and energy drift, which runs are', &
+        & 'on the Pareto front, and the observed orders of convergence. Writes study.csv, whole', &
+        & 'after every run, and study.txt; ./pf plot draws them. Results of the runs are not', &
         & 'kept.', &
         & '', &
         & '  --output DIR    folder of the tables (default: out/ and the name of the file)', &
@@ -436,13 +436,13 @@ contains
         & 'perifort choose FILE --error E [--time T] [--output DIR] [--threads N] [--overwrite]', &
         & '                [--quiet]', &
         & '', &
-        & 'Run the study in FILE, extrapolate error and time, and print the cheapest settings that', &
-        & 'meet an error; then run them and tell how far off the prediction was. Exit status 1 if', &
-        & 'the error is missed.', &
+        & 'Run the study in FILE, extrapolate error and time, and print the cheapest settings', &
+        & 'that meet an error; then run them and tell how far off the prediction was. Exit', &
+        & 'status 1 if the error is missed.', &
         & '', &
         & '  --error E       the error to be met, in the norm and unit of the study', &
-        & '  --time T        the longest that the chosen run may take [s]; if the error cannot be', &
-        & '                  met within it, the best settings that keep it', &
+        & '  --time T        the longest that the chosen run may take [s]; if the error cannot', &
+        & '                  be met within it, the best settings that keep it', &
         & '  --output DIR    folder of the tables (default: out/ and the name of the file)', &
         & '  --threads N     number of threads, the same for all runs', &
         & '  --overwrite     replace a study that is there', &

@@ -356,6 +356,7 @@ contains
     else
       allocate (extents(merge(2, 1, index(target%kind, ',') > 0)), source=0)
       read (target%kind(opening + 1:len(target%kind) - 1), *, iostat=status) extents
+      if (status /= 0) extents = 0
     end if
   end subroutine extents_of
 

@@ -6,10 +6,11 @@ module pd_scene_convert
   use pd_base_kinds, only: wp
   use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_source, only: token_type
-  use pd_scene_values, only: parse_integer, parse_logical, parse_real
+  use pd_scene_values, only: parse_integer, parse_logical, parse_real, quoted_text
   implicit none (type, external)
   private
-  public :: to_real, to_integer, to_logical, to_string, real_range, integer_range, unit_note
+  public :: to_real, to_integer, to_logical, to_string, to_word, real_range, integer_range, &
+    & unit_note
 
   character(*), parameter :: word_characters = &
     & 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-'  !! of names
@@ -93,6 +94,27 @@ contains
       value = found
     end if
   end subroutine to_logical
+
+  !> Any value as it is written, a text with its quotes.
+  subroutine to_word(token, name, value, message, note)
+    type(token_type), intent(in) :: token
+    character(*), intent(in) :: name
+    ! allow(C072): a text is assigned only after its length has been checked.
+    character(*), intent(inout) :: value
+    character(:), allocatable, intent(out) :: message, note
+    character(:), allocatable :: word
+
+    message = ''
+    note = ''
+    word = token%text
+    if (token%quoted) word = quoted_text(word)
+    if (len(word) <= len(value)) then
+      value = word
+    else
+      message = "the text for key '"//name//"' is too long"
+      note = to_text(len(word))//' characters, at most '//to_text(len(value))
+    end if
+  end subroutine to_word
 
   !> A text in quotes: one of `allowed` in any case, or, with `word`, a name that can stand in
   !> column headers. It must fit into `value`.

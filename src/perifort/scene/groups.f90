@@ -93,8 +93,8 @@ contains
     case ('probe')
       purpose = 'The values of the nearest point in every row of the history.'
     case ('study')
-      purpose = 'A key that `perifort study` and `choose` vary. Several groups make the product '// &
-        & 'of their values; what is measured need stand in one of them only. '// &
+      purpose = 'A key that `perifort study` and `choose` vary. Several groups make the '// &
+        & 'product of their values; what is measured need stand in one of them only. '// &
         & '`run` passes over it.'
     case default
       purpose = ''
@@ -443,22 +443,22 @@ contains
     type(keys_type), intent(inout) :: keys
     type(study_group), intent(inout) :: group
 
-    call keys%key('vary', group%vary, 'the key that is varied: group%key, or key alone where it '// &
-      & 'is the only one of its name; group(2)%key where a group is repeated, key(2) for an '// &
+    call keys%key('vary', group%vary, 'the key that is varied: group%key, or key alone where '// &
+      & 'it is the only one of its name; group(2)%key where a group is repeated, key(2) for an '// &
       & 'element', required=.true.)
     call keys%words('values', group%values, 'its values, one for each run; of body%points the '// &
       & 'count along x, the other counts follow in proportion', required=.true.)
-    call keys%key('together', group%together, 'goes in step with the group before it instead of '// &
-      & 'making the product')
+    call keys%key('together', group%together, 'goes in step with the group before it instead '// &
+      & 'of making the product')
     call keys%key('measure', group%measure, 'a probe, a column of the history, or a field in '// &
       & 'the final state', default='required in one group')
-    call keys%key('against', group%against, 'what it is compared with: analytic, a closed form; '// &
-      & 'finest, the run with the smallest spacing; or the name of a file, history.csv, a table '// &
-      & 'of positions and values, or results (.vtkhdf)', default='required in one group')
+    call keys%key('against', group%against, 'what it is compared with: analytic, a closed '// &
+      & 'form; finest, the run with the smallest spacing; or the name of a file, history.csv, '// &
+      & 'a table of positions and values, or results (.vtkhdf)', default='required in one group')
     call keys%key('analytic', group%analytic, 'the closed form', allowed=closed_forms, &
       & default='the one that fits the scene')
-    call keys%key('norm', group%norm, 'root mean square of the differences, the largest, or the '// &
-      & "root of their squares over the answer's", &
+    call keys%key('norm', group%norm, 'root mean square of the differences, the largest, or '// &
+      & "the root of their squares over the answer's", &
       & allowed=[character(8) :: 'rms', 'maximum', 'relative'], default="'relative'")
     call keys%key('region', group%region, 'field: name of a region whose points count', &
       & default='all points of the bodies')

@@ -9,12 +9,12 @@ module pd_scene_keys
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
   use pd_base_text, only: join, nearest_name, to_text
-  use pd_scene_convert, only: to_real, to_integer, to_logical, to_string, real_range, &
+  use pd_scene_convert, only: to_real, to_integer, to_logical, to_string, to_word, real_range, &
     & integer_range, unit_note
   use pd_scene_elements, only: find_elements, growing
   use pd_scene_source, only: source_type, source_fault
   use pd_scene_types, only: is_set
-  use pd_scene_values, only: exact_text, list_text, quoted_text
+  use pd_scene_values, only: exact_text, list_text, quoted_text, vector_text
   implicit none (type, external)
   private
   public :: keys_type, key_info, mode_read, mode_describe, mode_write
@@ -237,12 +237,7 @@ contains
     character(:), allocatable :: shown, message, note
     integer :: i
 
-    shown = ''
-    do i = 1, size(value)
-      if (all(value(i:) == 0)) exit
-      if (i > 1) shown = shown//', '
-      shown = shown//to_text(value(i))
-    end do
+    shown = list_text(value(:findloc(value /= 0, .true., dim=1, back=.true.)))
     call keys%note_key(name, 'integer('//to_text(size(value))//')', unit, meaning, shown, &
       & integer_range(at_least), required, default)
     if (keys%mode /= mode_read) return
@@ -265,22 +260,10 @@ contains
     character(*), intent(in), optional :: default
     logical, intent(in), optional :: hidden
     integer, allocatable :: slots(:)
-    integer :: i, last
+    integer :: i
     character(:), allocatable :: shown, message, note
 
-    shown = ''
-    last = count(is_set(value))
-    if (all(is_set(value(:last)))) then
-      shown = list_text(value(:last))
-    else
-      ! A gap: the elements are spelled one by one, the first without its own key name.
-      do i = 1, size(value)
-        if (.not. is_set(value(i))) cycle
-        if (len(shown) > 0) shown = shown//', '
-        shown = shown//name//'('//to_text(i)//') = '//exact_text(value(i))
-      end do
-      shown = shown(len(name) + 1:)
-    end if
+    shown = vector_text(name, value, is_set(value))
     if (present(hidden)) then
       if (hidden) shown = ''
     end if
@@ -355,8 +338,6 @@ contains
     if (keys%mode /= mode_read) return
     call keys%find(name, growing, slots)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call check_gaps(keys, name, slots)
-    if (allocated(keys%fault)) return
     if (allocated(value)) deallocate (value)
     allocate (value(size(slots)), source=0.0_wp)
     do i = 1, size(slots)
@@ -385,8 +366,6 @@ contains
     if (keys%mode /= mode_read) return
     call keys%find(name, growing, slots)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call check_gaps(keys, name, slots)
-    if (allocated(keys%fault)) return
     if (allocated(value)) deallocate (value)
     allocate (value(size(slots)))
     do i = 1, size(slots)
@@ -411,7 +390,7 @@ contains
     character(*), intent(in) :: meaning
     logical, intent(in), optional :: required
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown, word
+    character(:), allocatable :: shown, message, note
     integer :: i
 
     shown = ''
@@ -421,19 +400,11 @@ contains
     call keys%find(name, growing, slots)
     call keys%note_missing(name, size(slots) == 0, required)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call check_gaps(keys, name, slots)
-    if (allocated(keys%fault)) return
     if (allocated(value)) deallocate (value)
     allocate (value(size(slots)))
     do i = 1, size(slots)
-      word = keys%source%tokens(slots(i))%text
-      if (keys%source%tokens(slots(i))%quoted) word = quoted_text(word)
-      if (len(word) > len(value)) then
-        call keys%complain(slots(i), "the text for key '"//name//"' is too long", &
-          & to_text(len(word))//' characters, at most '//to_text(len(value)))
-        return
-      end if
-      value(i) = word
+      call to_word(keys%source%tokens(slots(i)), name, value(i), message, note)
+      call keys%complain(slots(i), message, note)
     end do
   end subroutine words
 
@@ -477,6 +448,8 @@ contains
 
     call find_elements(keys%source, keys%section, name, extents, slots, keys%used, error)
     if (allocated(error) .and. .not. allocated(keys%fault)) call move_alloc(error, keys%fault)
+    if (all(extents == growing(1)) .and. size(extents) == 1 .and. .not. allocated(keys%fault)) &
+      & call check_gaps(keys, name, slots)
   end subroutine find
 
   !> Keep the first fault of a value; a message '' is none.

@@ -7,14 +7,15 @@ module pd_scene_values
   use pd_base_text, only: lower_case, to_text
   implicit none (type, external)
   private
-  public :: parse_real, parse_integer, parse_logical, exact_text, quoted_text, list_text
+  public :: parse_real, parse_integer, parse_logical, exact_text, quoted_text, list_text, &
+    & vector_text
 
   character(*), parameter :: digits = '0123456789'
   integer, parameter :: largest_exponent = 300  !! beyond it a sum of squares overflows anyway
 
   !> Values as they stand after a key, parted by commas.
   interface list_text
-    module procedure :: reals_text, texts_text
+    module procedure :: reals_text, integers_text, texts_text
   end interface list_text
 
 contains
@@ -152,6 +153,41 @@ contains
       text = text//exact_text(values(i))
     end do
   end function reals_text
+
+  !> Whole numbers parted by commas.
+  pure function integers_text(values) result(text)
+    integer, intent(in) :: values(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(values)
+      if (i > 1) text = text//', '
+      text = text//to_text(values(i))
+    end do
+  end function integers_text
+
+  !> The given elements of a vector as they stand behind its key and a `=`. Where there is a gap the
+  !> elements are spelled one by one, the first without the key's own name.
+  function vector_text(name, values, given) result(text)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: values(:)
+    logical, intent(in) :: given(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    if (all(given(:count(given)))) then
+      text = list_text(values(:count(given)))
+      return
+    end if
+    text = ''
+    do i = 1, size(values)
+      if (.not. given(i)) cycle
+      if (len(text) > 0) text = text//', '
+      text = text//name//'('//to_text(i)//') = '//exact_text(values(i))
+    end do
+    text = text(len(name) + 1:)
+  end function vector_text
 
   !> Quoted texts parted by commas.
   pure function texts_text(values) result(text)

@@ -1,5 +1,5 @@
-!> `perifort choose`: the cheapest settings that meet an error, foretold from the runs of a study and
-!> then run.
+!> `perifort choose`: the cheapest settings that meet an error, foretold from the runs of a study
+!> and then run.
 !>
 !> One variable may take values between and beyond its listed ones: the number of points, or else
 !> the time step, its safety or the tolerance. The runs that differ in it alone make a line with its
@@ -35,8 +35,8 @@ module pd_study_choose
 
 contains
 
-  !> The whole command. `target`: the error to be met; `limit`: the longest a run may take [s], 0 for
-  !> any. An error with the status of bad input if the target is missed.
+  !> The whole command. `target`: the error to be met; `limit`: the longest a run may take [s], 0
+  !> for any. An error with the status of bad input if the target is missed.
   subroutine run_choose(path, options, target, limit, error)
     character(*), intent(in) :: path
     type(run_options_type), intent(in) :: options
@@ -291,6 +291,7 @@ contains
     end do
     write (rounded, '(es10.3)') value
     read (rounded, *, iostat=status) kept
+    if (status /= 0) kept = value
     word = exact_text(kept)
   end function listed_or_exact
 

@@ -1,4 +1,4 @@
-!> What the runs of a study say together: which are on the Pareto front, and how fast the error falls.
+!> What the runs of a study say together: which are on the Pareto front, how fast the error falls.
 module pd_study_front
   use pd_base_kinds, only: wp
   use pd_study_plan, only: plan_type

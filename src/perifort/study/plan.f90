@@ -346,8 +346,8 @@ contains
 
     call parse_integer(word, number, note)
     if (len(note) == 0 .and. number < 1) note = 'expected a whole number above 0'
-    if (len(note) == 0 .and. modulo(number, variable%step) /= 0) note = 'expected a multiple of '// &
-      & to_text(variable%step)//', so that the cells stay cubes'
+    if (len(note) == 0 .and. modulo(number, variable%step) /= 0) note = &
+      & 'expected a multiple of '//to_text(variable%step)//', so that the cells stay cubes'
     if (len(note) > 0) then
       call source_fault(source, place%line, place%column, place%width, "bad value '"//word// &
         & "' for the points along x", note, error)

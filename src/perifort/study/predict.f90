@@ -36,7 +36,7 @@ contains
     real(wp), intent(in) :: h(:), error(:), seconds(:)
     real(wp), intent(in) :: reference
     type(law_type), intent(out) :: law
-    integer :: order(size(h)), i
+    integer :: order(size(h))
     real(wp) :: p, misfit, log_factor
     integer :: last
 
@@ -67,8 +67,8 @@ contains
     law%extrapolates = law%order >= least_order
   end subroutine fit_law
 
-  !> The order that fits runs `first` .. best, with its factor, and the mean square of what is left of
-  !> the errors' logarithms.
+  !> The order that fits runs `first` .. best, with its factor, and the mean square of what is left
+  !> of the errors' logarithms.
   pure subroutine fit_order(law, first, order, log_factor, misfit)
     type(law_type), intent(in) :: law
     integer, intent(in) :: first

@@ -5,7 +5,8 @@ module pd_study_reference
   use pd_base_text, only: lower_case, to_text
   use pd_family_cells, only: cells_type
   use pd_output_datasets, only: get_shape, read_rows
-  use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file, start_hdf5
+  use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file, &
+    & start_hdf5
   use pd_scene_table, only: column_of, read_table, table_type
   use pd_scene_types, only: name_length
   use pd_study_closed_form, only: closed_form_type, components_of, field_at

@@ -1,6 +1,5 @@
 !> A study as lines of a CSV file and as a table to read.
 module pd_study_table
-  use pd_base_clock, only: duration_text
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp
   use pd_base_text, only: join, newline, to_text
@@ -72,8 +71,9 @@ contains
     end do
     text = text//newline//'  * on the Pareto front: no run is better in error and time'//newline
     call observed_orders(plan, outcomes, orders)
-    if (size(orders) > 0) text = text//newline//'Observed orders, log of the errors'' ratio over '// &
-      & 'log of the values'' ratio (of points: of the spacings'')'//newline
+    if (size(orders) > 0) text = text//newline// &
+      & "Observed orders: log of the errors' ratio over log of the values' ratio"// &
+      & " (of points: of the spacings')"//newline
     do i = 1, size(orders)
       associate (o => orders(i))
         text = text//'  '//padded(settings_text(plan, o%from), settings_width(plan))//'  -> '// &
@@ -124,8 +124,9 @@ contains
     end do
     text = text//right(error_text(outcome, 4), number_width)// &
       & right(to_text(outcome%seconds, 3), number_width)// &
-      & right(to_text(outcome%points), number_width)//right(to_text(outcome%bonds), number_width)// &
-      & right(to_text(outcome%steps), number_width)//right(to_text(outcome%bytes), number_width)// &
+      & right(to_text(outcome%points), number_width)// &
+      & right(to_text(outcome%bonds), number_width)//right(to_text(outcome%steps), number_width)// &
+      & right(to_text(outcome%bytes), number_width)// &
       & right(to_text(outcome%energy_drift, 2), number_width)
     if (outcome%pareto) text = text//'  *'
     if (allocated(outcome%fault)) text = text//'  no answer'
