@@ -4,9 +4,11 @@
 
 writes a picture of every field (1D: a curve over x; 2D: coloured points; 3D: all points and a cut
 through the middle) and the curves of the history: energies with their balance, probes, reactions.
-DIR is the folder of the results or the .vtkhdf file.
+Of a study it draws error against time with the Pareto front, and error against each varied key. DIR
+is the folder of the results or of the study, or the .vtkhdf or study.csv file.
 """
 import argparse
+import csv
 import sys
 from pathlib import Path
 
@@ -258,6 +260,95 @@ def history_pictures(results, folder):
         save(figure, folder / f"{title}.png")
 
 
+RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "energy_drift", "pareto")
+
+
+class Study:
+    """The table of a study: its varied keys with their values as text, and its columns as arrays."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        with open(self.path, newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+        keys = len(rows[0]) - len(RESULT_COLUMNS)
+        if keys < 0 or tuple(rows[0][keys:]) != RESULT_COLUMNS or len(rows) < 2:
+            raise KeyError(f"{self.path} is no table of a study, or an empty one")
+        self.keys = rows[0][:keys]
+        self.settings = [row[:keys] for row in rows[1:]]
+        self.columns = {name: np.array([float(row[keys + i]) for row in rows[1:]])
+                        for i, name in enumerate(RESULT_COLUMNS)}
+        # The run that others are compared with has the error 0, one without an answer none
+        self.shown = np.isfinite(self.columns["error"]) & (self.columns["error"] > 0)
+
+    def values(self, key):
+        """The values of a varied key as numbers, or None if they are none."""
+        try:
+            return np.array([float(row[self.keys.index(key)].lower().replace("d", "e"))
+                             for row in self.settings])
+        except ValueError:
+            return None
+
+    def families(self, without):
+        """Numbers of runs that differ in one key alone, by a label of the others."""
+        found = {}
+        for number, row in enumerate(self.settings):
+            if not self.shown[number]:
+                continue
+            label = ", ".join(f"{key} = {value}" for key, value in zip(self.keys, row)
+                              if key != without
+                              and len({other[self.keys.index(key)] for other in self.settings}) > 1)
+            found.setdefault(label, []).append(number)
+        return found
+
+
+def study_pictures(study, folder):
+    """Error against time with the front, and error against each varied key."""
+    error, seconds = study.columns["error"], study.columns["seconds"]
+    if not study.shown.any():
+        raise KeyError(f"{study.path} has no error to draw")
+    # The key with most values makes the lines
+    line = max(study.keys, key=lambda key: len({row[study.keys.index(key)]
+                                                for row in study.settings}))
+    figure, axis = plt.subplots(figsize=(7.5, 5))
+    for label, runs in study.families(line).items():
+        runs = sorted(runs, key=lambda run: seconds[run])
+        axis.loglog(seconds[runs], error[runs], "o-", markersize=4, linewidth=0.8, label=label)
+        for run in runs:
+            axis.annotate(study.settings[run][study.keys.index(line)],
+                          (seconds[run], error[run]), textcoords="offset points", xytext=(4, 3),
+                          fontsize=6, color="0.4")
+    front = np.flatnonzero(study.shown & (study.columns["pareto"] > 0))
+    front = front[np.argsort(seconds[front])]
+    axis.loglog(seconds[front], error[front], color="0.75", linewidth=5, zorder=0,
+                solid_capstyle="round", label="Pareto front")
+    axis.set(xlabel="time [s]", ylabel="error", title=f"the numbers are {line}")
+    axis.grid(alpha=0.3, which="both")
+    axis.legend(fontsize=7)
+    save(figure, folder / "study_time.png")
+    for key in study.keys:
+        figure, axis = plt.subplots(figsize=(7.5, 4.2))
+        numbers = study.values(key)
+        words = sorted({row[study.keys.index(key)] for row in study.settings})
+        for label, runs in study.families(key).items():
+            if numbers is None:
+                across = [words.index(study.settings[run][study.keys.index(key)]) for run in runs]
+            else:
+                runs = sorted(runs, key=lambda run: numbers[run])
+                across = numbers[runs]
+            axis.plot(across, error[runs], "o-" if numbers is not None else "o", markersize=4,
+                      linewidth=0.8, label=label)
+        axis.set_yscale("log")
+        if numbers is None:
+            axis.set_xticks(range(len(words)), words)
+        elif (numbers > 0).all():
+            axis.set_xscale("log")
+        axis.set(xlabel=key, ylabel="error")
+        axis.grid(alpha=0.3, which="both")
+        if any(study.families(key)):
+            axis.legend(fontsize=7)
+        save(figure, folder / f"study_{''.join(c if c.isalnum() else '_' for c in key)}.png")
+
+
 def main():
     parser = argparse.ArgumentParser(prog="./pf plot", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -272,6 +363,13 @@ def main():
                         help="where the pictures go (default: DIR)")
     options = parser.parse_args()
     try:
+        table = options.folder if options.folder.suffix == ".csv" else options.folder / "study.csv"
+        if table.is_file():
+            folder = options.to or table.parent
+            folder.mkdir(parents=True, exist_ok=True)
+            study_pictures(Study(table), folder)
+            if table == options.folder or not list(options.folder.glob("*.vtkhdf")):
+                return
         results = Results(options.folder)
         if options.step == "all":
             outputs = range(results.outputs)

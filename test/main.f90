@@ -45,6 +45,7 @@ program main
   use test_output_files, only: collect_output_files
   use test_output_layout, only: collect_output_layout
   use test_output_results, only: collect_output_results
+  use test_scene_change, only: collect_scene_change
   use test_scene_check, only: collect_scene_check
   use test_scene_elements, only: collect_scene_elements
   use test_scene_file, only: collect_scene_file
@@ -57,6 +58,11 @@ program main
   use test_scene_write, only: collect_scene_write
   use test_study_bench, only: collect_study_bench
   use test_study_limits, only: collect_study_limits
+  use test_study_closed_form, only: collect_study_closed_form
+  use test_study_interpolate, only: collect_study_interpolate
+  use test_study_plan, only: collect_study_plan
+  use test_study_predict, only: collect_study_predict
+  use test_study_study, only: collect_study_study
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -101,6 +107,7 @@ program main
   call register('output_files', collect_output_files)
   call register('output_layout', collect_output_layout)
   call register('output_results', collect_output_results)
+  call register('scene_change', collect_scene_change)
   call register('scene_check', collect_scene_check)
   call register('scene_elements', collect_scene_elements)
   call register('scene_file', collect_scene_file)
@@ -113,6 +120,11 @@ program main
   call register('scene_write', collect_scene_write)
   call register('study_bench', collect_study_bench)
   call register('study_limits', collect_study_limits)
+  call register('study_closed_form', collect_study_closed_form)
+  call register('study_interpolate', collect_study_interpolate)
+  call register('study_plan', collect_study_plan)
+  call register('study_predict', collect_study_predict)
+  call register('study_study', collect_study_study)
 
   call read_arguments()
   if (len(suite_name) > 0) then

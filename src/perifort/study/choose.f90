@@ -13,7 +13,8 @@ module pd_study_choose
   use pd_scene_types, only: path_length
   use pd_scene_values, only: exact_text
   use pd_study_front, only: is_step, step_variable
-  use pd_study_plan, only: plan_type, scene_of, size_up, trial_type, variable_type
+  use pd_study_plan, only: common_divisor, plan_type, scene_of, size_up, trial_type, &
+    & variable_type
   use pd_study_predict, only: error_at, fit_law, law_type, seconds_at
   use pd_study_study, only: add_trial, begin_study, run_all, run_one, say, session_type
   use pd_study_table, only: settings_text, table_text
@@ -219,7 +220,7 @@ contains
     logical :: refines
 
     refines = plan%variables(free)%refines
-    multiple = count_step(plan%variables(free))
+    multiple = count_step(plan, plan%variables(free))
     ! the runs themselves: what they gave is known
     do i = 1, law%n
       words = words_at(plan, free, t, law%h(i))
@@ -242,11 +243,23 @@ contains
   end subroutine search_line
 
   !> Counts of points are multiples of this: whole in all directions, and even where all listed ones
-  !> are, since the middle of a body lies on a point or between two by that.
-  pure integer function count_step(variable) result(step)
+  !> are, since the middle of a body lies on a point or between two by that. In a scene with cut out
+  !> shapes or cracks they keep all that the listed ones have in common: their edges then lie on the
+  !> lattice as in the runs that are known.
+  pure integer function count_step(plan, variable) result(step)
+    type(plan_type), intent(in) :: plan
     type(variable_type), intent(in) :: variable
+    integer :: i
+
     step = variable%step
-    if (modulo(step, 2) == 1 .and. all(modulo(nint(variable%numbers), 2) == 0)) step = 2*step
+    if (size(plan%scene%removed) + size(plan%scene%cracks) > 0) then
+      step = 0
+      do i = 1, size(variable%numbers)
+        step = common_divisor(step, nint(variable%numbers(i)))
+      end do
+    else if (modulo(step, 2) == 1 .and. all(modulo(nint(variable%numbers), 2) == 0)) then
+      step = 2*step
+    end if
   end function count_step
 
   !> The words of run `t` with another step on the axis of `free`; what goes in step with it follows

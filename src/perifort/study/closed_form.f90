@@ -1,4 +1,4 @@
-!> Answers in closed form (doc/theory.md, 11): what a field is at a point and a time.
+!> Answers in closed form (doc/theory.md, 12): what a field is at a point and a time.
 !>
 !> A form is plain numbers; `pd_study_analytic` takes them from a scene.
 module pd_study_closed_form

@@ -22,7 +22,7 @@ module pd_study_plan
   implicit none (type, external)
   private
   public :: plan_type, variable_type, trial_type, plan_study, plan_from_text, scene_of, size_up, &
-    & shown_word, result_columns
+    & shown_word, common_divisor, result_columns
 
   !> The columns of the table behind the varied keys.
   character(12), parameter :: result_columns(8) = [character(12) :: 'error', 'seconds', &
@@ -392,6 +392,7 @@ contains
     step = scene%bodies(target%number)%points(1)/max(1, divisor)
   end function smallest_step
 
+  !> The greatest common divisor; that of 0 and a number is the number.
   pure integer function common_divisor(first, second) result(divisor)
     integer, intent(in) :: first, second
     integer :: rest, next

@@ -1,4 +1,4 @@
-!> From the runs of a study to what has not been run (doc/theory.md, 11): error and time along one
+!> From the runs of a study to what has not been run (doc/theory.md, 13): error and time along one
 !> line, the runs that differ in one step h alone.
 !>
 !> The error is fitted by C (h^p - r^p), where r is the step of the run that all are compared with,
@@ -21,8 +21,10 @@ module pd_study_predict
     integer :: n = 0
     real(wp), allocatable :: h(:), error(:), seconds(:)
     real(wp) :: reference = 0.0_wp        !! r
-    real(wp) :: log_factor = 0.0_wp       !! log C
-    real(wp) :: order = 0.0_wp            !! p
+    real(wp) :: log_factor = 0.0_wp       !! log C, of all runs
+    real(wp) :: order = 0.0_wp            !! p, of all runs
+    real(wp) :: last_factor = 0.0_wp      !! log C beyond the finest run
+    real(wp) :: last_order = 0.0_wp       !! p beyond the finest run
     logical :: extrapolates = .false.     !! the fit holds beyond the finest run
     real(wp) :: margin = 1.1_wp           !! what the scatter of the runs about the fit asks for
     real(wp) :: slope = 0.0_wp            !! q
@@ -38,7 +40,6 @@ contains
     type(law_type), intent(out) :: law
     integer :: order(size(h))
     real(wp) :: p, misfit, log_factor
-    integer :: last
 
     law%n = size(h)
     order = ascending(-h)
@@ -55,16 +56,17 @@ contains
     if (.not. law%extrapolates) return
     call fit_order(law, 1, law%order, law%log_factor, misfit)
     law%margin = min(2.0_wp, max(1.1_wp, exp(2*sqrt(misfit))))
+    law%last_order = law%order
+    law%last_factor = law%log_factor
     ! an error that has begun to level off goes on as the last runs do
-    last = law%n - 2
-    if (last > 1) then
-      call fit_order(law, last, p, log_factor, misfit)
+    if (law%n > 3) then
+      call fit_order(law, law%n - 2, p, log_factor, misfit)
       if (p < law%order) then
-        law%order = p
-        law%log_factor = log_factor
+        law%last_order = p
+        law%last_factor = log_factor
       end if
     end if
-    law%extrapolates = law%order >= least_order
+    law%extrapolates = law%last_order >= least_order
   end subroutine fit_law
 
   !> The order that fits runs `first` .. best, with its factor, and the mean square of what is left
@@ -117,8 +119,8 @@ contains
   end subroutine line
 
   !> The error to be expected at a step. Between runs it is interpolated, where a run counts no
-  !> better than any finer one: what a coarse run does better, it owes to chance. Beyond the finest
-  !> run it is the fit's, moved up to that run if the fit lies below it, but no nearer to the run
+  !> better than any finer one, or the fit's if that is worse: what a run does better, it owes to
+  !> chance. Beyond the finest run it is the fit's, moved up to that run if the fit lies below it, but no nearer to the run
   !> that all are compared with than twice its step: there that run says more of itself. Huge where
   !> nothing is known, and at steps coarser than the coarsest run's, which may be unstable.
   pure real(wp) function error_at(law, h) result(error)
@@ -142,16 +144,20 @@ contains
       if (minval(law%error(i:)) <= 0.0_wp) return
       part = log(law%h(i)/h)/log(law%h(i)/law%h(i + 1))
       error = exp((1 - part)*log(maxval(law%error(i:))) + part*log(maxval(law%error(i + 1:))))
+      if (law%order >= least_order) error = max(error, exp(log_fit(law, law%log_factor, &
+        & law%order, h)))
     else if (law%extrapolates .and. h > 2*law%reference*(1 - 1.0e-9_wp)) then
-      above = max(0.0_wp, log(law%error(law%n)) - log_fit(law, law%h(law%n)))
-      error = exp(above + log_fit(law, h))
+      above = max(0.0_wp, log(law%error(law%n)) - log_fit(law, law%last_factor, law%last_order, &
+        & law%h(law%n)))
+      error = exp(above + log_fit(law, law%last_factor, law%last_order, h))
     end if
   end function error_at
 
-  pure real(wp) function log_fit(law, h)
+  !> log(C (h^p - r^p)).
+  pure real(wp) function log_fit(law, log_factor, order, h)
     type(law_type), intent(in) :: law
-    real(wp), intent(in) :: h
-    log_fit = law%log_factor + log(h**law%order - law%reference**law%order)
+    real(wp), intent(in) :: log_factor, order, h
+    log_fit = log_factor + log(h**order - law%reference**order)
   end function log_fit
 
   !> The time to be expected at a step [s]: interpolated between runs, and by the fit beyond.

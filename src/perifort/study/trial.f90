@@ -137,7 +137,8 @@ contains
           if (allocated(error)) return
         end if
       end if
-      call watcher%progress%start(int(plan%steps, i8), terminal, .not. terminal, load=plan%relaxes)
+      ! one more than there are, since the last step would be shown of runs of any length
+      call watcher%progress%start(plan%steps + 1_i8, terminal, .not. terminal, load=plan%relaxes)
       lost = wall_time() - lost
       if (plan%relaxes) then
         call run_relaxation(system, plan%relaxation, watcher, fault)
