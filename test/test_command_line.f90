@@ -113,6 +113,14 @@ contains
     call refused(error, [character(w) :: 'run', 'a', '--threads', '1,2'], 'takes one number')
     if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--csv', 'b'], "no option of 'run'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'choose', 'a'], "needs the error to be met")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'choose', 'a', '--error', '0'], "'--error' needs a number")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'study', 'a', '--error', '1'], "no option of 'study'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'study'], 'needs the scene file')
   end subroutine test_bench
 
   !> `limits` takes a scene and a time for its runs, a minute if none is given.

@@ -54,7 +54,7 @@ contains
         & index(text, '  ! ratio = 3.015 ') > 0 .and. index(text, '! horizon over the') > 0, text)
       if (allocated(error)) return
     end do
-    call check(error, size(group_names) == 15)
+    call check(error, size(group_names) == 16)
   end subroutine test_comments
 
   subroutine test_default(error)
