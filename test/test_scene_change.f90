@@ -16,7 +16,8 @@ module test_scene_change
   character(*), parameter :: text = '&scene dimension = 2 /'//line// &
     & "&material name = 'a' youngs_modulus = 1e9 density = 1e3 poissons_ratio = 0.3 /"//line// &
     & "&material name = 'b' youngs_modulus = 2e9 density = 2e3 poissons_ratio = 0.2 /"//line// &
-    & "&body name = 'plate' material = 'a' lower = 2*0.0 upper = 1, 0.5 points = 100, 50 /"//line// &
+    & "&body name = 'one' material = 'a' lower = 2*0.0 upper = 1, 0.5 points = 100, 50 /"// &
+    & line// &
     & '&initial displacement_gradient(1,2) = 0.5 /'//line// &
     & '&time steps = 5 safety = 0.5 /'//line
 
@@ -138,6 +139,11 @@ contains
     call expect(error, scene%materials(1)%density, 5.0e3_wp, 0.0_wp, 'changed')
     call expect(error, scene%materials(2)%density, 2.0e3_wp, 0.0_wp, 'same key of another group')
     call expect(error, scene%materials(1)%youngs_modulus, 1.0e9_wp, 0.0_wp, 'same group')
+    call changed('material(2)%density', '5e3', scene, found)
+    call accept(error, found)
+    if (allocated(error)) return
+    call expect(error, scene%materials(1)%density, 1.0e3_wp, 0.0_wp, 'same key of a group before')
+    call expect(error, scene%materials(2)%density, 5.0e3_wp, 0.0_wp, 'changed')
     call expect(error, scene%time%safety, 0.5_wp, 0.0_wp, 'a group behind it')
     call expect_true(error, scene%time%steps == 5 .and. size(scene%initial) == 1, 'all of it')
   end subroutine test_others

@@ -187,6 +187,10 @@ contains
       & .true.]) .eqv. [.true., .true., .true., .false., .true., .false., .false.]), 'the front')
     call expect_true(error, count(on_front(e, s, spread(.true., 1, 7))) == 1, &
       & 'one that is best in both')
+    call expect_true(error, all(on_front([1.0_wp, 2.0_wp], [3.0_wp, 3.0_wp], [.true., .true.]) &
+      & .eqv. [.true., .false.]), 'as fast, but worse')
+    call expect_true(error, all(on_front([2.0_wp, 2.0_wp], [3.0_wp, 4.0_wp], [.true., .true.]) &
+      & .eqv. [.true., .false.]), 'as good, but slower')
   end subroutine test_front
 
   !> Errors ratio^2/points^1.5 over points 10, 20, 40: orders 1.5 for points, none for the ratio.

@@ -231,13 +231,15 @@ contains
       & "&boundary region = 'high' velocity_x = 0 velocity_y = 0 /"//line// &
       & "&time method = 'relaxation' /"//line//'&relaxation tolerance = 1e-9 /'//line
 
-    call studied('patch', patch//"&study vary = 'horizon%ratio' values = 2.015, 3.015 measure = "// &
-      & "'displacement' against = 'analytic' region = 'inner' norm = 'relative' /", session, fault)
+    call studied('patch', patch//"&study vary = 'horizon%ratio' values = 2.015, 3.015 "// &
+      & "measure = 'displacement' against = 'analytic' region = 'inner' norm = 'relative' /", &
+      & session, fault)
     call accept(error, fault)
     if (allocated(error)) return
     call expect(error, maxval(session%outcomes%error), 0.0_wp, 1.0e-6_wp, 'displacement')
-    call studied('patch', patch//"&study vary = 'horizon%ratio' values = 2.015, 3.015 measure = "// &
-      & "'energy_density' against = 'analytic' analytic = 'linear_field' region = 'inner' /", &
+    call studied('patch', patch//"&study vary = 'horizon%ratio' values = 2.015, 3.015 "// &
+      & "measure = 'energy_density' against = 'analytic' analytic = 'linear_field' "// &
+      & "region = 'inner' /", &
       & session, fault)
     call accept(error, fault)
     if (allocated(error)) return
@@ -321,9 +323,9 @@ contains
     end do
   end subroutine test_tension
 
-  !> The distances from the finest run and from the exact answer differ by no more than that run's own
-  !> error, and a hundredth of it for the interpolation; 20 points' probe lies between points of the
-  !> others.
+  !> The distances from the finest run and from the exact answer differ by no more than that run's
+  !> own error, and a hundredth of it for the interpolation; 20 points' probe lies between points of
+  !> the others.
   subroutine test_finest(error)
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session, exact
@@ -416,8 +418,8 @@ contains
     call refused(block//study//"'uniaxial_stress' /", 'no pair of opposite sides')
     call refused(block//"&load side = 'x_min' pressure = 1 / &boundary side = 'x_max' "// &
       & "displacement_x = 0 displacement_y = 0 /"//study//"'uniaxial_stress' /", 'contraction')
-    call refused(block//"&load side = 'x_min' pressure = 1 / &load side = 'x_max' pressure = 2 /"// &
-      & study//"'uniaxial_stress' /", 'differently')
+    call refused(block//"&load side = 'x_min' pressure = 1 / &load side = 'x_max' "// &
+      & 'pressure = 2 /'//study//"'uniaxial_stress' /", 'differently')
     call refused(block//"&remove shape = 'sphere' radius = 0.02 / &load side = 'x_min' "// &
       & "pressure = 1 / &load side = 'x_max' pressure = 1 /"//study//"'plate_hole' /", &
       & 'in the middle')

@@ -21,8 +21,12 @@ contains
   !> compared with does not compete: its own error is not known.
   subroutine mark_front(outcomes)
     type(outcome_type), intent(inout) :: outcomes(:)
-    outcomes%pareto = on_front(outcomes%error, outcomes%seconds, outcomes%done .and. &
-      & outcomes%judged .and. .not. outcomes%truth)
+    real(wp), allocatable :: error(:), seconds(:)
+
+    error = outcomes%error
+    seconds = outcomes%seconds
+    outcomes%pareto = on_front(error, seconds, outcomes%done .and. outcomes%judged .and. &
+      & .not. outcomes%truth)
   end subroutine mark_front
 
   !> Whether each of the chosen runs is as good as any other in error or in time, and better in one

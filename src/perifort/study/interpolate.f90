@@ -1,4 +1,4 @@
-!> Values between places and between instants (doc/theory.md, 13).
+!> Values between places and between instants (doc/theory.md, 14).
 !>
 !> In space a polynomial of second degree is fitted to the places around by weighted least squares;
 !> where one place lies at the position itself, its value is taken. In time a cubic goes through the

@@ -1,4 +1,4 @@
-!> From the runs of a study to what has not been run (doc/theory.md, 13): error and time along one
+!> From the runs of a study to what has not been run (doc/theory.md, 14): error and time along one
 !> line, the runs that differ in one step h alone.
 !>
 !> The error is fitted by C (h^p - r^p), where r is the step of the run that all are compared with,
@@ -120,9 +120,10 @@ contains
 
   !> The error to be expected at a step. Between runs it is interpolated, where a run counts no
   !> better than any finer one, or the fit's if that is worse: what a run does better, it owes to
-  !> chance. Beyond the finest run it is the fit's, moved up to that run if the fit lies below it, but no nearer to the run
-  !> that all are compared with than twice its step: there that run says more of itself. Huge where
-  !> nothing is known, and at steps coarser than the coarsest run's, which may be unstable.
+  !> chance. Beyond the finest run it is the fit's, moved up to that run if the fit lies below it,
+  !> but no nearer to the run that all are compared with than twice its step: there that run says
+  !> more of itself. Huge where nothing is known, and at steps coarser than the coarsest run's,
+  !> which may be unstable.
   pure real(wp) function error_at(law, h) result(error)
     type(law_type), intent(in) :: law
     real(wp), intent(in) :: h

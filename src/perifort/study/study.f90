@@ -221,9 +221,11 @@ contains
     type(session_type), intent(inout) :: session
     type(error_type), allocatable, intent(out) :: error
     integer, allocatable :: order(:)
+    real(wp), allocatable :: work(:)
     integer :: i
 
-    order = ascending(session%plan%trials%work)
+    work = session%plan%trials%work
+    order = ascending(work)
     if (session%finest > 0) order = [session%finest, pack(order, order /= session%finest)]
     call say(session, head_text(session%plan, session%unit))
     do i = 1, size(order)
