@@ -384,6 +384,9 @@ contains
     integer, parameter :: w = 90
     character(*), parameter :: threads = &
       & '  --threads N     number of threads (default: OMP_NUM_THREADS or all; small scenes one)'
+    character(w), parameter :: tables(4) = [character(w) :: &
+      & '  --output DIR    folder of the tables (default: out/ and the name of the file)', threads, &
+      & '  --overwrite     replace a study that is there', '  --quiet         print errors only']
 
     select case (command)
     case ('run')
@@ -418,35 +421,20 @@ contains
         & threads], newline)
     case ('study')
       text = join([character(w) :: &
-        & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
-        & '', &
-        & 'Run the scene in FILE with all the values that its groups &study name, and tell for', &
-        & 'each run error, time, points, bonds, steps, memory and energy drift, which runs are', &
-        & 'on the Pareto front, and the observed orders of convergence. Writes study.csv, whole', &
-        & 'after every run, and study.txt; ./pf plot draws them. Results of the runs are not', &
-        & 'kept.', &
-        & '', &
-        & '  --output DIR    folder of the tables (default: out/ and the name of the file)', &
-        & '  --threads N     number of threads, the same for all runs (default: OMP_NUM_THREADS', &
-        & '                  or all; one if even the largest run is small)', &
-        & '  --overwrite     replace a study that is there', &
-        & '  --quiet         print errors only'], newline)
+        & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', '', &
+        & 'Run the scene in FILE with all the values that its groups &study name: error, time,', &
+        & 'size and energy drift of each run, the Pareto front, observed orders of convergence.', &
+        & 'Writes study.csv, whole after every run, and study.txt; ./pf plot draws them.', '', &
+        & tables], newline)
     case ('choose')
       text = join([character(w) :: &
-        & 'perifort choose FILE --error E [--time T] [--output DIR] [--threads N] [--overwrite]', &
-        & '                [--quiet]', &
-        & '', &
+        & 'perifort choose FILE --error E [--time T] [options of study]', '', &
         & 'Run the study in FILE, extrapolate error and time, and print the cheapest settings', &
         & 'that meet an error; then run them and tell how far off the prediction was. Exit', &
-        & 'status 1 if the error is missed.', &
-        & '', &
+        & 'status 1 if the error is missed.', '', &
         & '  --error E       the error to be met, in the norm and unit of the study', &
-        & '  --time T        the longest that the chosen run may take [s]; if the error cannot', &
-        & '                  be met within it, the best settings that keep it', &
-        & '  --output DIR    folder of the tables (default: out/ and the name of the file)', &
-        & '  --threads N     number of threads, the same for all runs', &
-        & '  --overwrite     replace a study that is there', &
-        & '  --quiet         print errors only'], newline)
+        & '  --time T        the longest that the chosen run may take [s]', &
+        & tables], newline)
     case ('template')
       text = join([character(w) :: &
         & 'perifort template [NAME]', &
