@@ -385,7 +385,7 @@ contains
     character(*), parameter :: threads = &
       & '  --threads N     number of threads (default: OMP_NUM_THREADS or all; small scenes one)'
     character(w), parameter :: tables(4) = [character(w) :: &
-      & '  --output DIR    folder of the tables (default: out/ and the name of the file)', threads, &
+      & '  --output DIR    folder of the tables (default: out/ and the file''s name)', threads, &
       & '  --overwrite     replace a study that is there', '  --quiet         print errors only']
 
     select case (command)
