@@ -1,4 +1,4 @@
-!> The first signal is noted. (The second would end the test program, as it should.)
+!> Signals are noted. (A second interrupt would end the test program, as it should.)
 module test_base_interrupt
   use, intrinsic :: iso_c_binding, only: c_int
   use pd_base_interrupt, only: interrupted, watch_for_interrupt
@@ -21,13 +21,15 @@ contains
 
   subroutine collect_base_interrupt(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
-    testsuite = [new_unittest('the first signal is noted', test_signals)]
+    testsuite = [ &
+      & new_unittest('the first signal is noted', test_signals), &
+      & new_unittest('what a queue repeats does no harm', test_repeated)]
   end subroutine collect_base_interrupt
 
-  !> Interrupt and termination, each after watching anew.
+  !> Interrupt, termination and warning, each after watching anew.
   subroutine test_signals(error)
     type(error_type), allocatable, intent(out) :: error
-    integer(c_int), parameter :: signals(2) = [2_c_int, 15_c_int]
+    integer(c_int), parameter :: signals(3) = [2_c_int, 15_c_int, 10_c_int]
     integer :: i
 
     do i = 1, size(signals)
@@ -41,5 +43,20 @@ contains
     end do
     call watch_for_interrupt()
   end subroutine test_signals
+
+  !> A queue's signals, sent again while the run ends, leave it alone.
+  subroutine test_repeated(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer(c_int), parameter :: signals(4) = [15_c_int, 15_c_int, 10_c_int, 10_c_int]
+    integer :: i
+
+    call watch_for_interrupt()
+    do i = 1, size(signals)
+      call check(error, posix_raise(signals(i)) == 0_c_int, 'the signal was sent')
+      if (allocated(error)) return
+    end do
+    call check(error, interrupted(), 'the signals are noted')
+    call watch_for_interrupt()
+  end subroutine test_repeated
 
 end module test_base_interrupt

@@ -1,5 +1,6 @@
-!> The user's interrupt (Ctrl-C) or a termination request: the first is noted, so that a run can end
-!> in order; the second ends the program at once, as it would without this module.
+!> Requests to end: the user's interrupt (Ctrl-C), and what a queue sends before it takes a machine
+!> away (SIGTERM, or SIGUSR1 as a warning). They are noted, so that a run can end in order. A second
+!> interrupt ends the program at once; queues may repeat theirs.
 module pd_base_interrupt
   use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int, c_null_funptr
   implicit none (type, external)
@@ -7,6 +8,7 @@ module pd_base_interrupt
   public :: watch_for_interrupt, interrupted
 
   integer(c_int), parameter :: sigint = 2_c_int, sigterm = 15_c_int  ! POSIX
+  integer(c_int), parameter :: sigusr1 = 10_c_int                    ! Linux
   logical, volatile :: noted = .false.
 
   interface
@@ -22,25 +24,26 @@ module pd_base_interrupt
 
 contains
 
-  !> From now on the first interrupt is noted.
+  !> From now on requests to end are noted.
   subroutine watch_for_interrupt()
     type(c_funptr) :: before
     noted = .false.
     before = posix_signal(sigint, c_funloc(note))
     before = posix_signal(sigterm, c_funloc(note))
+    before = posix_signal(sigusr1, c_funloc(note))
   end subroutine watch_for_interrupt
 
-  !> Whether an interrupt has been noted.
+  !> Whether a request has been noted.
   logical function interrupted()
     interrupted = noted
   end function interrupted
 
-  !> Note the first signal and give the second its usual effect.
+  !> Note the signal; of interrupts the next one has its usual effect.
   subroutine note(number) bind(c)
     integer(c_int), value :: number
     type(c_funptr) :: before
     noted = .true.
-    before = posix_signal(number, c_null_funptr)
+    if (number == sigint) before = posix_signal(number, c_null_funptr)
   end subroutine note
 
 end module pd_base_interrupt

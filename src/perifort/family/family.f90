@@ -2,6 +2,7 @@
 !>
 !> Everything outside the hot loops works on `bonds_of`, which lists the bonds of one slot.
 module pd_family_family
+  use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_family_volume, only: volume_rule_type
   implicit none (type, external)
@@ -27,6 +28,7 @@ module pd_family_family
   contains
     procedure(bonds_of_interface), deferred :: bonds_of
     procedure(break_interface), deferred :: break_bond
+    procedure(keep_interface), deferred :: keep_bonds
     procedure(memory_interface), deferred :: bytes
     procedure(describe_interface), deferred :: describe
     procedure :: alike
@@ -49,6 +51,14 @@ module pd_family_family
       class(family_type), intent(inout) :: family
       integer, intent(in) :: k, i
     end subroutine break_interface
+
+    !> Keep which bonds are broken, or put it back.
+    subroutine keep_interface(family, archive)
+      import :: family_type, archive_type
+      implicit none (type, external)
+      class(family_type), intent(inout) :: family
+      class(archive_type), intent(inout) :: archive
+    end subroutine keep_interface
 
     !> Memory of the family [bytes].
     pure integer(i8) function memory_interface(family)

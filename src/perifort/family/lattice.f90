@@ -9,6 +9,7 @@
 !> The force loops work on blocks of `lanes` slots of one row. Blocks whose surroundings look the
 !> same (and most do) share one table of weights with the surface factors in it.
 module pd_family_lattice
+  use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_error, only: error_type, fail
   use pd_base_lookup, only: lookup_type, mix
@@ -54,6 +55,7 @@ module pd_family_lattice
   contains
     procedure :: bonds_of
     procedure :: break_bond
+    procedure :: keep_bonds
     procedure :: bytes
     procedure :: describe
     procedure :: alike
@@ -363,6 +365,12 @@ contains
       end do
     end associate
   end subroutine break_bond
+
+  subroutine keep_bonds(family, archive)
+    class(lattice_family_type), intent(inout) :: family
+    class(archive_type), intent(inout) :: archive
+    call archive%keep('broken bonds of slots', family%broken)
+  end subroutine keep_bonds
 
   pure integer(i8) function bytes(family)
     class(lattice_family_type), intent(in) :: family

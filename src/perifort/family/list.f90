@@ -2,6 +2,7 @@
 !>
 !> Nothing else is stored per bond: xi, |xi| and v_c come from the points.
 module pd_family_list
+  use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_body_body, only: body_type, arrange
   use pd_family_cells, only: cells_type, sort_into_cells, collect_neighbours
@@ -24,6 +25,7 @@ module pd_family_list
   contains
     procedure :: bonds_of
     procedure :: break_bond
+    procedure :: keep_bonds
     procedure :: bytes
     procedure :: describe
   end type list_family_type
@@ -117,6 +119,12 @@ contains
     integer, intent(in) :: k, i
     family%intact(family%start(k) + i - 1) = 0_i1
   end subroutine break_bond
+
+  subroutine keep_bonds(family, archive)
+    class(list_family_type), intent(inout) :: family
+    class(archive_type), intent(inout) :: archive
+    call archive%keep('intact bonds', family%intact)
+  end subroutine keep_bonds
 
   pure integer(i8) function bytes(family)
     class(list_family_type), intent(in) :: family

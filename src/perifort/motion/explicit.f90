@@ -8,6 +8,7 @@ module pd_motion_explicit
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
+  use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, evaluate, account, add_loads, inverse_density, &
     & faulty_slot, place
@@ -15,20 +16,17 @@ module pd_motion_explicit
   use pd_motion_time_step, only: integrator_limit, stable_step, stiffness_bound
   implicit none (type, external)
   private
-  public :: run_explicit
+  public :: run_explicit, begin_memory
 
-  !> Velocities and accelerations of earlier steps, as far as the integrator needs them.
-  type :: memory_type
-    integer :: filled = 0                          !! how many earlier steps are kept
-    real(wp), allocatable :: v(:, :, :)            !! of t_{n-1}, t_{n-2}
-    real(wp), allocatable :: a(:, :, :)
-    real(wp), allocatable :: u0(:, :), v0(:, :)    !! at the beginning of the step
-    real(wp), allocatable :: a0(:, :)
-  end type memory_type
+  !> The state at the beginning of a step, for integrators that look back at it.
+  type :: start_type
+    real(wp), allocatable :: u(:, :), v(:, :), a(:, :)
+  end type start_type
 
 contains
 
-  !> Move `system` through `steps` steps of `dt` [s] from t = 0.
+  !> Move `system` through `steps` steps of `dt` [s] from t = 0, or from where it stands if its
+  !> memory says that it has begun.
   subroutine run_explicit(system, integrator, dt, steps, observer, error)
     type(system_type), intent(inout) :: system
     character(*), intent(in) :: integrator
@@ -36,35 +34,42 @@ contains
     integer, intent(in) :: steps
     class(observer_type), intent(inout) :: observer
     type(error_type), allocatable, intent(out) :: error
-    type(memory_type) :: memory
+    type(start_type) :: start
     type(instant_type) :: instant
     logical :: sound
-    integer :: n
+    integer :: n, seen
 
     instant%dt = dt
-    call allocate_memory(system, integrator, memory)
-    do n = 0, steps
+    seen = system%memory%step
+    if (seen == not_begun) call begin_memory(system, integrator)
+    call allocate_start(system, integrator, start)
+    do n = max(0, seen), steps
       instant%step = n
       instant%time = n*dt
       instant%last = n == steps
-      call evaluate(system, instant%time, breaking=.true.)
-      ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
-      instant%kick = 0.0_wp
-      if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
-      call account(system, instant%time)
-      call observer%observe(system, instant, error)
-      if (allocated(error) .or. n == steps) return
+      if (n > seen) then
+        call evaluate(system, instant%time, breaking=.true.)
+        ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
+        instant%kick = 0.0_wp
+        if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
+        call account(system, instant%time)
+        system%memory%step = n
+        call observer%observe(system, instant, error)
+        if (allocated(error)) return
+      end if
+      if (n == steps) exit
       if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, sound)
       else
-        call advance(system, integrator, instant%time, dt, memory)
+        call advance(system, integrator, instant%time, dt, start)
         sound = faulty_slot(system, system%state%v, dt) == 0
       end if
       if (sound) cycle
       call explain_fault(system, integrator, instant%time + dt, dt, error)
       return
     end do
+    system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_explicit
 
   !> Whether the integrator's velocities belong to the middle of the steps.
@@ -73,48 +78,56 @@ contains
     at_half_steps = integrator == 'forward_backward' .or. integrator == 'velocity_verlet'
   end function at_half_steps
 
-  subroutine allocate_memory(system, integrator, memory)
-    type(system_type), intent(in) :: system
+  !> Room for what the integrator carries from step to step.
+  subroutine begin_memory(system, integrator)
+    type(system_type), intent(inout) :: system
     character(*), intent(in) :: integrator
-    type(memory_type), intent(out) :: memory
     integer :: n, d
 
-    if (at_half_steps(integrator)) return
+    system%memory = memory_type()
+    if (integrator /= 'adams_bashforth' .and. integrator /= 'adams_moulton') return
     n = size(system%state%u, 1)
     d = size(system%state%u, 2)
-    allocate (memory%v(n, d, 2), memory%a(n, d, 2), source=0.0_wp)
-    allocate (memory%u0(n, d), memory%v0(n, d), memory%a0(n, d), source=0.0_wp)
-  end subroutine allocate_memory
+    allocate (system%memory%v(n, d, 2), system%memory%a(n, d, 2), source=0.0_wp)
+  end subroutine begin_memory
+
+  subroutine allocate_start(system, integrator, start)
+    type(system_type), intent(in) :: system
+    character(*), intent(in) :: integrator
+    type(start_type), intent(out) :: start
+
+    if (at_half_steps(integrator)) return
+    allocate (start%u, start%v, start%a, mold=system%state%u)
+    start%a = 0.0_wp
+  end subroutine allocate_start
 
   !> One step from t to t + dt; the forces are those at t.
-  subroutine advance(system, integrator, t, dt, memory)
+  subroutine advance(system, integrator, t, dt, start)
     type(system_type), intent(inout) :: system
     character(*), intent(in) :: integrator
     real(wp), intent(in) :: t, dt
-    type(memory_type), intent(inout) :: memory
+    type(start_type), intent(inout) :: start
 
+    call remember_instant(system, t, start)
     select case (integrator)
     case ('adams_bashforth')
-      call remember_instant(system, t, memory)
-      if (memory%filled < 2) then
-        call runge_kutta(system, t, dt, memory)
+      if (system%memory%filled < 2) then
+        call runge_kutta(system, t, dt, start)
       else
-        call adams(system, dt, memory, [23.0_wp, -16.0_wp, 5.0_wp]/12.0_wp)
+        call adams(system, dt, start, [23.0_wp, -16.0_wp, 5.0_wp]/12.0_wp)
       end if
-      call shift(memory)
+      call shift(start, system%memory)
     case ('adams_moulton')
-      call remember_instant(system, t, memory)
-      if (memory%filled < 1) then
-        call runge_kutta(system, t, dt, memory)
+      if (system%memory%filled < 1) then
+        call runge_kutta(system, t, dt, start)
       else
-        call adams(system, dt, memory, [1.5_wp, -0.5_wp, 0.0_wp])
+        call adams(system, dt, start, [1.5_wp, -0.5_wp, 0.0_wp])
         call evaluate(system, t + dt, breaking=.false.)
-        call correct(system, t, dt, memory)
+        call correct(system, t, dt, start)
       end if
-      call shift(memory)
+      call shift(start, system%memory)
     case default
-      call remember_instant(system, t, memory)
-      call runge_kutta(system, t, dt, memory)
+      call runge_kutta(system, t, dt, start)
     end select
   end subroutine advance
 
@@ -181,75 +194,78 @@ contains
   end subroutine accelerations
 
   !> Keep displacement, velocity and acceleration at the beginning of a step.
-  subroutine remember_instant(system, t, memory)
+  subroutine remember_instant(system, t, start)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: t
-    type(memory_type), intent(inout) :: memory
-    memory%u0 = system%state%u
-    memory%v0 = system%state%v
-    call accelerations(system, t, memory%a0)
+    type(start_type), intent(inout) :: start
+    start%u = system%state%u
+    start%v = system%state%v
+    call accelerations(system, t, start%a)
   end subroutine remember_instant
 
   !> What was the present becomes the past.
-  pure subroutine shift(memory)
+  pure subroutine shift(start, memory)
+    type(start_type), intent(in) :: start
     type(memory_type), intent(inout) :: memory
     memory%v(:, :, 2) = memory%v(:, :, 1)
     memory%a(:, :, 2) = memory%a(:, :, 1)
-    memory%v(:, :, 1) = memory%v0
-    memory%a(:, :, 1) = memory%a0
+    memory%v(:, :, 1) = start%v
+    memory%a(:, :, 1) = start%a
     memory%filled = memory%filled + 1
   end subroutine shift
 
   !> Adams-Bashforth: weights of t_n, t_{n-1}, t_{n-2}.
-  pure subroutine adams(system, dt, memory, weight)
+  pure subroutine adams(system, dt, start, weight)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: dt
-    type(memory_type), intent(in) :: memory
+    type(start_type), intent(in) :: start
     real(wp), intent(in) :: weight(3)
-    system%state%u = memory%u0 + dt*(weight(1)*memory%v0 + weight(2)*memory%v(:, :, 1) &
-      & + weight(3)*memory%v(:, :, 2))
-    system%state%v = memory%v0 + dt*(weight(1)*memory%a0 + weight(2)*memory%a(:, :, 1) &
-      & + weight(3)*memory%a(:, :, 2))
+    associate (v => system%memory%v, a => system%memory%a)
+      system%state%u = start%u + dt*(weight(1)*start%v + weight(2)*v(:, :, 1) &
+        & + weight(3)*v(:, :, 2))
+      system%state%v = start%v + dt*(weight(1)*start%a + weight(2)*a(:, :, 1) &
+        & + weight(3)*a(:, :, 2))
+    end associate
   end subroutine adams
 
   !> Adams-Moulton of second order, from the forces at the predicted state.
-  subroutine correct(system, t, dt, memory)
+  subroutine correct(system, t, dt, start)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t, dt
-    type(memory_type), intent(inout) :: memory
+    type(start_type), intent(in) :: start
     real(wp), allocatable :: a(:, :)
 
-    allocate (a, mold=memory%a0)
+    allocate (a, mold=start%a)
     call accelerations(system, t + dt, a)
-    system%state%u = memory%u0 + dt/2*(memory%v0 + system%state%v)
-    system%state%v = memory%v0 + dt/2*(memory%a0 + a)
+    system%state%u = start%u + dt/2*(start%v + system%state%v)
+    system%state%v = start%v + dt/2*(start%a + a)
   end subroutine correct
 
   !> The classical scheme of fourth order; constraints are imposed at each stage's time.
-  subroutine runge_kutta(system, t, dt, memory)
+  subroutine runge_kutta(system, t, dt, start)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t, dt
-    type(memory_type), intent(inout) :: memory
+    type(start_type), intent(in) :: start
     real(wp), parameter :: ahead(3) = [0.5_wp, 0.5_wp, 1.0_wp]
     real(wp), parameter :: weight(4) = [1.0_wp, 2.0_wp, 2.0_wp, 1.0_wp]/6.0_wp
     real(wp), allocatable :: du(:, :), dv(:, :), a(:, :), v(:, :)
     integer :: stage
 
-    allocate (a, source=memory%a0)
-    allocate (v, source=memory%v0)
-    du = weight(1)*memory%v0
-    dv = weight(1)*memory%a0
+    allocate (a, source=start%a)
+    allocate (v, source=start%v)
+    du = weight(1)*start%v
+    dv = weight(1)*start%a
     do stage = 1, 3
-      system%state%u = memory%u0 + ahead(stage)*dt*v
-      system%state%v = memory%v0 + ahead(stage)*dt*a
+      system%state%u = start%u + ahead(stage)*dt*v
+      system%state%v = start%v + ahead(stage)*dt*a
       call evaluate(system, t + ahead(stage)*dt, breaking=.false.)
       v = system%state%v
       call accelerations(system, t + ahead(stage)*dt, a)
       du = du + weight(stage + 1)*v
       dv = dv + weight(stage + 1)*a
     end do
-    system%state%u = memory%u0 + dt*du
-    system%state%v = memory%v0 + dt*dv
+    system%state%u = start%u + dt*du
+    system%state%v = start%v + dt*dv
   end subroutine runge_kutta
 
   !> The error for a motion that is none any more at time `t` [s] with steps of `dt` [s]. Whether

@@ -7,6 +7,7 @@ module pd_motion_relaxation
   use pd_base_numbers, only: block_length
   use pd_base_text, only: to_text
   use pd_motion_conjugate_gradient, only: relax_by_conjugate_gradient
+  use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_residual, only: relaxation_type, squared_force, fail_unconverged
   use pd_motion_rigid, only: rigid_type, find_free_motions, check_balance, remove_free_motions
@@ -14,7 +15,7 @@ module pd_motion_relaxation
     & place
   implicit none (type, external)
   private
-  public :: relaxation_type, run_relaxation
+  public :: relaxation_type, run_relaxation, begin_memory
 
   real(wp), parameter :: largest_damping = 1.9_wp  !! c dt must stay below 2
 
@@ -29,7 +30,8 @@ module pd_motion_relaxation
 
 contains
 
-  !> Bring `system` to rest under the conditions at each load step's time i/load_steps.
+  !> Bring `system` to rest under the conditions at each load step's time i/load_steps; if its
+  !> memory says that it has begun, it goes on from there.
   subroutine run_relaxation(system, relaxation, observer, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
@@ -37,10 +39,9 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(instant_type) :: instant
     type(rigid_type) :: rigid
-    real(wp), allocatable :: before(:, :), trend(:, :)
     integer(i8) :: number
-    integer :: i
-    logical :: dynamic
+    integer :: i, first
+    logical :: dynamic, going_on
 
     instant%dt = 1.0_wp
     call find_free_motions(system, rigid)
@@ -48,29 +49,36 @@ contains
       call check_balance(system, rigid, real(i, wp)/relaxation%load_steps, error)
       if (allocated(error)) return
     end do
-    call evaluate(system, 0.0_wp, breaking=.false.)
-    system%state%v = 0.0_wp
-    call account(system, 0.0_wp, at_rest=.true.)
-    instant%settled = .true.
-    call observer%observe(system, instant, error)
-    if (allocated(error)) return
-    allocate (trend(0, system%body%dim))
-    do i = 1, relaxation%load_steps
-      if (relaxation%conjugate_gradient .and. relaxation%load_steps > 1) before = system%state%u
+    if (system%memory%step == not_begun) then
+      call begin_memory(system)
+      call evaluate(system, 0.0_wp, breaking=.false.)
+      call settle(system, instant, observer, error)
+      if (allocated(error)) return
+    end if
+    instant%step = system%memory%step
+    first = system%memory%load_step
+    if (system%memory%iteration == 0) first = first + 1
+    do i = first, relaxation%load_steps
+      going_on = system%memory%iteration > 0
+      if (relaxation%conjugate_gradient .and. relaxation%load_steps > 1 .and. .not. going_on) &
+        & system%memory%start = system%state%u
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
       do
-        dynamic = .not. relaxation%conjugate_gradient
-        if (relaxation%conjugate_gradient) then
-          call relax_by_conjugate_gradient(system, relaxation, rigid, trend, instant, observer, &
-            & dynamic, error)
+        dynamic = going_on .or. .not. relaxation%conjugate_gradient
+        if (.not. dynamic) then
+          instant%resumable = .false.
+          call relax_by_conjugate_gradient(system, relaxation, rigid, system%memory%trend, &
+            & instant, observer, dynamic, error)
+          instant%resumable = .true.
           if (allocated(error)) return
           instant%gave_way = dynamic
         end if
         if (dynamic) call relax(system, relaxation, instant, observer, error)
         instant%gave_way = .false.
         if (allocated(error)) return
-        trend = trend(:0, :)
+        going_on = .false.
+        system%memory%trend = system%memory%trend(:0, :)
         ! the forces that did the work are those before the bonds break
         call account(system, instant%time, at_rest=.true.)
         call break_now(system, number)
@@ -78,70 +86,125 @@ contains
       end do
       call remove_free_motions(system, rigid, system%state%u)
       call evaluate(system, instant%time, breaking=.false.)
-      if (allocated(before)) trend = system%state%u - before
-      system%state%v = 0.0_wp
-      call account(system, instant%time, at_rest=.true.)
-      instant%settled = .true.
+      if (allocated(system%memory%start)) then
+        system%memory%trend = system%state%u - system%memory%start
+        deallocate (system%memory%start)
+      end if
       instant%last = i == relaxation%load_steps
-      call observer%observe(system, instant, error)
+      call settle(system, instant, observer, error)
       if (allocated(error)) return
     end do
+    system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_relaxation
 
-  !> Iterate to rest at `instant%time`.
+  !> Room for what is carried from iteration to iteration.
+  subroutine begin_memory(system)
+    type(system_type), intent(inout) :: system
+    system%memory = memory_type()
+    allocate (system%memory%rate, mold=system%state%u)
+    system%memory%rate = 0.0_wp
+    allocate (system%memory%trend(0, size(system%state%u, 2)))
+  end subroutine begin_memory
+
+  !> The end of a load step, whose forces are known: let the observer see it.
+  subroutine settle(system, instant, observer, error)
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(inout) :: instant
+    class(observer_type), intent(inout) :: observer
+    type(error_type), allocatable, intent(out) :: error
+
+    system%state%v = 0.0_wp
+    call account(system, instant%time, at_rest=.true.)
+    instant%settled = .true.
+    system%memory%step = instant%step
+    system%memory%load_step = instant%load_step
+    system%memory%iteration = 0
+    call observer%observe(system, instant, error)
+  end subroutine settle
+
+  !> Iterate to rest at `instant%time`, or go on in the midst of that.
   subroutine relax(system, relaxation, instant, observer, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
     type(instant_type), intent(inout) :: instant
     class(observer_type), intent(inout) :: observer
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: rate(:, :), a(:, :), a_before(:, :)
+    real(wp), allocatable :: a(:, :), a_before(:, :)
     type(sums_type) :: sums
     real(wp) :: damping, reference
     integer :: iteration, fault, m
 
-    allocate (rate, a, a_before, mold=system%state%u)
-    rate = 0.0_wp
-    reference = 0.0_wp
+    allocate (a, a_before, mold=system%state%u)
     instant%settled = .false.
-    call evaluate(system, instant%time, breaking=.false.)
-    call fictitious_acceleration(system, relaxation, instant%time, a, reference)
-    rate = a/2                                                     ! 7.30
-    do iteration = 1, relaxation%maximum_iterations
-      call move(system, rate)                                      ! 7.29b
-      a_before = a
-      call evaluate(system, instant%time, breaking=.false.)
-      call fictitious_acceleration(system, relaxation, instant%time, a, reference)
-      call add_up(system, relaxation, rate, a, a_before, sums)
-      instant%step = instant%step + 1
-      reference = max(reference, sums%reference)
-      instant%residual = 0.0_wp
-      if (sums%residual > 0.0_wp) instant%residual = sqrt(sums%residual/reference)
-      fault = faulty_slot(system, rate, 1.0_wp)
-      if (fault > 0) then
-        call fail(error, 'the relaxation diverges at iteration '//to_text(instant%step)// &
-          & ': point '//to_text(int(system%body%point(fault)))//' at ('//place(system, fault)// &
-          & ') moves more than a horizon in one iteration. Likely cause: loads that '// &
-          & 'the body cannot bear, or a density matrix too small for it (density_matrix = '// &
-          & '''frame_invariant'' is stable, with others raise safety)', status_no_answer)
-        return
+    associate (memory => system%memory, rate => system%memory%rate)
+      if (memory%iteration == 0) then
+        memory%load_step = instant%load_step
+        memory%reference = 0.0_wp
+        call evaluate(system, instant%time, breaking=.false.)
       end if
-      ! imposing sets the speed of imposed motion, which isn't one here
-      do m = 1, size(system%motions)
-        system%state%v(system%motions(m)%slots, :) = 0.0_wp
+      reference = memory%reference
+      call fictitious_acceleration(system, relaxation, instant%time, a, reference)
+      if (memory%iteration == 0) rate = a/2                        ! 7.30
+      do iteration = max(1, memory%iteration), relaxation%maximum_iterations
+        if (iteration > memory%iteration) then
+          call move(system%state%u, rate)                          ! 7.29b
+          a_before = a
+          call evaluate(system, instant%time, breaking=.false.)
+          call fictitious_acceleration(system, relaxation, instant%time, a, reference)
+          call add_up(system, relaxation, rate, a, a_before, sums)
+          reference = max(reference, sums%reference)
+          call remember(system%memory, iteration, reference, sums)
+          instant%step = instant%step + 1
+          memory%step = instant%step
+          fault = faulty_slot(system, rate, 1.0_wp)
+          if (fault > 0) then
+            call fail(error, 'the relaxation diverges at iteration '//to_text(instant%step)// &
+              & ': point '//to_text(int(system%body%point(fault)))//' at ('// &
+              & place(system, fault)//') moves more than a horizon in one iteration. Likely '// &
+              & 'cause: loads that the body cannot bear, or a density matrix too small for '// &
+              & 'it (density_matrix = ''frame_invariant'' is stable, with others raise safety)', &
+              & status_no_answer)
+            return
+          end if
+          ! imposing sets the speed of imposed motion, which isn't one here
+          do m = 1, size(system%motions)
+            system%state%v(system%motions(m)%slots, :) = 0.0_wp
+          end do
+          instant%residual = memory%residual
+          call observer%observe(system, instant, error)
+          if (allocated(error)) return
+        end if
+        instant%residual = memory%residual
+        if (memory%residual <= relaxation%tolerance .and. &
+          & memory%change <= relaxation%tolerance**2*memory%displacement) then
+          memory%iteration = 0
+          return
+        end if
+        damping = 0.0_wp                                           ! 7.35, 7.36
+        if (memory%stiffness > 0.0_wp .and. memory%displacement > 0.0_wp) &
+          & damping = min(largest_damping, 2*sqrt(memory%stiffness/memory%displacement))
+        call accelerate(rate, a, damping)                          ! 7.29a
       end do
-      call observer%observe(system, instant, error)
-      if (allocated(error)) return
-      if (instant%residual <= relaxation%tolerance .and. &
-        & sums%change <= relaxation%tolerance**2*sums%displacement) return
-      damping = 0.0_wp                                             ! 7.35, 7.36
-      if (sums%stiffness > 0.0_wp .and. sums%displacement > 0.0_wp) &
-        & damping = min(largest_damping, 2*sqrt(sums%stiffness/sums%displacement))
-      call accelerate(rate, a, damping)                            ! 7.29a
-    end do
+    end associate
     call fail_unconverged(relaxation, instant%load_step, instant%residual, &
-      & sqrt(sums%change/max(tiny(1.0_wp), sums%displacement)), error)
+      & sqrt(system%memory%change/max(tiny(1.0_wp), system%memory%displacement)), error)
   end subroutine relax
+
+  !> What an iteration leaves for the next one.
+  pure subroutine remember(memory, iteration, reference, sums)
+    type(memory_type), intent(inout) :: memory
+    integer, intent(in) :: iteration
+    real(wp), intent(in) :: reference
+    type(sums_type), intent(in) :: sums
+
+    memory%iteration = iteration
+    memory%reference = reference
+    memory%residual = 0.0_wp
+    if (sums%residual > 0.0_wp) memory%residual = sqrt(sums%residual/memory%reference)
+    memory%stiffness = sums%stiffness
+    memory%displacement = sums%displacement
+    memory%change = sums%change
+  end subroutine remember
 
   !> a = F/lambda of the free components, 0 elsewhere. `reference`, if it is 0, becomes the square
   !> of the loads, or without loads of the first residual: a body released from a strained state.
@@ -174,15 +237,15 @@ contains
   end subroutine fictitious_acceleration
 
   !> u = u + rate (a step of 1).
-  subroutine move(system, rate)
-    type(system_type), intent(inout) :: system
+  subroutine move(u, rate)
+    real(wp), intent(inout) :: u(:, :)
     real(wp), intent(in) :: rate(:, :)
     integer :: k, c
 
     do c = 1, size(rate, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(system, rate, c) private(k)
+      !$omp parallel do simd schedule(static) default(none) shared(u, rate, c) private(k)
       do k = 1, size(rate, 1)
-        system%state%u(k, c) = system%state%u(k, c) + rate(k, c)
+        u(k, c) = u(k, c) + rate(k, c)
       end do
     end do
   end subroutine move

@@ -14,6 +14,7 @@ module pd_motion_system
   use pd_force_reference, only: point_dilatation, point_force
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
     & moved_by_velocity
+  use pd_motion_memory, only: memory_type
   implicit none (type, external)
   private
   public :: system_type, state_type, start_system, evaluate, break_now, account, energies_type, &
@@ -43,6 +44,7 @@ module pd_motion_system
     real(wp), allocatable :: last_u(:)          !! work accounting: place, force and imposed
     real(wp), allocatable :: last_force(:)      !! velocity (0 of loads) of each component that
     real(wp), allocatable :: last_v(:)          !! does work, at the last step
+    type(memory_type) :: memory                 !! what the motion carries from instant to instant
     logical :: break_late = .false.             !! bonds break after the step's forces
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
   end type system_type

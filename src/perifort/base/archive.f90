@@ -1,0 +1,231 @@
+!> Where a part of the program keeps what it must find again to go on after a restart, without
+!> knowing of files: one list of calls serves for writing, reading and measuring.
+!>
+!>     call archive%keep('displacement', state%u)
+!>     call archive%keep('broken bonds', broken)
+!>
+!> When it writes, an archive takes the values; when it reads, it puts them back, in the same order.
+!> An array that is allocated gets back values of its own shape only; one that is not takes that of
+!> the archive. The first failure stays in `error`, and the calls after it do nothing.
+module pd_base_archive
+  use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp, i1, i8
+  use pd_base_text, only: to_text
+  implicit none (type, external)
+  private
+  public :: archive_type
+
+  integer(i8), parameter :: absent = -1_i8  !! first extent of an array that is not allocated
+
+  type, abstract :: archive_type
+    logical :: reading = .false.
+    type(error_type), allocatable :: error
+  contains
+    procedure(describe_interface), deferred :: describe
+    procedure(move_interface), deferred :: move
+    procedure, private :: keep_real, keep_integer, keep_long, keep_logical, keep_text
+    procedure, private :: keep_reals, keep_real_table, keep_real_block
+    procedure, private :: keep_flags, keep_long_table
+    !> Write or read back one value.
+    generic :: keep => keep_real, keep_integer, keep_long, keep_logical, keep_text, keep_reals, &
+      & keep_real_table, keep_real_block, keep_flags, keep_long_table
+  end type archive_type
+
+  abstract interface
+    !> Begin a value: its name, the kind of its elements (`real8`, `integer1`, ...) and its extents.
+    !> When reading, name and kind must agree, and the extents are those of the archive.
+    subroutine describe_interface(self, name, kind_name, extents)
+      import :: archive_type, i8
+      implicit none (type, external)
+      class(archive_type), intent(inout) :: self
+      character(*), intent(in) :: name, kind_name
+      integer(i8), intent(inout) :: extents(:)
+    end subroutine describe_interface
+
+    !> Take `bytes` bytes from `place`, or put them there.
+    subroutine move_interface(self, place, bytes)
+      import :: archive_type, c_ptr, i8
+      implicit none (type, external)
+      class(archive_type), intent(inout) :: self
+      type(c_ptr), intent(in) :: place
+      integer(i8), intent(in) :: bytes
+    end subroutine move_interface
+  end interface
+
+contains
+
+  !> Describe a value and say whether its bytes are to be moved. `there` says whether the value is
+  !> allocated; on return whether it is to be.
+  subroutine begin(self, name, kind_name, extents, there, moves)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name, kind_name
+    integer(i8), intent(inout) :: extents(:)
+    logical, intent(inout) :: there
+    logical, intent(out) :: moves
+    integer(i8) :: mine(size(extents))
+
+    moves = .false.
+    if (allocated(self%error)) return
+    if (.not. there) extents = absent
+    mine = extents
+    call self%describe(name, kind_name, extents)
+    if (allocated(self%error)) return
+    if (there .and. any(extents /= mine)) then
+      call fail(self%error, name//' has the extents '//listed(extents)//' there and '// &
+        & listed(mine)//' here')
+      return
+    end if
+    there = all(extents >= 0)
+    moves = there .and. all(extents > 0)
+  end subroutine begin
+
+  pure function listed(extents) result(text)
+    integer(i8), intent(in) :: extents(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    text = to_text(extents(1))
+    do i = 2, size(extents)
+      text = text//' x '//to_text(extents(i))
+    end do
+  end function listed
+
+  subroutine keep_real(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), intent(inout) :: value
+    real(wp), allocatable :: one(:)
+    allocate (one(1), source=value)
+    call self%keep(name, one)
+    if (.not. allocated(self%error)) value = one(1)
+  end subroutine keep_real
+
+  subroutine keep_long(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i8), intent(inout) :: value
+    integer(i8), allocatable :: one(:, :)
+    allocate (one(1, 1), source=value)
+    call self%keep(name, one)
+    if (.not. allocated(self%error)) value = one(1, 1)
+  end subroutine keep_long
+
+  subroutine keep_integer(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(inout) :: value
+    integer(i8) :: long
+    long = value
+    call self%keep(name, long)
+    if (.not. allocated(self%error)) value = int(long)
+  end subroutine keep_integer
+
+  subroutine keep_logical(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    logical, intent(inout) :: value
+    integer(i8) :: long
+    long = merge(1_i8, 0_i8, value)
+    call self%keep(name, long)
+    if (.not. allocated(self%error)) value = long == 1_i8
+  end subroutine keep_logical
+
+  !> A text; its length may change in reading.
+  subroutine keep_text(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    character(:), allocatable, intent(inout) :: value
+    integer(i1), allocatable :: codes(:)
+    integer :: i
+
+    if (.not. self%reading) then
+      allocate (codes(len(value)))
+      do i = 1, len(value)
+        codes(i) = transfer(value(i:i), codes(i))
+      end do
+    end if
+    call self%keep(name, codes)
+    if (allocated(self%error) .or. .not. self%reading) return
+    value = repeat(' ', size(codes))
+    do i = 1, size(codes)
+      value(i:i) = transfer(codes(i), value(i:i))
+    end do
+  end subroutine keep_text
+
+  subroutine keep_reals(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), allocatable, target, intent(inout) :: value(:)
+    integer(i8) :: extents(1)
+    logical :: there, moves
+
+    there = allocated(value)
+    if (there) extents = shape(value, i8)
+    call begin(self, name, 'real8', extents, there, moves)
+    if (allocated(self%error)) return
+    if (there .and. .not. allocated(value)) allocate (value(extents(1)))
+    if (moves) call self%move(c_loc(value), 8_i8*product(extents))
+  end subroutine keep_reals
+
+  subroutine keep_real_table(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), allocatable, target, intent(inout) :: value(:, :)
+    integer(i8) :: extents(2)
+    logical :: there, moves
+
+    there = allocated(value)
+    if (there) extents = shape(value, i8)
+    call begin(self, name, 'real8', extents, there, moves)
+    if (allocated(self%error)) return
+    if (there .and. .not. allocated(value)) allocate (value(extents(1), extents(2)))
+    if (moves) call self%move(c_loc(value), 8_i8*product(extents))
+  end subroutine keep_real_table
+
+  subroutine keep_real_block(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), allocatable, target, intent(inout) :: value(:, :, :)
+    integer(i8) :: extents(3)
+    logical :: there, moves
+
+    there = allocated(value)
+    if (there) extents = shape(value, i8)
+    call begin(self, name, 'real8', extents, there, moves)
+    if (allocated(self%error)) return
+    if (there .and. .not. allocated(value)) allocate (value(extents(1), extents(2), extents(3)))
+    if (moves) call self%move(c_loc(value), 8_i8*product(extents))
+  end subroutine keep_real_block
+
+  subroutine keep_flags(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i1), allocatable, target, intent(inout) :: value(:)
+    integer(i8) :: extents(1)
+    logical :: there, moves
+
+    there = allocated(value)
+    if (there) extents = shape(value, i8)
+    call begin(self, name, 'integer1', extents, there, moves)
+    if (allocated(self%error)) return
+    if (there .and. .not. allocated(value)) allocate (value(extents(1)))
+    if (moves) call self%move(c_loc(value), product(extents))
+  end subroutine keep_flags
+
+  subroutine keep_long_table(self, name, value)
+    class(archive_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i8), allocatable, target, intent(inout) :: value(:, :)
+    integer(i8) :: extents(2)
+    logical :: there, moves
+
+    there = allocated(value)
+    if (there) extents = shape(value, i8)
+    call begin(self, name, 'integer8', extents, there, moves)
+    if (allocated(self%error)) return
+    if (there .and. .not. allocated(value)) allocate (value(extents(1), extents(2)))
+    if (moves) call self%move(c_loc(value), 8_i8*product(extents))
+  end subroutine keep_long_table
+
+end module pd_base_archive

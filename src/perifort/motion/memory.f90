@@ -1,0 +1,55 @@
+!> Where a motion stands, beside its state: what integrators and relaxation carry from one instant
+!> that an observer sees to the next. It lies in the system, so that whoever keeps the system can go
+!> on from there as if nothing had been in between.
+module pd_motion_memory
+  use pd_base_archive, only: archive_type
+  use pd_base_kinds, only: wp
+  implicit none (type, external)
+  private
+  public :: memory_type, keep_memory, not_begun
+
+  integer, parameter :: not_begun = -1
+
+  type :: memory_type
+    integer :: step = not_begun            !! complete steps (iterations) at the last instant seen
+    ! explicit integration by the Adams rules
+    integer :: filled = 0                  !! how many earlier steps are kept
+    real(wp), allocatable :: v(:, :, :)    !! velocities of t_{n-1}, t_{n-2} (n_slots, dim, 2) [m/s]
+    real(wp), allocatable :: a(:, :, :)    !! accelerations then (n_slots, dim, 2) [m/s2]
+    ! relaxation
+    integer :: load_step = 0               !! the load step under way, or the last one settled
+    integer :: iteration = 0               !! of the relaxation under way; 0: at rest
+    real(wp), allocatable :: rate(:, :)    !! displacement per iteration (n_slots, dim) [m]
+    real(wp), allocatable :: trend(:, :)   !! of the last load step, of 0 rows if of no use [m]
+    real(wp), allocatable :: start(:, :)   !! displacements where the load step began [m]
+    real(wp) :: reference = 0.0_wp         !! square of the force that residuals are parts of [N2]
+    real(wp) :: residual = 0.0_wp          !! relative [-]
+    real(wp) :: stiffness = 0.0_wp         !! U.K.U of 7.36
+    real(wp) :: displacement = 0.0_wp      !! U.U [m2]
+    real(wp) :: change = 0.0_wp            !! dU.dU [m2]
+  end type memory_type
+
+contains
+
+  !> Keep all of it, or put it back.
+  subroutine keep_memory(archive, memory)
+    class(archive_type), intent(inout) :: archive
+    type(memory_type), intent(inout) :: memory
+
+    call archive%keep('step', memory%step)
+    call archive%keep('earlier steps', memory%filled)
+    call archive%keep('earlier velocities', memory%v)
+    call archive%keep('earlier accelerations', memory%a)
+    call archive%keep('load step', memory%load_step)
+    call archive%keep('iteration', memory%iteration)
+    call archive%keep('rate', memory%rate)
+    call archive%keep('trend', memory%trend)
+    call archive%keep('start of load step', memory%start)
+    call archive%keep('reference', memory%reference)
+    call archive%keep('residual', memory%residual)
+    call archive%keep('U.K.U', memory%stiffness)
+    call archive%keep('U.U', memory%displacement)
+    call archive%keep('dU.dU', memory%change)
+  end subroutine keep_memory
+
+end module pd_motion_memory
