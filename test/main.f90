@@ -10,6 +10,7 @@ program main
   use testdrive, only: collect_interface, new_testsuite, run_selected, select_suite, &
     & testsuite_type, unittest_type
   use test_base_clock, only: collect_base_clock
+  use test_base_checksum, only: collect_base_checksum
   use test_base_interrupt, only: collect_base_interrupt
   use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
@@ -41,12 +42,15 @@ program main
   use test_motion_time_step, only: collect_motion_time_step
   use test_orders, only: collect_orders
   use test_output_base64, only: collect_output_base64
+  use test_output_checkpoint, only: collect_output_checkpoint
   use test_output_contact, only: collect_output_contact
   use test_output_files, only: collect_output_files
   use test_output_layout, only: collect_output_layout
+  use test_output_restart, only: collect_output_restart
   use test_output_results, only: collect_output_results
   use test_scene_change, only: collect_scene_change
   use test_scene_check, only: collect_scene_check
+  use test_scene_compare, only: collect_scene_compare
   use test_scene_elements, only: collect_scene_elements
   use test_scene_file, only: collect_scene_file
   use test_scene_read, only: collect_scene_read
@@ -72,6 +76,7 @@ program main
   character(:), allocatable :: suite_name, test_name
 
   call register('base_clock', collect_base_clock)
+  call register('base_checksum', collect_base_checksum)
   call register('base_interrupt', collect_base_interrupt)
   call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
@@ -103,12 +108,15 @@ program main
   call register('motion_time_step', collect_motion_time_step)
   call register('orders', collect_orders)
   call register('output_base64', collect_output_base64)
+  call register('output_checkpoint', collect_output_checkpoint)
   call register('output_contact', collect_output_contact)
   call register('output_files', collect_output_files)
   call register('output_layout', collect_output_layout)
+  call register('output_restart', collect_output_restart)
   call register('output_results', collect_output_results)
   call register('scene_change', collect_scene_change)
   call register('scene_check', collect_scene_check)
+  call register('scene_compare', collect_scene_compare)
   call register('scene_elements', collect_scene_elements)
   call register('scene_file', collect_scene_file)
   call register('scene_read', collect_scene_read)

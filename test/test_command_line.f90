@@ -1,7 +1,8 @@
 !> Commands, options, and what is said about wrong ones.
 module test_command_line
   use pd_base_error, only: pd_error => error_type, status_usage
-  use pd_command_line, only: command_line_type, command_names, help_text, parse_command_line
+  use pd_command_line, only: command_line_type, command_names, help_text, parse_command_line, &
+    & restart_command
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -17,6 +18,7 @@ contains
       & new_unittest('run with all its options', test_run), &
       & new_unittest('options may stand before the file and take =', test_order), &
       & new_unittest('defaults', test_defaults), &
+      & new_unittest('going on with a run', test_restart), &
       & new_unittest('bench with all its options', test_bench), &
       & new_unittest('limits with its options', test_limits), &
       & new_unittest('names after -- may begin with a dash', test_dashes), &
@@ -75,6 +77,45 @@ contains
     if (allocated(error)) return
     call check(error, len(line%argument), 0)
   end subroutine test_defaults
+
+  !> The checkpoint may be left out, wherever the option stands; the command that goes on with a run
+  !> has all its other options.
+  subroutine test_restart(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+
+    call parse_command_line([character(w) :: 'run', 'a b.nml', '--restart', '--output', 'dir', &
+      & '--threads', '2', '--quiet', '--max-minutes', '2.5'], line, fault)
+    call check(error, .not. allocated(fault), 'a good command line was refused')
+    if (allocated(error)) return
+    call check(error, line%restart .and. len(line%checkpoint) == 0)
+    if (allocated(error)) return
+    call check(error, abs(line%max_minutes - 2.5d0) <= 0.0d0)
+    if (allocated(error)) return
+    call check(error, restart_command(line), "perifort run 'a b.nml' --output dir --threads 2 "// &
+      & '--max-minutes 2.5 --quiet --restart')
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'run', 'a.nml', '--restart', 'b.old'], line, fault)
+    call check(error, line%argument//' '//line%checkpoint, 'a.nml b.old')
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'run', '--restart=b.old', 'a.nml'], line, fault)
+    call check(error, line%argument//' '//line%checkpoint, 'a.nml b.old')
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'run', '--restart', 'a.nml'], line, fault)
+    call check(error, line%argument//' '//line%checkpoint, 'a.nml ')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--restart', 'b', 'c'], 'takes one argument')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--restart', '--overwrite'], &
+      & 'give one of them')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'check', 'a', '--restart'], "no option of 'check'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--max-minutes', '0'], "found '0'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--max-minutes', 'ten'], "found 'ten'")
+  end subroutine test_restart
 
   !> Several numbers may be parted by blanks or commas.
   subroutine test_bench(error)

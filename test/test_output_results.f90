@@ -4,10 +4,10 @@ module test_output_results
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_text, only: to_text
   use pd_output_datasets, only: get_shape, read_rows
+  use pd_output_earlier, only: existing_results, refuse_existing
   use pd_output_files, only: file_bytes, file_exists
   use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
-  use pd_output_results, only: column_type, existing_results, field_type, refuse_existing, &
-    & results_type
+  use pd_output_results, only: column_type, field_type, results_type
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private

@@ -7,15 +7,18 @@ module pd_command_line
   use pd_study_options, only: bench_options_type, check_options
   implicit none (type, external)
   private
-  public :: command_line_type, parse_command_line, read_command_line, help_text, command_names
+  public :: command_line_type, parse_command_line, read_command_line, help_text, command_names, &
+    & restart_command
 
   integer, parameter :: word_length = 16
   character(word_length), parameter :: command_names(10) = [character(word_length) :: &
     & 'run', 'check', 'limits', 'study', 'choose', 'template', 'reference', 'bench', 'version', &
     & 'help']
-  character(word_length), parameter :: option_names(15) = [character(word_length) :: &
-    & '--output', '--threads', '--overwrite', '--quiet', '--points', '--dimension', '--model', &
-    & '--family', '--breaking', '--surface', '--seconds', '--csv', '--error', '--time', '--help']
+  integer, parameter :: restart_option = 4  !! its place in `option_names`
+  character(word_length), parameter :: option_names(17) = [character(word_length) :: &
+    & '--output', '--threads', '--overwrite', '--restart', '--max-minutes', '--quiet', '--points', &
+    & '--dimension', '--model', '--family', '--breaking', '--surface', '--seconds', '--csv', &
+    & '--error', '--time', '--help']
 
   !> A command line, understood and checked.
   type :: command_line_type
@@ -24,6 +27,9 @@ module pd_command_line
     character(:), allocatable :: output_directory  !! `--output`; '' = the default
     integer :: threads = 0                         !! `--threads`; 0 = as the machine has it
     logical :: overwrite = .false.                 !! `--overwrite`
+    logical :: restart = .false.                   !! `--restart`
+    character(:), allocatable :: checkpoint        !! its value; '' = the newest of the run
+    real(wp) :: max_minutes = 0.0_wp               !! `--max-minutes`; 0 = no limit
     logical :: quiet = .false.                     !! `--quiet`
     type(bench_options_type) :: bench              !! the options of `bench`
     real(wp) :: seconds = 60.0_wp                  !! `--seconds` of `limits`
@@ -79,6 +85,7 @@ contains
     line%command = ''
     line%argument = ''
     line%output_directory = ''
+    line%checkpoint = ''
     line%text = ''
     seen = .false.
     only_names = .false.
@@ -127,7 +134,7 @@ contains
             i = i + 1
             value = value//','//trim(arguments(i))
           end do
-        else if (has_value .and. .not. takes_value(name)) then
+        else if (has_value .and. .not. takes_value(name) .and. name /= '--restart') then
           call usage(error, line, "'"//name//"' takes no value, found '"//value//"'")
           return
         end if
@@ -138,6 +145,8 @@ contains
         if (allocated(error)) return
       else if (len(line%argument) == 0) then
         line%argument = word
+      else if (seen(restart_option) .and. len(line%checkpoint) == 0) then
+        line%checkpoint = word
       else
         call usage(error, line, "'"//trim(line%command)//"' takes one argument, found '"// &
           & line%argument//"' and '"//word//"'")
@@ -170,7 +179,10 @@ contains
     end do
     select case (line%command)
     case ('run', 'check', 'limits', 'study', 'choose')
-      if (len(line%argument) == 0) then
+      if (line%restart .and. line%overwrite) then
+        call usage(error, line, "'--restart' goes on with a run and '--overwrite' begins it "// &
+          & 'anew: give one of them')
+      else if (len(line%argument) == 0) then
         call usage(error, line, "'"//line%command//"' needs the scene file")
       else if (allocated(line%bench%threads)) then
         if (size(line%bench%threads) > 1) call usage(error, line, "'"//line%command// &
@@ -250,9 +262,7 @@ contains
     case ('--surface')
       line%bench%surface = .true.
     case ('--seconds')
-      status = 1
-      if (len(value) > 0 .and. verify(value, '0123456789.') == 0) &
-        & read (value, *, iostat=status) line%bench%seconds
+      call read_amount(value, line%bench%seconds, status)
       line%seconds = line%bench%seconds
       if (status /= 0) call usage(error, line, "'--seconds' needs a number, as in "// &
         & "--seconds 0.5, found '"//value//"'")
@@ -266,6 +276,13 @@ contains
         & trim(merge('--error 1e-3', '--time 60   ', name == '--error'))//", found '"//value//"'")
     case ('--overwrite')
       line%overwrite = .true.
+    case ('--restart')
+      line%restart = .true.
+      line%checkpoint = value
+    case ('--max-minutes')
+      call read_amount(value, line%max_minutes, status)
+      if (status /= 0 .or. line%max_minutes <= 0.0_wp) call usage(error, line, &
+        & "'--max-minutes' needs a number above 0, as in --max-minutes 50, found '"//value//"'")
     case ('--quiet')
       line%quiet = .true.
     case ('--help')
@@ -317,7 +334,7 @@ contains
   pure logical function takes_value(name)
     character(*), intent(in) :: name
     select case (name)
-    case ('--overwrite', '--quiet', '--surface', '--help')
+    case ('--overwrite', '--restart', '--quiet', '--surface', '--help')
       takes_value = .false.
     case default
       takes_value = .true.
@@ -369,6 +386,19 @@ contains
     if (len(text) > 0) text = "; did you mean '"//text//"'?"
   end function suggestion
 
+  !> The command that goes on with a run: the same but for `--overwrite` and `--restart`.
+  pure function restart_command(line) result(text)
+    type(command_line_type), intent(in) :: line
+    character(:), allocatable :: text
+
+    text = 'perifort run '//quoted(line%argument)
+    if (len(line%output_directory) > 0) text = text//' --output '//quoted(line%output_directory)
+    if (line%threads > 0) text = text//' --threads '//to_text(line%threads)
+    if (line%max_minutes > 0.0_wp) text = text//' --max-minutes '//to_text(line%max_minutes)
+    if (line%quiet) text = text//' --quiet'
+    text = text//' --restart'
+  end function restart_command
+
   !> A word as a shell would need it.
   pure function quoted(word) result(text)
     character(*), intent(in) :: word
@@ -392,12 +422,17 @@ contains
     case ('run')
       text = join([character(w) :: &
         & 'perifort run FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
+        & '                  [--restart [CHECKPOINT]] [--max-minutes M]', &
         & '', &
         & 'Compute the scene in FILE and write the results.', &
         & '', &
         & '  --output DIR    folder of the results (default: out/ and the name of the file)', &
         & threads, &
         & '  --overwrite     replace results that are there', &
+        & '  --restart [CHECKPOINT]', &
+        & '                  go on from the last checkpoint of this run, or from another; where', &
+        & '                  there is none yet, start from the beginning', &
+        & '  --max-minutes M stop in order after so many minutes, with a checkpoint (status 4)', &
         & '  --quiet         print errors only'], newline)
     case ('check')
       text = join([character(w) :: &

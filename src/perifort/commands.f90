@@ -5,7 +5,7 @@ module pd_commands
   use pd_base_error, only: error_type, fail, status_usage
   use pd_base_text, only: to_text
   use pd_base_version, only: compiler_flags, compiler_name, program_version
-  use pd_command_line, only: command_line_type, help_text
+  use pd_command_line, only: command_line_type, help_text, restart_command
   use pd_driver, only: check_scene, run_options_type, run_scene
   use pd_scene_read, only: read_scene
   use pd_scene_reference, only: write_reference
@@ -41,6 +41,10 @@ contains
       options%threads = line%threads
       options%overwrite = line%overwrite
       options%quiet = line%quiet
+      options%restart = line%restart
+      options%checkpoint = line%checkpoint
+      options%max_minutes = line%max_minutes
+      options%restart_command = restart_command(line)
       if (line%command == 'study') then
         call run_study(line%argument, options, error)
         return

@@ -3,15 +3,14 @@
 module pd_driver
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_clock, only: duration_text, output_is_terminal, phase_timer_type, wall_time
-  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp, i8
+  use pd_base_clock, only: duration_text, phase_timer_type, wall_time
+  use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: watch_for_interrupt
   use pd_base_text, only: to_text, with_unit
-  use pd_base_version, only: program_version
   use pd_scene_types, only: scene_type, is_set, material_group
   use pd_scene_write, only: scene_text
-  use pd_body_body, only: body_type, in_point_order
+  use pd_body_body, only: body_type
   use pd_body_generate, only: generate_body, horizon_of, touch
   use pd_body_initial, only: initial_state
   use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
@@ -25,30 +24,26 @@ module pd_driver
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
   use pd_force_weights, only: build_weights
-  use pd_motion_explicit, only: run_explicit
+  use pd_motion_explicit, only: run_explicit, begin_steps => begin_memory
   use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, region_mask
+  use pd_motion_keep, only: checksum_of_start
   use pd_motion_plan, only: plan_type, make_plan, depth_of
-  use pd_motion_relaxation, only: run_relaxation
-  use pd_motion_system, only: system_type, start_system, evaluate
+  use pd_motion_relaxation, only: run_relaxation, begin_iterations => begin_memory
+  use pd_motion_system, only: system_type, start_system, evaluate, account
   use pd_motion_time_step, only: evaluations, horizon_volume
+  use pd_output_begin, only: run_options_type, open_recorder, keep_checkpoints, schedule_of, &
+    & history_interval, output_directory, stem_of, command_of, text_of
+  use pd_output_checkpoint, only: about_type, checkpoint_bytes, new_about
+  use pd_output_earlier, only: mark_complete, refuse_existing
   use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, &
-    & planned_outputs, planned_rows
-  use pd_output_results, only: refuse_existing
-  use pd_output_summary, only: summary_before, summary_after
+    & planned_outputs, planned_rows, schedule_type
+  use pd_output_restart, only: find_restart, put_back, restart_type
+  use pd_output_summary, only: checkpoint_line, summary_before, summary_after
   use pd_base_system, only: available_memory
   implicit none (type, external)
   private
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads, &
     & check_memory, output_directory, history_interval
-
-  !> How to run, from the command line.
-  type :: run_options_type
-    character(:), allocatable :: output_directory  !! '' = out/<stem of the scene file>
-    character(:), allocatable :: command           !! as typed, kept in the results
-    integer :: threads = 0                         !! 0 = as many as OpenMP offers
-    logical :: overwrite = .false.
-    logical :: quiet = .false.
-  end type run_options_type
 
   !> Everything that stands before the first step.
   type :: set_up_type
@@ -68,23 +63,44 @@ contains
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
+    type(restart_type) :: restart
     type(recorder_type) :: recorder
     type(error_type), allocatable :: late
     character(:), allocatable :: directory, stem
+    integer(i8) :: start
+    logical :: stopped
 
     stem = stem_of(scene)
     directory = output_directory(scene, options)
-    call refuse_existing(directory, stem, options%overwrite, error)
-    if (allocated(error)) return
+    if (options%restart) then
+      call find_restart(directory, stem, text_of(options%checkpoint), scene, &
+        & command_of(options), restart, error)
+      if (allocated(error)) return
+      call say(options, restart%note)
+      if (restart%complete) return
+    else
+      call refuse_existing(directory, stem, options%overwrite, error)
+      if (allocated(error)) return
+    end if
     if (options%threads > 0) call omp_set_num_threads(options%threads)
     call prepare(scene, set_up, error)
     if (allocated(error)) return
     call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
+      start = checksum_of_start(system)
+      if (restart%found) call put_back(restart, scene, system, plan, error)
+      if (allocated(error)) return
+      if (restart%complete) then
+        call say(options, '  complete        the run has as many steps already')
+        return
+      end if
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
         & set_up%lonely, omp_get_max_threads()))
-      call open_recorder(scene, options, set_up, directory, stem, recorder, error)
+      recorder%timer = set_up%timer
+      recorder%probes = set_up%probes
+      call open_recorder(scene, options, system, plan, directory, stem, restart, recorder, error)
       if (allocated(error)) return
+      call keep_checkpoints(scene, options, plan, start, directory, stem, restart, recorder)
       call watch_for_interrupt()
       call recorder%timer%start('time stepping')
       if (plan%relaxes) then
@@ -94,9 +110,15 @@ contains
       end if
       call recorder%timer%stop('time stepping')
       call recorder%progress%finish()
-      call recorder%results%close(late)
+      stopped = .false.
+      if (allocated(error)) stopped = error%status == status_interrupted
+      call recorder%results%close(late, stopped, keep_mark=.true.)
       if (.not. allocated(error) .and. allocated(late)) call move_alloc(late, error)
       if (allocated(error)) return
+      ! the end is kept when the results are complete, and then the mark of unfinished ones goes
+      system%memory%step = recorder%steps_done
+      if (recorder%checkpoint%keeps_end()) call recorder%keep_state(system, finished=.true.)
+      call mark_complete(directory, stem)
       call say(options, summary_after(system, recorder, directory))
     end associate
   end subroutine run_scene
@@ -133,8 +155,33 @@ contains
           & *evaluations(plan%integrator))//' without output ('//with_unit(seconds, 's', 3)// &
           & ' an evaluation of the forces, measured)')
       end if
+      call say(options, checkpoint_line(scene, bytes_of_checkpoint(scene, set_up)))
     end associate
   end subroutine check_scene
+
+  !> Bytes of the last checkpoint of a run, which has all that it carries; the rows of a relaxation,
+  !> whose number isn't known before, are left out.
+  integer(i8) function bytes_of_checkpoint(scene, set_up) result(bytes)
+    type(scene_type), intent(in) :: scene
+    type(set_up_type), intent(inout) :: set_up
+    type(about_type) :: about
+    type(schedule_type) :: schedule
+
+    associate (system => set_up%system, plan => set_up%plan)
+      schedule = schedule_of(scene, plan)
+      about = new_about(scene_text(scene), 0_i8, plan%steps, plan%step)
+      allocate (about%kept%rows(size(history_columns(system, set_up%probes, plan%relaxes)), &
+        & planned_rows(schedule)), about%kept%times(planned_outputs(schedule, plan%step)), &
+        & source=0.0_wp)
+      call account(system, 0.0_wp)
+      if (plan%relaxes) then
+        call begin_iterations(system)
+      else
+        call begin_steps(system, plan%integrator)
+      end if
+      bytes = checkpoint_bytes(about, system)
+    end associate
+  end function bytes_of_checkpoint
 
   !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a
   !> run takes at its peak, while families are built, about 400 bytes a point with a lattice; a list
@@ -354,116 +401,6 @@ contains
       end do
     end do
   end subroutine find_probes
-
-  !> Files, history and progress of a run.
-  subroutine open_recorder(scene, options, set_up, directory, stem, recorder, error)
-    type(scene_type), intent(in) :: scene
-    type(run_options_type), intent(in) :: options
-    type(set_up_type), intent(in) :: set_up
-    character(*), intent(in) :: directory, stem
-    type(recorder_type), intent(inout) :: recorder
-    type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: positions(:, :)
-    character(:), allocatable :: command
-    integer :: f, c
-
-    associate (body => set_up%system%body, plan => set_up%plan, schedule => recorder%schedule)
-      recorder%timer = set_up%timer
-      recorder%probes = set_up%probes
-      schedule%relaxation = plan%relaxes
-      schedule%steps = plan%steps
-      if (.not. plan%relaxes) recorder%watch%stable_step = plan%limit
-      schedule%every = scene%output%every
-      if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
-      if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
-      schedule%history_every = history_interval(scene, plan)
-      allocate (recorder%fields(size(scene%output%fields)))
-      do f = 1, size(recorder%fields)
-        recorder%fields(f) = field_of(trim(scene%output%fields(f)))
-      end do
-      allocate (positions(body%n_points, 3), source=0.0_wp)
-      do c = 1, body%dim
-        call in_point_order(body, body%x(:, c), positions(:, c))
-      end do
-      command = ''
-      if (allocated(options%command)) command = options%command
-      call recorder%results%create(directory, stem, positions, recorder%fields, &
-        & planned_outputs(schedule, plan%step), &
-        & history_columns(set_up%system, recorder%probes, plan%relaxes), planned_rows(schedule), &
-        & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
-        & program_version, options%overwrite, error)
-      if (allocated(error)) return
-      call put_points(scene, body, recorder, error)
-      if (allocated(error)) return
-      call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet, &
-        & load=plan%relaxes)
-    end associate
-  end subroutine open_recorder
-
-  !> What each point is: volume, body, material, layer, regions.
-  subroutine put_points(scene, body, recorder, error)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
-    type(recorder_type), intent(inout) :: recorder
-    type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: volume(:)
-    integer(i4), allocatable :: number(:)
-    logical, allocatable :: mask(:)
-    integer :: r
-
-    allocate (volume(body%n_points), number(body%n_points))
-    call in_point_order(body, body%volume, volume)
-    call recorder%results%put_points('volume', volume, error)
-    if (allocated(error)) return
-    call in_point_order(body, body%body, number)
-    call recorder%results%put_points('body', number, error)
-    if (allocated(error)) return
-    call in_point_order(body, body%material, number)
-    call recorder%results%put_points('material', number, error)
-    if (allocated(error)) return
-    call in_point_order(body, body%layer, number)
-    call recorder%results%put_points('layer', number, error)
-    do r = 1, size(scene%regions)
-      if (allocated(error)) return
-      mask = region_mask(scene, body, trim(scene%regions(r)%name))
-      call recorder%results%put_points('region_'//trim(scene%regions(r)%name), &
-        & merge(1_i1, 0_i1, mask(body%slot)), error)
-    end do
-  end subroutine put_points
-
-  !> Steps (iterations in relaxation) between rows of the history.
-  pure integer function history_interval(scene, plan) result(every)
-    type(scene_type), intent(in) :: scene
-    type(plan_type), intent(in) :: plan
-    every = scene%output%history_every
-    if (every == 0) every = max(1, merge(plan%relaxation%maximum_iterations, plan%steps, &
-      & plan%relaxes)/2000)
-  end function history_interval
-
-  !> The folder of the results: the one asked for, or out/ and the scene file's name.
-  pure function output_directory(scene, options) result(directory)
-    type(scene_type), intent(in) :: scene
-    type(run_options_type), intent(in) :: options
-    character(:), allocatable :: directory
-
-    directory = 'out/'//stem_of(scene)
-    if (.not. allocated(options%output_directory)) return
-    if (options%output_directory /= '') directory = options%output_directory
-  end function output_directory
-
-  !> The scene file's name without folder and ending.
-  pure function stem_of(scene) result(stem)
-    type(scene_type), intent(in) :: scene
-    character(:), allocatable :: stem
-    integer :: dot
-
-    stem = 'scene'
-    if (.not. allocated(scene%file)) return
-    if (scene%file == '') return
-    stem = scene%file(index(scene%file, '/', back=.true.) + 1:)
-    dot = index(stem, '.', back=.true.)
-    if (dot > 1) stem = stem(:dot - 1)
-  end function stem_of
 
   !> Use one thread for a body whose step is over before another thread has woken, unless the user
   !> has asked for a number.

@@ -56,6 +56,7 @@ contains
       if (allocated(error)) return
     end if
     instant%step = system%memory%step
+    if (.not. allocated(system%memory%trend)) allocate (system%memory%trend(0, system%body%dim))
     first = system%memory%load_step
     if (system%memory%iteration == 0) first = first + 1
     do i = first, relaxation%load_steps
@@ -103,7 +104,6 @@ contains
     system%memory = memory_type()
     allocate (system%memory%rate, mold=system%state%u)
     system%memory%rate = 0.0_wp
-    allocate (system%memory%trend(0, size(system%state%u, 2)))
   end subroutine begin_memory
 
   !> The end of a load step, whose forces are known: let the observer see it.

@@ -6,9 +6,10 @@ module pd_output_datasets
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t, c_loc, c_ptr
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5P_DATASET_CREATE_F, &
     & H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_I32LE, &
-    & H5T_STD_I64LE, H5T_STD_I8LE, h5dclose_f, h5dcreate_f, h5dget_space_f, h5dopen_f, &
+    & H5T_STD_I64LE, H5T_STD_I8LE, h5dclose_f, h5dcreate_f, &
+    & h5dget_create_plist_f, h5dget_space_f, h5dopen_f, &
     & h5dread_f, h5dset_extent_f, h5dwrite_f, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
-    & h5pset_chunk_f, h5pset_fill_time_f, h5sclose_f, h5screate_simple_f, &
+    & h5pget_chunk_f, h5pset_chunk_f, h5pset_fill_time_f, h5sclose_f, h5screate_simple_f, &
     & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, &
     & hsize_t
   use pd_base_error, only: error_type, fail
@@ -17,7 +18,7 @@ module pd_output_datasets
   implicit none (type, external)
   private
   public :: put_array, make_dataset, make_series, write_rows, read_rows, set_rows, get_shape
-  public :: storage_f8, storage_f4, storage_i8
+  public :: get_chunk, storage_f8, storage_f4, storage_i8
 
   integer, parameter :: storage_f8 = 1  !! 64-bit real
   integer, parameter :: storage_f4 = 2  !! 32-bit real
@@ -190,6 +191,33 @@ contains
     call h5sclose_f(space, ignored)
     call h5dclose_f(dataset, ignored)
   end subroutine get_shape
+
+  !> Rows of a chunk of a series of one component.
+  subroutine get_chunk(file, path, rows, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: path
+    integer(i8), intent(out) :: rows
+    type(error_type), allocatable, intent(out) :: error
+    integer(hid_t) :: dataset, properties
+    integer(hsize_t) :: extent(1)
+    integer :: status, ignored
+
+    rows = 0
+    call h5dopen_f(file%id, path, dataset, status)
+    if (status /= 0) then
+      call explain(error, 'find '//path//' in', file%name)
+      return
+    end if
+    call h5dget_create_plist_f(dataset, properties, status)
+    if (status == 0) call h5pget_chunk_f(properties, 1, extent, status)
+    if (status < 0) then
+      call explain(error, 'read the chunks of '//path//' of', file%name)
+    else
+      rows = extent(1)
+    end if
+    call h5pclose_f(properties, ignored)
+    call h5dclose_f(dataset, ignored)
+  end subroutine get_chunk
 
   !> Move rows between memory and a dataset, one hyperslab.
   subroutine move_rows(file, path, storage, components, first, rows, buffer, writing, error)

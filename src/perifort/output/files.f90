@@ -1,12 +1,13 @@
 !> Files and folders: what standard Fortran leaves out, through the C library and without a shell.
 module pd_output_files
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_int64_t, &
+    & c_null_char, c_ptr
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   implicit none (type, external)
   private
   public :: make_directory, rename_file, remove_file, cut_file, file_exists, directory_exists, &
-    & file_bytes, set_environment, in_directory
+    & file_bytes, set_environment, in_directory, sync_path
 
   ! allow(C071)
   interface  ! C's texts have no other form
@@ -42,6 +43,30 @@ module pd_output_files
       character(kind=c_char), intent(in) :: name(*), value(*)
       integer(c_int), value :: overwrite
     end function c_setenv
+
+    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
+      import :: c_char, c_ptr
+      implicit none (type, external)
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+    end function c_fopen
+
+    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
+      import :: c_int, c_ptr
+      implicit none (type, external)
+      type(c_ptr), value :: stream
+    end function c_fclose
+
+    integer(c_int) function c_fileno(stream) bind(c, name='fileno')
+      import :: c_int, c_ptr
+      implicit none (type, external)
+      type(c_ptr), value :: stream
+    end function c_fileno
+
+    integer(c_int) function c_fsync(descriptor) bind(c, name='fsync')
+      import :: c_int
+      implicit none (type, external)
+      integer(c_int), value :: descriptor
+    end function c_fsync
   end interface
 
 contains
@@ -90,6 +115,22 @@ contains
     if (c_rename(trim(from)//c_null_char, trim(to)//c_null_char) == 0) return
     call fail(error, 'cannot rename '//trim(from)//' to '//trim(to))
   end subroutine rename_file
+
+  !> Wait until all that was written to a file is on the disk; of a folder, the names in it.
+  subroutine sync_path(path, error)
+    character(*), intent(in) :: path
+    type(error_type), allocatable, intent(out) :: error
+    type(c_ptr) :: stream
+    integer(c_int) :: status, ignored
+
+    stream = c_fopen(trim(path)//c_null_char, 'rb'//c_null_char)
+    status = -1_c_int
+    if (c_associated(stream)) then
+      status = c_fsync(c_fileno(stream))
+      ignored = c_fclose(stream)
+    end if
+    if (status /= 0) call fail(error, 'the system does not bring '//trim(path)//' to the disk')
+  end subroutine sync_path
 
   !> Remove a file if it is there.
   subroutine remove_file(path)

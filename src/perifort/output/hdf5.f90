@@ -9,11 +9,12 @@ module pd_output_hdf5
   use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_SCOPE_GLOBAL_F, &
     & H5P_FILE_ACCESS_F, H5S_SCALAR_F, H5T_CSET_UTF8_F, H5T_FORTRAN_S1, H5T_STD_I64LE, &
     & h5aclose_f, h5acreate_f, h5aopen_by_name_f, h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, &
-    & h5dcreate_f, h5dont_atexit_f, h5dwrite_f, h5eset_auto_f, h5fclose_f, h5fcreate_f, &
+    & h5dcreate_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, h5dread_f, h5dwrite_f, &
+    & h5eset_auto_f, h5fclose_f, h5fcreate_f, &
     & h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, h5lexists_f, &
     & h5oclose_f, h5ocopy_f, h5oopen_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, &
     & h5pset_sieve_buf_size_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, &
-    & h5tcopy_f, h5tset_cset_f, h5tset_size_f, hid_t, hsize_t, size_t
+    & h5tcopy_f, h5tget_size_f, h5tset_cset_f, h5tset_size_f, hid_t, hsize_t, size_t
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   use pd_base_text, only: to_text
@@ -22,7 +23,7 @@ module pd_output_hdf5
   private
   public :: hdf5_file, start_hdf5, hdf5_version, create_file, open_file, flush_file, close_file
   public :: make_group, copy_object, object_exists, put_attribute, change_attribute, get_attribute
-  public :: put_text, explain
+  public :: put_text, get_text, explain
 
   !> An open file.
   type :: hdf5_file
@@ -415,5 +416,42 @@ contains
     end if
     call h5tclose_f(kind_id, ignored)
   end subroutine put_text
+
+  !> A text as `put_text` writes it.
+  subroutine get_text(file, path, text, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: path
+    character(:), allocatable, intent(out) :: text
+    type(error_type), allocatable, intent(out) :: error
+    character(kind=c_char), allocatable, target :: buffer(:)
+    integer(hid_t) :: kind_id, dataset
+    integer(size_t) :: length
+    type(c_ptr) :: place
+    integer :: status, ignored, i
+
+    text = ''
+    call h5dopen_f(file%id, path, dataset, status)
+    if (status /= 0) then
+      call explain(error, 'find '//path//' in', file%name)
+      return
+    end if
+    call h5dget_type_f(dataset, kind_id, status)
+    if (status == 0) call h5tget_size_f(kind_id, length, status)
+    if (status == 0) then
+      allocate (buffer(length))
+      place = c_loc(buffer)
+      call h5dread_f(dataset, kind_id, place, status)
+    end if
+    if (status /= 0) then
+      call explain(error, 'read '//path//' of', file%name)
+    else
+      text = repeat(' ', size(buffer))
+      do i = 1, size(buffer)
+        text(i:i) = buffer(i)
+      end do
+    end if
+    call h5tclose_f(kind_id, ignored)
+    call h5dclose_f(dataset, ignored)
+  end subroutine get_text
 
 end module pd_output_hdf5

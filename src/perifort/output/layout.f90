@@ -13,8 +13,8 @@ module pd_output_layout
   use pd_output_types, only: column_type, field_type
   implicit none (type, external)
   private
-  public :: layout_type, put_scene, put_geometry, write_vectors, copy_static, to_single, chunk_rows
-  public :: block_rows
+  public :: layout_type, put_scene, put_geometry, write_vectors, copy_static, copy_scene, to_single
+  public :: chunk_rows, block_rows
 
   integer, parameter :: block_rows = 65536  !! points converted and written at a time
   integer(i8), parameter :: small_chunk = 65536_i8, large_chunk = 4194304_i8  ! [bytes]
@@ -307,11 +307,11 @@ contains
     if (abs(value) > most) to_single = sign(huge(1.0_sp), real(sign(1.0_wp, value), sp))
   end function to_single
 
-  !> Copy all that doesn't grow.
+  !> Copy all that doesn't grow but the scene.
   subroutine copy_static(from, to, error)
     type(hdf5_file), intent(in) :: from, to
     type(error_type), allocatable, intent(out) :: error
-    character(*), parameter :: parts(8) = [character(24) :: '/points', '/scene', &
+    character(*), parameter :: parts(7) = [character(24) :: '/points', &
       & '/VTKHDF/NumberOfPoints', '/VTKHDF/Points', '/VTKHDF/Vertices', '/VTKHDF/Lines', &
       & '/VTKHDF/Polygons', '/VTKHDF/Strips']
     integer :: i
@@ -321,6 +321,13 @@ contains
       if (allocated(error)) return
     end do
   end subroutine copy_static
+
+  !> Copy the scene.
+  subroutine copy_scene(from, to, error)
+    type(hdf5_file), intent(in) :: from, to
+    type(error_type), allocatable, intent(out) :: error
+    call copy_object(from, '/scene', to, error)
+  end subroutine copy_scene
 
   !> Copy the complete outputs and rows, and what there is of an output under way, field by field
   !> and block by block. `outputs` and `rows` count the complete ones.

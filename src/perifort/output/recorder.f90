@@ -3,16 +3,17 @@
 module pd_output_recorder
   use, intrinsic :: iso_fortran_env, only: error_unit
   use pd_base_kinds, only: wp, i4, i8
-  use pd_base_clock, only: phase_timer_type, progress_type
+  use pd_base_clock, only: duration_text, phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
-  use pd_base_text, only: to_text
+  use pd_base_text, only: newline, to_text
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
   use pd_motion_watch, only: watch_type
+  use pd_output_checkpoint, only: about_type, checkpoint_type
   use pd_output_contact, only: touching_points
   use pd_output_results, only: results_type
   use pd_output_types, only: column_type, field_type
@@ -52,12 +53,20 @@ module pd_output_recorder
     integer :: rows = 0
     integer :: outputs = 0
     integer :: steps_done = 0
+    integer :: first_step = 0                !! steps that were done before this start
     real(wp) :: time = 0.0_wp
     logical :: touched = .false.             !! contact has been reported
     integer :: gave_way = 0                  !! load steps left to dynamic relaxation
     integer :: gave_way_at = 0               !! the last of them
+    type(checkpoint_type) :: checkpoint
+    type(about_type) :: about                !! of the run, for its checkpoints
+    integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
+    integer :: more_outputs = 0              !! which goes on would not have
+    real(wp) :: most_seconds = 0.0_wp        !! wall time until the run stops by itself, if > 0 [s]
+    character(:), allocatable :: command     !! goes on with the run
   contains
     procedure :: observe
+    procedure :: keep_state
   end type recorder_type
 
 contains
@@ -161,30 +170,33 @@ contains
     type(system_type), intent(inout) :: system
     type(instant_type), intent(in) :: instant
     type(error_type), allocatable, intent(out) :: error
-    logical :: row, output, stopping
+    logical :: row, output, row_due, output_due_now, may_stop, stopping, keeping
     real(wp), allocatable :: v(:, :)
 
     associate (schedule => observer%schedule)
       observer%steps_done = instant%step
       observer%time = instant%time
       if (schedule%relaxation) then
-        row = instant%settled .or. mod(instant%step, schedule%history_every) == 0
-        output = instant%settled .and. &
-          & (instant%last .or. mod(instant%load_step, schedule%every) == 0)
+        row_due = instant%settled .or. mod(instant%step, schedule%history_every) == 0
+        output_due_now = instant%settled .and. mod(instant%load_step, schedule%every) == 0
         call observer%progress%update(int(instant%load_step, i8) &
           & - merge(0_i8, 1_i8, instant%settled .or. instant%load_step == 0), instant%time, &
           & system%broken, relaxation_note(instant))
       else
-        row = instant%last .or. mod(instant%step, schedule%history_every) == 0
-        output = instant%last .or. output_due(schedule, instant%step, instant%dt)
+        row_due = mod(instant%step, schedule%history_every) == 0
+        output_due_now = output_due(schedule, instant%step, instant%dt)
         call observer%progress%update(int(instant%step, i8), instant%time, system%broken)
       end if
     end associate
     if (instant%gave_way) call note_giving_way(observer, instant)
-    stopping = interrupted() .and. .not. instant%last
-    row = row .or. stopping
-    output = output .or. stopping
-    if (.not. (row .or. output)) return
+    may_stop = instant%resumable .and. .not. instant%last
+    stopping = may_stop .and. (interrupted() .or. time_is_over(observer))
+    keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
+    row = row_due .or. stopping .or. instant%last
+    output = output_due_now .or. stopping .or. instant%last
+    observer%more_rows = merge(1, 0, row .and. .not. row_due)
+    observer%more_outputs = merge(1, 0, output .and. .not. output_due_now)
+    if (.not. (row .or. output .or. keeping)) return
     call observer%timer%stop('time stepping')
     call velocities_now(system, instant, v)
     if (row) then
@@ -199,9 +211,12 @@ contains
       call observer%timer%stop('output')
       if (allocated(error)) return
     end if
+    if (keeping) call observer%keep_state(system, finished=.false.)
     call observer%timer%start('time stepping')
-    if (stopping) call fail(error, 'interrupted at step '//to_text(instant%step)//', t = '// &
-      & to_text(instant%time)//': this state is the last output', status_interrupted)
+    if (stopping) call fail(error, reason_to_stop(observer)//' at step '// &
+      & to_text(instant%step)//', t = '//to_text(instant%time)// &
+      & ': this state is the last output'//newline//'  to go on: '//observer%command, &
+      & status_interrupted)
   end subroutine observe
 
   !> Count the load steps that the conjugate gradient leaves to dynamic relaxation, and say so at
@@ -219,6 +234,52 @@ contains
       & ' the conjugate gradient finds no rest (iteration '//to_text(instant%step)// &
       & '): dynamic relaxation goes on from there'
   end subroutine note_giving_way
+
+  !> Whether the run has had the time that it was given.
+  logical function time_is_over(recorder)
+    class(recorder_type), intent(in) :: recorder
+    time_is_over = .false.
+    if (recorder%most_seconds > 0.0_wp) &
+      & time_is_over = recorder%timer%total() >= recorder%most_seconds
+  end function time_is_over
+
+  function reason_to_stop(recorder) result(reason)
+    class(recorder_type), intent(in) :: recorder
+    character(:), allocatable :: reason
+    reason = 'interrupted'
+    if (.not. interrupted()) reason = 'stopped after '//duration_text(recorder%most_seconds)// &
+      & ', as asked for,'
+  end function reason_to_stop
+
+  !> Write a checkpoint. If that fails, the run goes on with the one before it.
+  subroutine keep_state(recorder, system, finished)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(inout) :: system
+    logical, intent(in) :: finished  !! the run has come to its end
+    type(error_type), allocatable :: error
+    character(:), allocatable :: scene_text
+
+    call recorder%timer%start('checkpoints')
+    associate (about => recorder%about)
+      scene_text = about%kept%scene_text
+      about%kept = recorder%results%kept(recorder%more_rows, recorder%more_outputs)
+      about%kept%scene_text = scene_text
+      about%step = recorder%steps_done
+      about%time = recorder%time
+      about%finished = finished
+      about%supply = recorder%supply
+      about%kinetic = recorder%energies%kinetic
+      about%strain = recorder%energies%strain
+      about%touched = recorder%touched
+      call recorder%results%sync(error)
+      if (.not. allocated(error)) call recorder%checkpoint%write(about, system, error)
+    end associate
+    call recorder%timer%stop('checkpoints')
+    if (.not. allocated(error)) return
+    call recorder%progress%finish()
+    write (error_unit, '(a)') 'warning: no checkpoint of step '//to_text(recorder%steps_done)// &
+      & ' could be written: '//error%message
+  end subroutine keep_state
 
   !> What the progress line adds in relaxation.
   pure function relaxation_note(instant) result(note)

@@ -13,15 +13,18 @@
 module pd_output_results
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_text, only: join, lower_case, nearest_name, to_text, with_unit
-  use pd_output_files, only: file_exists, in_directory, make_directory, remove_file
+  use pd_base_text, only: join, lower_case, to_text, with_unit
+  use pd_output_checkpoint, only: remove_checkpoints
+  use pd_output_description, only: check_description
+  use pd_output_earlier, only: existing_results, mark_complete, mark_unfinished, refuse_existing
+  use pd_output_files, only: in_directory, make_directory, remove_file
   use pd_output_history, only: csv_type, history_type
-  use pd_output_types, only: column_type, field_type, label_length
+  use pd_output_types, only: column_type, field_type, kept_type, label_length
   use pd_output_vtkhdf, only: vtkhdf_file
   use pd_output_vtu, only: remove_series, vtu_series
   implicit none (type, external)
   private
-  public :: results_type, existing_results, refuse_existing, column_type, field_type, label_length
+  public :: results_type, column_type, field_type, label_length
 
   !> The results of one run.
   type :: results_type
@@ -37,11 +40,13 @@ module pd_output_results
     integer :: points = 0
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
+    real(wp), allocatable :: times(:)    !! of them [s]
     real(wp) :: time = 0.0_wp            !! of the output under way [s]
     logical :: in_output = .false.
     logical :: use_vtkhdf = .false., use_vtu = .false.
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
+    logical :: resumed = .false.         !! they are those of a run that goes on
     logical :: failed = .false.
   contains
     procedure :: create
@@ -57,47 +62,25 @@ module pd_output_results
     procedure :: end_output
     procedure :: add_row
     procedure :: close => close_results
+    procedure :: sync
+    procedure :: kept => rows_and_times
+    procedure :: goes_on
     procedure :: planned_bytes
     procedure :: output_count
   end type results_type
 
 contains
 
-  !> The first file of earlier results of this stem in `directory`; '' if there is none.
-  function existing_results(directory, stem) result(path)
-    character(*), intent(in) :: directory, stem
-    character(:), allocatable :: path
-
-    path = in_directory(directory, trim(stem)//'.vtkhdf')
-    if (file_exists(path)) return
-    path = in_directory(directory, trim(stem)//'.pvd')
-    if (file_exists(path)) return
-    path = in_directory(directory, 'history.csv')
-    if (.not. file_exists(path)) path = ''
-  end function existing_results
-
-  !> Fail if earlier results would have to be overwritten and mustn't be. Cheap: meant to be
-  !> called before any long preparation.
-  subroutine refuse_existing(directory, stem, overwrite, error)
-    character(*), intent(in) :: directory, stem
-    logical, intent(in) :: overwrite
-    type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: path
-
-    if (overwrite) return
-    path = existing_results(directory, stem)
-    if (path /= '') call fail(error, 'there are results already: '//path// &
-      & ' (--overwrite replaces them, --output DIR puts the new ones elsewhere)')
-  end subroutine refuse_existing
-
   !> Begin the results `directory/stem.*` and `directory/history.csv`.
   !>
   !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
   !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
   !> `precision` ('double', 'single') is that of the fields; `format` is 'vtkhdf', 'vtu' or 'both'.
-  !> `scene_text`, `command` and the program's `version` are kept in the file.
+  !> `scene_text`, `command` and the program's `version` are kept in the file. With `kept`, the
+  !> files that are there go on after the outputs and rows in it; where there are none, new ones
+  !> begin with its rows.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
-    & planned_rows, precision, format, scene_text, command, version, overwrite, error)
+    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept)
     class(results_type), intent(out) :: self
     character(*), intent(in) :: directory, stem
     real(wp), intent(in) :: positions(:, :)
@@ -109,11 +92,14 @@ contains
     character(*), intent(in) :: scene_text, command, version
     logical, intent(in) :: overwrite
     type(error_type), allocatable, intent(out) :: error
+    type(kept_type), intent(in), optional :: kept
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
     if (allocated(error)) return
-    call refuse_existing(directory, stem, overwrite, error)
+    self%resumed = .false.
+    if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
+    if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
     if (allocated(error)) return
     call make_directory(directory, error)
     if (allocated(error)) return
@@ -129,8 +115,16 @@ contains
     self%use_vtkhdf = lower_case(format) /= 'vtu'
     self%use_vtu = lower_case(format) /= 'vtkhdf'
     call self%history%start(size(columns))
+    allocate (self%times(0))
+    if (present(kept)) call self%history%restore(kept%rows, written=self%resumed)
     if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
-    if (self%use_vtkhdf) then
+    if (self%resumed) then
+      if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
+        & size(positions, 1, kind=i8), fields, planned_outputs, columns, planned_rows, single, &
+        & scene_text, command, version, kept, error)
+      if (.not. allocated(error)) call resume_others(self, kept, error)
+      if (allocated(error)) return
+    else if (self%use_vtkhdf) then
       call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), positions, fields, &
         & planned_outputs, columns, planned_rows, single, scene_text, command, version, error)
       if (allocated(error)) then
@@ -141,51 +135,20 @@ contains
     self%open = .true.
   end subroutine create
 
-  !> Whether names, shapes and words are usable.
-  subroutine check_description(positions, fields, columns, precision, format, error)
-    real(wp), intent(in) :: positions(:, :)
-    type(field_type), intent(in) :: fields(:)
-    type(column_type), intent(in) :: columns(:)
-    character(*), intent(in) :: precision, format
-    type(error_type), allocatable, intent(out) :: error
-    character(label_length), allocatable :: names(:)
-    integer :: i
-
-    if (size(positions, 1) < 1) then
-      call fail(error, 'results need at least one point')
-    else if (size(positions, 2) /= 3) then
-      call fail(error, 'positions need three components, whatever the dimension')
-    else if (all(lower_case(trim(precision)) /= ['single', 'double'])) then
-      call fail(error, 'unknown precision '''//trim(precision)//''': single, double')
-    else if (all(lower_case(trim(format)) /= ['vtkhdf', 'vtu   ', 'both  '])) then
-      call fail(error, 'unknown format '''//trim(format)//''': vtkhdf, vtu, both')
-    end if
-    allocate (names(max(size(fields), size(columns))))
-    do i = 1, size(fields)
-      if (allocated(error)) return
-      names(i) = fields(i)%name
-      call check_name(names(i), names(:i - 1), error)
-      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3])) &
-        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1 nor 3 components')
-    end do
-    do i = 1, size(columns)
-      if (allocated(error)) return
-      names(i) = columns(i)%name
-      call check_name(names(i), names(:i - 1), error)
-    end do
-  end subroutine check_description
-
-  !> A name is there, new, and no path; a comma would part it in the table.
-  subroutine check_name(name, others, error)
-    character(*), intent(in) :: name, others(:)
+  !> Go on with the files beside the HDF5 file.
+  subroutine resume_others(self, kept, error)
+    class(results_type), intent(inout) :: self
+    type(kept_type), intent(in) :: kept
     type(error_type), allocatable, intent(out) :: error
 
-    if (name == '' .or. scan(trim(name), '/,"<>&'//new_line('a')) > 0 .or. name == '.') then
-      call fail(error, '''' //trim(name)//''' can''t name a field or column of the results')
-    else if (any(others == name)) then
-      call fail(error, 'two fields or columns of the results are named '//trim(name))
-    end if
-  end subroutine check_name
+    self%times = kept%times
+    self%outputs = size(kept%times)
+    call mark_unfinished(self%directory, self%stem, error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%resume(kept%times, error)
+    if (size(self%columns) > 0 .and. .not. allocated(error)) call self%csv%replace( &
+      & in_directory(self%directory, 'history.csv'), self%columns, kept%rows, error)
+    self%started = .not. allocated(error)
+  end subroutine resume_others
 
   subroutine put_points_real(self, name, values, error)
     class(results_type), intent(inout) :: self
@@ -347,6 +310,7 @@ contains
       call explain_output(self, error)
     else
       self%outputs = self%outputs + 1
+      self%times = [self%times, self%time]
       self%in_output = .false.
     end if
   end subroutine end_output
@@ -357,6 +321,9 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     if (self%started) return
+    call mark_unfinished(self%directory, self%stem, error)
+    if (allocated(error)) return
+    call remove_checkpoints(self%directory, self%stem)
     if (self%use_vtkhdf) then
       call self%vtkhdf%publish(error)
     else
@@ -427,14 +394,50 @@ contains
       & //' outputs)'
   end subroutine explain_need
 
-  !> Complete the files. After an error they stay as they were at the last complete output; if
-  !> nothing was written, nothing is left behind.
-  subroutine close_results(self, error)
+  !> Wait until all that was written is on the disk, with the rows that wait.
+  subroutine sync(self, error)
     class(results_type), intent(inout) :: self
     type(error_type), allocatable, intent(out) :: error
+
+    if (.not. (self%open .and. self%started)) return
+    call write_rows(self, error)
+    if (self%use_vtkhdf .and. .not. allocated(error)) call self%vtkhdf%sync(error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%sync(error)
+    if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
+  end subroutine sync
+
+  !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
+  pure function rows_and_times(self, but_rows, but_outputs) result(kept)
+    class(results_type), intent(in) :: self
+    integer, intent(in) :: but_rows, but_outputs
+    type(kept_type) :: kept
+
+    kept%rows = self%history%first_rows(but_rows)
+    kept%times = self%times(:self%outputs - but_outputs)
+  end function rows_and_times
+
+  !> Whether these are the files of a run that goes on, with all that was written before the first
+  !> output.
+  pure logical function goes_on(self)
+    class(results_type), intent(in) :: self
+    goes_on = self%resumed
+  end function goes_on
+
+  !> Complete the files. Those of a run that was `stopped` stay as they are, to go on another time;
+  !> with `keep_mark` they stay marked as unfinished. After an error in writing they stay as they
+  !> were at the last complete output; if nothing was written, nothing is left behind.
+  subroutine close_results(self, error, stopped, keep_mark)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    logical, intent(in), optional :: stopped, keep_mark
     type(error_type), allocatable :: ignored
+    logical :: leave, complete
 
     if (.not. self%open) return
+    leave = .false.
+    if (present(stopped)) leave = stopped
+    complete = .not. leave
+    if (present(keep_mark)) complete = complete .and. .not. keep_mark
     self%open = .false.
     if (self%use_vtu) call self%vtu%abandon()
     if (.not. self%failed) then
@@ -446,11 +449,18 @@ contains
       if (self%csv%is_open()) call self%csv%close(ignored)
       return
     end if
-    if (self%use_vtkhdf) call self%vtkhdf%finish(error)
+    if (self%use_vtkhdf) then
+      if (leave) then
+        call self%vtkhdf%leave(error)
+      else
+        call self%vtkhdf%finish(error)
+      end if
+    end if
     if (self%csv%is_open()) then
       call self%csv%close(ignored)
       if (allocated(ignored) .and. .not. allocated(error)) call move_alloc(ignored, error)
     end if
+    if (complete .and. .not. allocated(error)) call mark_complete(self%directory, self%stem)
   end subroutine close_results
 
   !> Bytes that all planned outputs and rows take, within some kilobytes.

@@ -3,12 +3,12 @@
 !> The C library's streams are used because they tell whether buffered text reached the file;
 !> a Fortran runtime library may lose that news.
 module pd_output_sink
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_null_ptr, &
-    & c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_loc, c_null_char, &
+    & c_null_ptr, c_ptr, c_size_t
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   use pd_base_text, only: newline
-  use pd_output_files, only: cut_file
+  use pd_output_files, only: cut_file, rename_file, sync_path
   implicit none (type, external)
   private
   public :: sink_type
@@ -25,7 +25,10 @@ module pd_output_sink
     procedure :: open => open_sink
     procedure :: put
     procedure :: line
+    procedure :: put_bytes
     procedure :: flush => flush_sink
+    procedure :: sync => sync_sink
+    procedure :: rename => rename_sink
     procedure :: close => close_sink
     procedure :: is_open
   end type sink_type
@@ -38,10 +41,10 @@ module pd_output_sink
       character(kind=c_char), intent(in) :: path(*), mode(*)
     end function c_fopen
 
-    integer(c_size_t) function c_fwrite(text, size, count, stream) bind(c, name='fwrite')
-      import :: c_char, c_ptr, c_size_t
+    integer(c_size_t) function c_fwrite(place, size, count, stream) bind(c, name='fwrite')
+      import :: c_ptr, c_size_t
       implicit none (type, external)
-      character(kind=c_char), intent(in) :: text(*)
+      type(c_ptr), value :: place
       integer(c_size_t), value :: size, count
       type(c_ptr), value :: stream
     end function c_fwrite
@@ -76,17 +79,26 @@ contains
   !> Write a piece of text.
   subroutine put(self, text, error)
     class(sink_type), intent(inout) :: self
-    character(*), intent(in) :: text
+    character(*), target, intent(in) :: text
+    type(error_type), allocatable, intent(out) :: error
+
+    if (len(text) > 0) call self%put_bytes(c_loc(text), len(text, kind=i8), error)
+  end subroutine put
+
+  !> Write `bytes` bytes from `place`.
+  subroutine put_bytes(self, place, bytes, error)
+    class(sink_type), intent(inout) :: self
+    type(c_ptr), intent(in) :: place
+    integer(i8), intent(in) :: bytes
     type(error_type), allocatable, intent(out) :: error
     integer(c_size_t) :: count
 
-    if (len(text) == 0) return
-    count = c_fwrite(text, 1_c_size_t, len(text, kind=c_size_t), self%stream)
-    self%bytes = self%bytes + len(text, kind=i8)
-    if (count == len(text, kind=c_size_t)) return
+    count = c_fwrite(place, 1_c_size_t, int(bytes, c_size_t), self%stream)
+    self%bytes = self%bytes + bytes
+    if (count == int(bytes, c_size_t)) return
     self%broken = .true.
     call fail(error, 'cannot write '//self%path//': '//reason_at(self%path, '.probe'))
-  end subroutine put
+  end subroutine put_bytes
 
   !> Write a line.
   subroutine line(self, text, error)
@@ -108,6 +120,25 @@ contains
       call fail(error, 'cannot write '//self%path//': '//reason_at(self%path, '.probe'))
     end if
   end subroutine flush_sink
+
+  !> Hand all to the system and wait until it is on the disk.
+  subroutine sync_sink(self, error)
+    class(sink_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    call self%flush(error)
+    if (.not. allocated(error)) call sync_path(self%path, error)
+  end subroutine sync_sink
+
+  !> Give the open file another name, in place of an older file.
+  subroutine rename_sink(self, path, error)
+    class(sink_type), intent(inout) :: self
+    character(*), intent(in) :: path
+    type(error_type), allocatable, intent(out) :: error
+
+    call rename_file(self%path, path, error)
+    if (.not. allocated(error)) self%path = path
+  end subroutine rename_sink
 
   !> Complete the file; after a failure it ends with the last piece that was flushed.
   subroutine close_sink(self, error)

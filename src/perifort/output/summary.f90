@@ -9,7 +9,7 @@ module pd_output_summary
   use pd_output_recorder, only: recorder_type, probe_type
   implicit none (type, external)
   private
-  public :: summary_before, summary_after, memory_of
+  public :: summary_before, summary_after, checkpoint_line, memory_of
 
 contains
 
@@ -121,6 +121,23 @@ contains
     if (plan%printed > 0.0_wp) text = with_unit(plan%printed, 's', 6)
   end function printed
 
+  !> How large checkpoints are and how often they are written.
+  pure function checkpoint_line(scene, bytes) result(text)
+    type(scene_type), intent(in) :: scene
+    integer(i8), intent(in) :: bytes
+    character(:), allocatable :: text
+
+    text = ''
+    if (scene%output%checkpoint_every > 0) &
+      & text = 'every '//to_text(scene%output%checkpoint_every)//' steps'
+    if (scene%output%checkpoint_minutes > 0.0_wp) then
+      if (text /= '') text = text//' and '
+      text = text//'every '//duration_text(60*scene%output%checkpoint_minutes)
+    end if
+    if (text == '') text = 'only when the run is interrupted'
+    text = '  checkpoints     '//with_unit(real(bytes, wp), 'B', 3)//', the last two kept, '//text
+  end function checkpoint_line
+
   !> What the run came to: time per phase, speed, energies, damage, where the results are.
   function summary_after(system, recorder, directory) result(text)
     type(system_type), intent(in) :: system
@@ -128,13 +145,14 @@ contains
     character(*), intent(in) :: directory
     character(:), allocatable :: text
     real(wp) :: supply, balance, largest
+    integer :: steps
 
     text = recorder%timer%table()//newline
-    if (recorder%steps_done > 0) text = text//line('speed', &
+    steps = recorder%steps_done - recorder%first_step
+    if (steps > 0) text = text//line('speed', &
       & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
-      & /(real(system%family%n_bonds, wp)*recorder%steps_done), 3)//' ns per bond and step, '// &
-      & to_text(recorder%steps_done/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
-      & ' steps/s')
+      & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
+      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
     if (recorder%gave_way > 0) text = text//line('solver', to_text(recorder%gave_way)// &
       & ' load step(s) were left to dynamic relaxation by the conjugate gradient')
     associate (now => recorder%energies)

@@ -9,16 +9,18 @@
 module pd_output_vtkhdf
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, sp, i1, i4, i8
-  use pd_output_datasets, only: put_array, set_rows, write_rows
-  use pd_output_files, only: remove_file, rename_file
-  use pd_output_hdf5, only: change_attribute, close_file, create_file, flush_file, hdf5_file, &
-    & make_group, open_file, start_hdf5
-  use pd_output_layout, only: block_rows, copy_static, layout_type, put_geometry, put_scene, &
+  use pd_base_text, only: to_text
+  use pd_output_datasets, only: get_chunk, get_shape, put_array, read_rows, set_rows, write_rows
+  use pd_output_files, only: remove_file, rename_file, sync_path
+  use pd_output_hdf5, only: change_attribute, close_file, create_file, flush_file, get_attribute, &
+    & get_text, hdf5_file, make_group, open_file, start_hdf5
+  use pd_output_layout, only: block_rows, copy_scene, copy_static, layout_type, put_geometry, &
+    & put_scene, &
     & to_single, write_vectors
-  use pd_output_types, only: column_type, field_type
+  use pd_output_types, only: column_type, field_type, kept_type
   implicit none (type, external)
   private
-  public :: vtkhdf_file
+  public :: vtkhdf_file, scene_of_results
 
   integer(i8), parameter :: default_outputs = 16_i8, default_rows = 4096_i8
 
@@ -34,6 +36,7 @@ module pd_output_vtkhdf
     logical :: sealed = .false.           !! laid out for good
   contains
     procedure :: create
+    procedure :: resume
     procedure, private :: put_points_real, put_points_i4, put_points_i1
     !> Add an array over the points to `/points`, before the first output.
     generic :: put_points => put_points_real, put_points_i4, put_points_i1
@@ -44,7 +47,9 @@ module pd_output_vtkhdf
     procedure :: end_output
     procedure :: append_rows
     procedure :: publish
+    procedure :: sync
     procedure :: finish
+    procedure :: leave
     procedure :: abandon
     procedure :: planned_bytes
     procedure :: output_bytes
@@ -71,15 +76,8 @@ contains
 
     self%path = path
     self%current = path//'.part'
-    allocate (self%layout%fields, source=fields)
-    allocate (self%layout%columns, source=columns)
-    self%layout%points = size(positions, 1, kind=i8)
-    self%layout%single = single
-    self%layout%capacity = default_outputs
-    if (planned_outputs > 0) self%layout%capacity = planned_outputs
-    self%layout%row_capacity = default_rows
-    if (planned_rows > 0) self%layout%row_capacity = planned_rows
-
+    call plan_layout(self, size(positions, 1, kind=i8), fields, planned_outputs, columns, &
+      & planned_rows, single)
     call start_hdf5(error)
     if (allocated(error)) return
     call remove_file(path//'.grow')  ! a killed run may have left it
@@ -92,6 +90,128 @@ contains
     if (.not. allocated(error)) call self%layout%make_time_series(self%file, error)
     if (allocated(error)) call self%abandon()
   end subroutine create
+
+  !> What the file is to hold, and room for how much of it.
+  subroutine plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    type(vtkhdf_file), intent(inout) :: self
+    integer(i8), intent(in) :: points
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    logical, intent(in) :: single
+
+    allocate (self%layout%fields, source=fields)
+    allocate (self%layout%columns, source=columns)
+    self%layout%points = points
+    self%layout%single = single
+    self%layout%capacity = default_outputs
+    if (planned_outputs > 0) self%layout%capacity = planned_outputs
+    self%layout%row_capacity = default_rows
+    if (planned_rows > 0) self%layout%row_capacity = planned_rows
+  end subroutine plan_layout
+
+  !> Go on with a file that was left at or after the outputs and rows in `kept`: what is beyond them
+  !> is cut off. The other arguments are those of `create`; a changed `scene_text` is written.
+  subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
+    & scene_text, command, version, kept, error)
+    class(vtkhdf_file), intent(out) :: self
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: points
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    logical, intent(in) :: single
+    character(*), intent(in) :: scene_text, command, version
+    type(kept_type), intent(in) :: kept
+    type(error_type), allocatable, intent(out) :: error
+    type(layout_type) :: plan
+    character(:), allocatable :: text
+    logical :: narrow
+
+    self%path = path
+    self%current = path
+    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    call start_hdf5(error)
+    if (allocated(error)) return
+    call remove_file(path//'.grow')
+    call remove_file(path//'.part')
+    call open_file(path, .true., self%file, error)
+    if (allocated(error)) return
+    self%sealed = .true.
+    call get_text(self%file, '/scene/text', text, error)
+    if (.not. allocated(error)) call check_kept(self, kept, error)
+    if (.not. allocated(error) .and. text /= kept%scene_text .and. text /= scene_text) &
+      & call fail(error, path//' holds the results of another scene than the checkpoint')
+    if (allocated(error)) return
+    self%outputs = size(kept%times, kind=i8)
+    self%rows = size(kept%rows, 2, kind=i8)
+
+    plan = self%layout
+    call find_capacity(self, error)
+    if (allocated(error)) return
+    narrow = self%layout%capacity < max(plan%capacity, self%outputs + 1) .or. &
+      & self%layout%row_capacity < max(plan%row_capacity, self%rows + 1)
+    if (narrow .or. text /= scene_text) then
+      call enlarge(self, max(plan%capacity, self%outputs + 1), &
+        & max(plan%row_capacity, self%rows + 1), error, scene_text, command, version)
+    else
+      call cut_back(self, error)
+    end if
+  end subroutine resume
+
+  !> Whether the file has what the checkpoint counts on.
+  subroutine check_kept(self, kept, error)
+    class(vtkhdf_file), intent(in) :: self
+    type(kept_type), intent(in) :: kept
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(i8) :: outputs, rows
+
+    call get_attribute(self%file, '/VTKHDF/Steps', 'NSteps', outputs, error)
+    if (.not. allocated(error)) call get_attribute(self%file, '/history', 'rows', rows, error)
+    if (allocated(error)) return
+    if (outputs < size(kept%times) .or. rows < size(kept%rows, 2)) then
+      call fail(error, self%path//' holds '//to_text(outputs)//' outputs and '//to_text(rows)// &
+        & ' rows of history, less than the '//to_text(size(kept%times))//' and '// &
+        & to_text(size(kept%rows, 2))//' that the checkpoint counts on')
+      return
+    end if
+    allocate (values(size(kept%times)))
+    call read_rows(self%file, '/VTKHDF/Steps/Values', 0_i8, values, error)
+    if (allocated(error)) return
+    if (any(abs(values - kept%times) > 0.0_wp)) call fail(error, self%path// &
+      & ' has outputs at other times than the checkpoint: it belongs to another run')
+  end subroutine check_kept
+
+  !> Room for how many outputs and rows a file was laid out for.
+  subroutine find_capacity(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    integer :: components
+
+    call get_shape(self%file, '/VTKHDF/Steps/PartOffsets', components, self%layout%capacity, error)
+    if (allocated(error) .or. size(self%layout%columns) == 0) return
+    call get_chunk(self%file, '/history/'//trim(self%layout%columns(1)%name), &
+      & self%layout%row_capacity, error)
+  end subroutine find_capacity
+
+  !> Let the file count its outputs and rows as they are counted here, which is less than before.
+  subroutine cut_back(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    ! as when they are added, the count never says more than a column has
+    call change_attribute(self%file, '/history', 'rows', self%rows, error)
+    if (.not. allocated(error)) call flush_file(self%file, error)
+    if (.not. allocated(error)) call set_columns(self, max(1_i8, self%rows), error)
+    if (.not. allocated(error)) call set_rows(self%file, '/VTKHDF/Steps/Values', 1, &
+      & max(1_i8, self%outputs), error)
+    if (.not. allocated(error)) call change_attribute(self%file, '/VTKHDF/Steps', 'NSteps', &
+      & self%outputs, error)
+    if (.not. allocated(error)) call flush_file(self%file, error)
+  end subroutine cut_back
 
   subroutine put_points_real(self, name, values, error)
     class(vtkhdf_file), intent(inout) :: self
@@ -258,11 +378,13 @@ contains
     end do
   end subroutine set_columns
 
-  !> Copy the file into one with more room, which takes its place.
-  subroutine enlarge(self, capacity, row_capacity, error)
+  !> Copy the file into one with more room, which takes its place; with another scene, if one is
+  !> given.
+  subroutine enlarge(self, capacity, row_capacity, error, scene_text, command, version)
     class(vtkhdf_file), intent(inout) :: self
     integer(i8), intent(in) :: capacity, row_capacity
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: scene_text, command, version
     type(error_type), allocatable :: ignored
     type(hdf5_file) :: bigger
     character(:), allocatable :: name
@@ -276,6 +398,13 @@ contains
     call create_file(name, bigger, error)
     if (.not. allocated(error)) call self%layout%make_heart(bigger, error)
     if (.not. allocated(error)) call copy_static(self%file, bigger, error)
+    if (.not. allocated(error)) then
+      if (present(scene_text)) then
+        call put_scene(bigger, scene_text, command, version, error)
+      else
+        call copy_scene(self%file, bigger, error)
+      end if
+    end if
     if (.not. allocated(error)) call self%layout%make_time_series(bigger, error)
     if (.not. allocated(error)) call self%layout%copy_time_series(self%file, &
       & self%outputs, self%rows, bigger, error)
@@ -307,6 +436,22 @@ contains
     self%current = self%path
     self%file%name = self%path
   end subroutine publish
+
+  !> Wait until all that was written is on the disk.
+  subroutine sync(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    call flush_file(self%file, error)
+    if (.not. allocated(error)) call sync_path(self%current, error)
+  end subroutine sync
+
+  !> Close the file with the room that it has, to go on with it another time.
+  subroutine leave(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    call close_file(self%file, error)
+  end subroutine leave
 
   !> Cut off room that wasn't needed and close the file.
   subroutine finish(self, error)
@@ -351,5 +496,21 @@ contains
     class(vtkhdf_file), intent(in) :: self
     layout_bytes = self%layout%fixed_bytes()
   end function layout_bytes
+
+  !> The scene that a results file holds.
+  subroutine scene_of_results(path, text, error)
+    character(*), intent(in) :: path
+    character(:), allocatable, intent(out) :: text
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+    type(hdf5_file) :: file
+
+    text = ''
+    call start_hdf5(error)
+    if (.not. allocated(error)) call open_file(path, .false., file, error)
+    if (allocated(error)) return
+    call get_text(file, '/scene/text', text, error)
+    call close_file(file, ignored)
+  end subroutine scene_of_results
 
 end module pd_output_vtkhdf

@@ -4,11 +4,11 @@
 !> Each file gets its name when it is complete, and the list names only complete files.
 module pd_output_vtu
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, sp, i1, i8
   use pd_base_text, only: newline
   use pd_output_base64, only: base64_encoder, base64_length
-  use pd_output_files, only: file_exists, in_directory, remove_file, rename_file
+  use pd_output_files, only: file_exists, in_directory, remove_file, rename_file, sync_path
   use pd_output_layout, only: block_rows, to_single
   use pd_output_sink, only: sink_type
   use pd_output_types, only: field_type
@@ -26,10 +26,13 @@ module pd_output_vtu
     real(wp), allocatable :: positions(:, :)
     real(wp), allocatable :: times(:)
     integer :: outputs = 0
+    integer :: synced = 0    !! outputs that are certainly on the disk
     logical :: single = .false.
     type(sink_type) :: sink
   contains
     procedure :: create
+    procedure :: resume
+    procedure :: sync
     procedure :: begin_output
     procedure, private :: put_scalar, put_vector
     !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
@@ -62,6 +65,43 @@ contains
     allocate (self%times(16))
     self%single = single
   end subroutine create
+
+  !> Go on with a series, made ready by `create`, after the outputs at `times` [s]; later ones go.
+  subroutine resume(self, times, error)
+    class(vtu_series), intent(inout) :: self
+    real(wp), intent(in) :: times(:)
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: name
+    integer :: i
+
+    do i = 1, size(times)
+      name = in_directory(self%directory, member(self%stem, i - 1))
+      if (file_exists(name)) cycle
+      call fail(error, 'there is no '//name//', which the checkpoint counts on')
+      return
+    end do
+    self%outputs = size(times)
+    self%synced = self%outputs
+    self%times = [times, spread(0.0_wp, 1, size(self%times))]
+    call write_list(self, self%outputs, error)
+    if (allocated(error)) return
+    call remove_series(self%directory, self%stem, self%outputs)
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs)//'.part'))
+  end subroutine resume
+
+  !> Wait until all complete outputs are on the disk.
+  subroutine sync(self, error)
+    class(vtu_series), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = self%synced, self%outputs - 1
+      call sync_path(in_directory(self%directory, member(self%stem, i)), error)
+      if (allocated(error)) return
+    end do
+    self%synced = self%outputs
+    call sync_path(in_directory(self%directory, self%stem//'.pvd'), error)
+  end subroutine sync
 
   !> `stem_000012.vtu`
   pure function member(stem, index) result(name)

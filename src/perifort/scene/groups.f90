@@ -425,6 +425,11 @@ contains
       & allowed=[character(6) :: 'single', 'double'])
     call keys%key('format', group%format, 'vtkhdf: one HDF5 file, also VTK; vtu: a .pvd series', &
       & allowed=[character(6) :: 'vtkhdf', 'vtu', 'both'])
+    call keys%key('checkpoint_every', group%checkpoint_every, '', &
+      & 'steps (relaxation: iterations) between checkpoints, from which a run can go on', &
+      & at_least=1, default='by time only', hidden=group%checkpoint_every == 0)
+    call keys%key('checkpoint_minutes', group%checkpoint_minutes, 'min', &
+      & 'minutes of computing between checkpoints; 0: none by time', at_least=0.0_wp)
   end subroutine visit_output
 
   !> `&probe`

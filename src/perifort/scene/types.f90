@@ -147,6 +147,8 @@ module pd_scene_types
     character(name_length), allocatable :: fields(:)
     character(name_length) :: precision = 'double'   !! 'single'
     character(name_length) :: format = 'vtkhdf'      !! 'vtu', 'both'
+    integer :: checkpoint_every = 0              !! steps (relaxation: iterations); 0 = none so
+    real(wp) :: checkpoint_minutes = 15.0_wp     !! of wall time; 0 = not by time
   end type output_group
 
   !> `&probe`
