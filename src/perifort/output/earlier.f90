@@ -5,10 +5,12 @@ module pd_output_earlier
   use pd_base_text, only: newline
   use pd_output_checkpoint, only: checkpoint_path
   use pd_output_files, only: file_exists, in_directory, remove_file
+  use pd_output_hdf5, only: close_file, get_text, hdf5_file, open_file, start_hdf5
   use pd_output_sink, only: sink_type
   implicit none (type, external)
   private
-  public :: existing_results, refuse_existing, unfinished, mark_unfinished, mark_complete
+  public :: existing_results, refuse_existing, unfinished, mark_unfinished, mark_complete, &
+    & scene_of_results
 
 contains
 
@@ -81,5 +83,21 @@ contains
     character(*), intent(in) :: directory, stem
     call remove_file(mark_of(directory, stem))
   end subroutine mark_complete
+
+  !> The scene that a results file holds.
+  subroutine scene_of_results(path, text, error)
+    character(*), intent(in) :: path
+    character(:), allocatable, intent(out) :: text
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+    type(hdf5_file) :: file
+
+    text = ''
+    call start_hdf5(error)
+    if (.not. allocated(error)) call open_file(path, .false., file, error)
+    if (allocated(error)) return
+    call get_text(file, '/scene/text', text, error)
+    call close_file(file, ignored)
+  end subroutine scene_of_results
 
 end module pd_output_earlier

@@ -10,9 +10,9 @@ module pd_output_restart
   use pd_motion_system, only: system_type
   use pd_output_checkpoint, only: about_type, checkpoint_path, keep_about, older_path
   use pd_output_checkpoint_file, only: reader_type
-  use pd_output_earlier, only: existing_results, mark_complete, refuse_existing, unfinished
+  use pd_output_earlier, only: existing_results, mark_complete, refuse_existing, &
+    & scene_of_results, unfinished
   use pd_output_files, only: file_exists, in_directory
-  use pd_output_vtkhdf, only: scene_of_results
   use pd_scene_compare, only: difference_type, scene_differences
   use pd_scene_types, only: scene_type, is_set
   use pd_scene_write, only: scene_text

@@ -20,7 +20,7 @@ module pd_output_vtkhdf
   use pd_output_types, only: column_type, field_type, kept_type
   implicit none (type, external)
   private
-  public :: vtkhdf_file, scene_of_results
+  public :: vtkhdf_file
 
   integer(i8), parameter :: default_outputs = 16_i8, default_rows = 4096_i8
 
@@ -496,21 +496,5 @@ contains
     class(vtkhdf_file), intent(in) :: self
     layout_bytes = self%layout%fixed_bytes()
   end function layout_bytes
-
-  !> The scene that a results file holds.
-  subroutine scene_of_results(path, text, error)
-    character(*), intent(in) :: path
-    character(:), allocatable, intent(out) :: text
-    type(error_type), allocatable, intent(out) :: error
-    type(error_type), allocatable :: ignored
-    type(hdf5_file) :: file
-
-    text = ''
-    call start_hdf5(error)
-    if (.not. allocated(error)) call open_file(path, .false., file, error)
-    if (allocated(error)) return
-    call get_text(file, '/scene/text', text, error)
-    call close_file(file, ignored)
-  end subroutine scene_of_results
 
 end module pd_output_vtkhdf
