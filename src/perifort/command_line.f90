@@ -262,7 +262,7 @@ contains
     case ('--surface')
       line%bench%surface = .true.
     case ('--seconds')
-      call read_amount(value, line%bench%seconds, status)
+      call read_positive(value, line%bench%seconds, status)
       line%seconds = line%bench%seconds
       if (status /= 0) call usage(error, line, "'--seconds' needs a number, as in "// &
         & "--seconds 0.5, found '"//value//"'")
@@ -280,8 +280,8 @@ contains
       line%restart = .true.
       line%checkpoint = value
     case ('--max-minutes')
-      call read_amount(value, line%max_minutes, status)
-      if (status /= 0 .or. line%max_minutes <= 0.0_wp) call usage(error, line, &
+      call read_positive(value, line%max_minutes, status)
+      if (status /= 0) call usage(error, line, &
         & "'--max-minutes' needs a number above 0, as in --max-minutes 50, found '"//value//"'")
     case ('--quiet')
       line%quiet = .true.
