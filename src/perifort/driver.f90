@@ -5,9 +5,11 @@ module pd_driver
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
-  use pd_base_error, only: error_type, fail, status_interrupted
+  use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: watch_for_interrupt
   use pd_base_text, only: to_text, with_unit
+  use pd_scene_check_bodies, only: memory_per_point
+  use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_types, only: scene_type, is_set, material_group
   use pd_scene_write, only: scene_text
   use pd_body_body, only: body_type
@@ -108,6 +110,11 @@ contains
       else
         call run_explicit(system, plan%integrator, plan%step, plan%steps, recorder, error)
       end if
+      if (allocated(error)) then
+        ! what the motion finds wrong with the input, it finds before the first iteration
+        if (error%status == status_input .and. recorder%rows == 0) &
+          & call place_fault(error, scene, 'time', 1, 'method')
+      end if
       call recorder%timer%stop('time stepping')
       call recorder%progress%finish()
       stopped = .false.
@@ -183,38 +190,45 @@ contains
     end associate
   end function bytes_of_checkpoint
 
-  !> An error if the lattice bodies of a scene need more memory than there is. Measured on cubes, a
-  !> run takes at its peak, while families are built, about 400 bytes a point with a lattice; a list
-  !> adds about 10 bytes a bond, and conjugate gradients up to 250 bytes a point.
+  !> An error if the lattice bodies of a scene need more memory than there is, at the body with the
+  !> most points. Measured on cubes, a list takes about 10 bytes a bond, a lattice whose bonds can
+  !> break has a bit for each, and conjugate gradients take up to 250 bytes a point.
   subroutine check_memory(scene, error)
     type(scene_type), intent(in) :: scene
     type(error_type), allocatable, intent(out) :: error
-    real(wp), parameter :: per_point = 400.0_wp, per_bond = 10.0_wp, per_solver = 250.0_wp
-    real(wp) :: points, spacing, delta, need, there
-    integer :: i, dim
+    real(wp), parameter :: per_bond = 10.0_wp, per_bit = 0.125_wp, per_solver = 250.0_wp
+    real(wp) :: points, most, number, spacing, members, need, there
+    integer :: i, dim, largest
 
     dim = scene%header%dimension
     points = 0.0_wp
+    most = 0.0_wp
     spacing = 0.0_wp
+    largest = 1
     do i = 1, size(scene%bodies)
       if (scene%bodies(i)%file /= '') cycle
-      points = points + product(real(scene%bodies(i)%points(:dim), wp))
+      number = product(real(scene%bodies(i)%points(:dim), wp))
+      points = points + number
+      if (number > most) largest = i
+      most = max(most, number)
       spacing = max(spacing, (scene%bodies(i)%upper(1) - scene%bodies(i)%lower(1)) &
         & /scene%bodies(i)%points(1))
     end do
     if (points <= 0.0_wp) return
-    need = points*per_point
+    need = points*memory_per_point
     if (scene%time%method == 'relaxation' .and. scene%relaxation%solver == 'conjugate_gradient') &
       & need = need + points*per_solver
+    members = min(points, (2*min(horizon_of(scene, spacing)/spacing, points))**dim)
     if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
-      delta = horizon_of(scene, spacing)
-      need = need + points*per_bond*horizon_volume(dim, delta, 1.0_wp)/spacing**dim
+      need = need + points*per_bond*members
+    else if (size(scene%cracks) > 0 .or. any_critical(scene)) then
+      need = need + points*per_bit*members
     end if
     there = real(available_memory(), wp)
     if (need <= there) return
-    call fail(error, 'the scene has '//to_text(int(points, i8))//' points and needs about '// &
-      & with_unit(need, 'B', 3)//' of memory, but only '//with_unit(there, 'B', 3)// &
-      & ' are available')
+    call scene_fault(error, scene, 'body', largest, 'points', 'the scene has '// &
+      & to_text(int(points, i8))//' points and needs about '//with_unit(need, 'B', 3)// &
+      & ' of memory', 'only '//with_unit(there, 'B', 3)//' are available')
   end subroutine check_memory
 
   !> Points, families, corrections, cracks, conditions and the plan of a scene.
@@ -240,6 +254,7 @@ contains
         & trim(scene%horizon%volume_correction)), delta), system, error)
       if (allocated(error)) return
       call check_overlap(system%body, system%family, set_up%lonely, error)
+      call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
       call timer%stop('families')
 
@@ -298,14 +313,15 @@ contains
       call lattice_suits(system%body, rule, suits, reason)
     end if
     if (scene%horizon%family == 'lattice' .and. .not. suits) then
-      call fail(error, &
-        & 'the scene cannot have lattice families, which &horizon family asks for: '//reason)
+      call scene_fault(error, scene, 'horizon', 1, 'family', &
+        & 'the scene cannot have lattice families, which &horizon family asks for', reason)
       return
     end if
     if (suits) then
       allocate (lattice)
       call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), &
         & lattice, error)
+      call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
       call move_alloc(lattice, system%family)
     else

@@ -14,19 +14,26 @@ module pd_base_error
   type :: error_type
     character(:), allocatable :: message  !! what was wrong, what was expected, what is allowed
     integer :: status = status_input      !! the program's exit status
+    character(:), allocatable :: group    !! the group of a scene that is to blame, if it is known
+    integer :: number = 0                 !! which one of that name
   end type error_type
 
 contains
 
-  !> Allocate `error` with a message and an exit status (default: `status_input`).
-  pure subroutine fail(error, message, status)
+  !> Allocate `error` with a message and an exit status (default: `status_input`). `group` and
+  !> `number` say which group of a scene is to blame, for those who know its place in the file.
+  pure subroutine fail(error, message, status, group, number)
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in) :: message
     integer, intent(in), optional :: status
+    character(*), intent(in), optional :: group
+    integer, intent(in), optional :: number
 
     allocate (error)
     error%message = message
     if (present(status)) error%status = status
+    if (present(group)) error%group = group
+    if (present(number)) error%number = number
   end subroutine fail
 
 end module pd_base_error

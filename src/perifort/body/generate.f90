@@ -5,9 +5,10 @@
 module pd_body_generate
   use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type, fail
-  use pd_base_text, only: newline, to_text
+  use pd_base_text, only: newline, to_text, with_unit
   use pd_scene_types, only: scene_type, body_group, is_set
   use pd_scene_file, only: resolve_path
+  use pd_scene_rules, only: scene_fault
   use pd_scene_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_shapes, only: inside
@@ -17,6 +18,7 @@ module pd_body_generate
 
   real(wp), parameter :: same_grid = 1.0e-6_wp  !! how far two grids may differ [spacings]
   real(wp), parameter :: touch = 1.0e-6_wp      !! what counts as on a surface [spacings]
+  real(wp), parameter :: most_members = 2.0e5_wp  !! of the box around a horizon [points]
 
 contains
 
@@ -51,15 +53,35 @@ contains
       call keep_points(body, .not. inside(scene%removed(i), body%x, touch*minval(body%spacing)))
     end do
     if (body%n_points == 0) then
-      call fail(error, 'the scene has no points: every point of its bodies was removed')
+      call scene_fault(error, scene, 'remove', size(scene%removed), 'shape', &
+        & 'the scene has no points: every point of its bodies was removed', '')
       return
     end if
     delta = horizon_of(scene, maxval(body%spacing))
+    call check_family_size(scene, body%dim, delta, minval(body%spacing), error)
+    if (allocated(error)) return
     do i = 1, size(scene%boundaries)
       if (scene%boundaries(i)%side == '') cycle
       call add_layer(scene, i, delta, depth, body)
     end do
   end subroutine generate_body
+
+  !> An error if the horizon holds more points than any computation is meant to have in a family;
+  !> what is counted in families and offsets below then fits its integers.
+  subroutine check_family_size(scene, dim, delta, spacing, error)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: delta, spacing
+    type(error_type), allocatable, intent(out) :: error
+    real(wp) :: members
+
+    members = (2*min(delta/spacing, most_members))**dim
+    if (members <= most_members) return
+    call scene_fault(error, scene, 'horizon', 1, merge('length', 'ratio ', &
+      & is_set(scene%horizon%length)), 'the horizon of '//with_unit(delta, 'm')//' is too large &
+      &for a smallest spacing of '//with_unit(spacing, 'm'), 'a family of the points around one &
+      &may have about '//to_text(most_members)//' members')
+  end subroutine check_family_size
 
   !> delta [m]: the length given, or the ratio times the largest spacing.
   pure real(wp) function horizon_of(scene, largest_spacing) result(delta)

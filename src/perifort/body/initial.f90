@@ -1,10 +1,11 @@
 !> Initial state (7.8): displacement, velocity and temperature change of every point.
 module pd_body_initial
   use pd_base_kinds, only: wp
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type
   use pd_base_text, only: to_text
-  use pd_scene_types, only: scene_type, initial_group, is_set
+  use pd_scene_types, only: scene_type, is_set
   use pd_scene_file, only: resolve_path
+  use pd_scene_rules, only: scene_fault
   use pd_scene_table, only: table_type, read_table
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
@@ -30,7 +31,7 @@ contains
     do i = 1, size(scene%initial)
       associate (group => scene%initial(i))
         if (group%file /= '') then
-          call state_from_file(scene, group, body, u, v, temperature_change, error)
+          call state_from_file(scene, i, body, u, v, temperature_change, error)
           if (allocated(error)) return
           cycle
         end if
@@ -67,9 +68,9 @@ contains
   end subroutine set_field
 
   !> Columns of a table, one row per point in the order of the results.
-  subroutine state_from_file(scene, group, body, u, v, temperature_change, error)
+  subroutine state_from_file(scene, number, body, u, v, temperature_change, error)
     type(scene_type), intent(in) :: scene
-    type(initial_group), intent(in) :: group
+    integer, intent(in) :: number
     type(body_type), intent(in) :: body
     real(wp), intent(inout) :: u(:, :), v(:, :), temperature_change(:)
     type(error_type), allocatable, intent(out) :: error
@@ -79,14 +80,14 @@ contains
     type(table_type) :: table
     integer :: column, which
 
-    path = resolve_path(trim(group%file), scene%file)
+    path = resolve_path(trim(scene%initial(number)%file), scene%file)
     call read_table(path, table, error, allowed=pack(known, of_dimension(body%dim)))
     if (allocated(error)) return
     if (size(table%values, 2) /= body%n_points) then
-      call fail(error, 'the initial state in '//path//' has '//to_text(size(table%values, 2))// &
-        & ' rows, but the scene has '//to_text(body%n_points)// &
-        & ' points (layers included): one row '// &
-        & 'per point is expected, in the order of the results')
+      call scene_fault(error, scene, 'initial', number, 'file', 'the initial state in '//path// &
+        & ' has '//to_text(size(table%values, 2))//' rows, but the scene has '// &
+        & to_text(body%n_points)//' points (layers included)', &
+        & 'one row per point is expected, in the order of the results')
       return
     end if
     do column = 1, size(table%names)

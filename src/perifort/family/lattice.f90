@@ -98,8 +98,33 @@ contains
       if (any(body%grid == g)) room = room + product(real(extent(body, g), wp))
     end do
     suits = body%n_points >= least_filled*room
-    if (.not. suits) reason = 'the points fill too little of their grid'
+    if (.not. suits) then
+      reason = 'the points fill too little of their grid'
+      return
+    end if
+    room = 0.0_wp
+    do g = 1, size(body%grids)
+      if (any(body%grid == g)) room = room + padded(body, rule, g)
+    end do
+    suits = room <= most_slots
+    if (.not. suits) reason = 'with its padding the grid has '//to_text(room, 3)//' cells, more than '// &
+      & to_text(most_slots)
   end subroutine lattice_suits
+
+  !> Slots of the box around the points of grid `g` with its padding, or a few less.
+  pure real(wp) function padded(body, rule, g) result(slots)
+    type(body_type), intent(in) :: body
+    type(volume_rule_type), intent(in) :: rule
+    integer, intent(in) :: g
+    real(wp) :: cells(3), margin
+
+    margin = reach(rule, body%grids(g)%spacing, body%dim)/body%grids(g)%spacing
+    cells = real(extent(body, g), wp)
+    ! rows and planes are followed by padding, and the box has it at both ends
+    cells(:body%dim - 1) = cells(:body%dim - 1) + margin
+    cells(body%dim) = cells(body%dim) + 2*margin
+    slots = product(cells)
+  end function padded
 
   !> Cells along each axis of the box around the points of grid `g`, 1 for axes that are not used.
   pure function extent(body, g) result(cells)
@@ -109,8 +134,9 @@ contains
 
     cells = 1
     do c = 1, body%dim
-      cells(c) = nint((maxval(body%x(:, c), mask=body%grid == g) - minval(body%x(:, c), &
-        & mask=body%grid == g))/body%grids(g)%spacing) + 1
+      ! far apart, two bodies may span more cells than a number has room for
+      cells(c) = nint(min(real(most_slots, wp), (maxval(body%x(:, c), mask=body%grid == g) &
+        & - minval(body%x(:, c), mask=body%grid == g))/body%grids(g)%spacing)) + 1
     end do
   end function extent
 
@@ -216,7 +242,8 @@ contains
       if (point(at) > 0_i4) then
         call fail(error, 'bodies '//to_text(int(body%body(point(at))))//' and '// &
           & to_text(int(body%body(k)))//' overlap: their points '//to_text(int(point(at)))// &
-          & ' and '//to_text(k)//' are in one cell')
+          & ' and '//to_text(k)//' are in one cell', group='body', &
+          & number=max(int(body%body(point(at))), int(body%body(k))))
         return
       end if
       point(at) = int(k, i4)

@@ -49,10 +49,11 @@ contains
     if (body%body(k) /= body%body(j)) then
       call fail(error, 'bodies '//to_text(int(body%body(k)))//' and '// &
         & to_text(int(body%body(j)))// &
-        & ' overlap: their points '//at(k)//' and '//at(j)//' are closer than half a spacing')
+        & ' overlap: their points '//at(k)//' and '//at(j)//' are closer than half a spacing', &
+        & group='body', number=max(int(body%body(k)), int(body%body(j))))
     else
       call fail(error, 'two points of body '//to_text(int(body%body(k)))//' coincide: '//at(k)// &
-        & ' and '//at(j))
+        & ' and '//at(j), group='body', number=int(body%body(k)))
     end if
 
   contains

@@ -1,7 +1,8 @@
 !> Boundary conditions and loads of a scene, on the slots they hold.
 module pd_motion_from_scene
   use pd_base_kinds, only: wp, i4
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type
+  use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type, load_group, is_set
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
@@ -34,7 +35,8 @@ contains
         end if
         motion%slots = slots_where(body, chosen)
         if (size(motion%slots) == 0) then
-          call fail(error, no_points('&boundary', group%name, group%region))
+          call scene_fault(error, scene, 'boundary', m, 'region', no_points('&boundary', &
+            & group%name, group%region), 'expected a shape that holds points of the bodies')
           return
         end if
         do c = 1, 3
@@ -75,7 +77,8 @@ contains
         if (group%body /= '') chosen = chosen .and. body%body == body_number(scene, group%body)
         load%slots = slots_where(body, chosen)
         if (size(load%slots) == 0) then
-          call fail(error, no_points('&load', group%body, group%region))
+          call scene_fault(error, scene, 'load', l, 'region', no_points('&load', group%body, &
+            & group%region), 'expected a place that holds points of the bodies')
           return
         end if
         allocate (load%density(size(load%slots), body%dim), source=0.0_wp)

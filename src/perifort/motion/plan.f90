@@ -1,8 +1,9 @@
 !> What a run will do in time: the step and its number, or the relaxation's mass.
 module pd_motion_plan
   use pd_base_kinds, only: wp
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type
   use pd_base_text, only: to_text
+  use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type, is_set
   use pd_motion_relaxation, only: relaxation_type
   use pd_motion_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, stable_step_of
@@ -46,9 +47,10 @@ contains
     plan%relaxes = scene%time%method == 'relaxation'
     plan%integrator = trim(scene%time%integrator)
     if (.not. any(bound > 0.0_wp)) then
-      call fail(error, &
-        & 'no point of the scene has a neighbour within the horizon: there is nothing '// &
-        & 'to compute. Is the horizon''s ratio or length too small?')
+      call scene_fault(error, scene, 'horizon', 1, merge('length', 'ratio ', &
+        & is_set(scene%horizon%length)), &
+        & 'no point of the scene has a neighbour within the horizon: there is nothing to compute', &
+        & 'is the horizon''s ratio or length too small?')
       return
     end if
     if (plan%relaxes) then
@@ -73,9 +75,9 @@ contains
     plan%steps = scene%time%steps
     if (.not. is_set(scene%time%duration)) return
     if (scene%time%duration/plan%step > 0.9_wp*huge(1)) then
-      call fail(error, 'the duration of '//to_text(scene%time%duration)//' s needs '// &
-        & to_text(scene%time%duration/plan%step)//' steps of '//to_text(plan%step)// &
-        & ' s, more than '//to_text(huge(1)))
+      call scene_fault(error, scene, 'time', 1, 'duration', 'the duration of '// &
+        & to_text(scene%time%duration)//' s needs '//to_text(scene%time%duration/plan%step)// &
+        & ' steps of '//to_text(plan%step)//' s', 'there may be '//to_text(huge(1)))
       return
     end if
     plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))

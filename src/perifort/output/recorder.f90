@@ -124,12 +124,17 @@ contains
   pure integer function planned_outputs(schedule, dt) result(number)
     type(schedule_type), intent(in) :: schedule
     real(wp), intent(in) :: dt
-    integer :: step
+    integer(i8) :: outputs
 
-    number = 0
-    do step = 0, schedule%steps
-      if (output_due(schedule, step, dt) .or. step == schedule%steps) number = number + 1
-    end do
+    if (schedule%interval <= 0.0_wp) then
+      outputs = schedule%steps/schedule%every
+    else if (dt < schedule%interval) then
+      outputs = intervals(schedule, schedule%steps, dt)
+    else
+      outputs = schedule%steps
+    end if
+    number = int(min(int(schedule%steps, i8), outputs)) + 1
+    if (.not. output_due(schedule, schedule%steps, dt)) number = number + 1
   end function planned_outputs
 
   !> Number of rows of a run; 0 if that isn't known beforehand.
@@ -150,19 +155,21 @@ contains
 
     if (schedule%interval > 0.0_wp) then
       due = step == 0
-      if (.not. due) due = count_of(step) > count_of(step - 1)
+      if (.not. due) due = dt > schedule%interval &
+        & .or. intervals(schedule, step, dt) > intervals(schedule, step - 1, dt)
     else
       due = mod(step, schedule%every) == 0
     end if
-
-  contains
-
-    !> Intervals complete at a step, where a hair short of one counts as one.
-    pure integer(i8) function count_of(n)
-      integer, intent(in) :: n
-      count_of = int(n*dt/schedule%interval*(1 + 1.0e-12_wp) + 1.0e-9_wp, i8)
-    end function count_of
   end function output_due
+
+  !> Intervals complete at a step, where a hair short of one counts as one. For steps that are not
+  !> longer than the interval.
+  pure integer(i8) function intervals(schedule, step, dt)
+    type(schedule_type), intent(in) :: schedule
+    integer, intent(in) :: step
+    real(wp), intent(in) :: dt
+    intervals = int(step*min(1.0_wp, dt/schedule%interval)*(1 + 1.0e-12_wp) + 1.0e-9_wp, i8)
+  end function intervals
 
   !> Look at one instant: write what is due.
   subroutine observe(observer, system, instant, error)

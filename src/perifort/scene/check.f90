@@ -1,8 +1,9 @@
 !> Everything that can be known of a scene before its points are built: what is needed is there,
 !> alternatives exclude each other, names refer to something. Fills in what goes without saying.
 module pd_scene_check
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i2
   use pd_base_error, only: error_type
+  use pd_base_text, only: to_text
   use pd_scene_check_actions, only: check_initial, check_boundary, check_load
   use pd_scene_check_bodies, only: check_body, check_shape, check_material, check_crack
   use pd_scene_groups, only: default_fields, default_probe_fields
@@ -26,6 +27,8 @@ contains
     integer :: i
 
     call allocate_groups(scene)
+    call check_numbers(scene, error, source)
+    if (allocated(error)) return
     call check_settings(scene, error, source)
     if (allocated(error)) return
     call check_names(scene, error, source)
@@ -91,6 +94,24 @@ contains
     if (.not. allocated(scene%probes)) allocate (scene%probes(0))
     if (.not. allocated(scene%studies)) allocate (scene%studies(0))
   end subroutine allocate_groups
+
+  !> Bodies, materials and layers have numbers of 16 bits.
+  subroutine check_numbers(scene, error, source)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer, parameter :: most = huge(1_i2)
+    character(8), parameter :: groups(3) = [character(8) :: 'body', 'material', 'boundary']
+    integer :: numbers(3), i
+
+    numbers = [size(scene%bodies), size(scene%materials), size(scene%boundaries)]
+    do i = 1, size(groups)
+      if (numbers(i) <= most) cycle
+      call rule_fault(error, trim(groups(i)), most + 1, '', 'too many groups &'//trim(groups(i))// &
+        & ': '//to_text(numbers(i)), 'there may be '//to_text(most), source)
+      return
+    end do
+  end subroutine check_numbers
 
   !> The groups that stand once, and the two without which there is nothing to compute.
   subroutine check_settings(scene, error, source)

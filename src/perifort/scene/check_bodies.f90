@@ -2,7 +2,7 @@
 module pd_scene_check_bodies
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
-  use pd_base_text, only: to_text
+  use pd_base_text, only: to_text, with_unit
   use pd_scene_file, only: resolve_path
   use pd_scene_rules, only: rule_fault, given, check_known, check_vector, check_finite_box
   use pd_scene_source, only: source_type
@@ -11,10 +11,15 @@ module pd_scene_check_bodies
   implicit none (type, external)
   private
   public :: check_body, check_shape, check_material, check_crack, check_file, needed_ratio
+  public :: memory_per_point
 
   real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
+  !> What a point of a lattice takes at the peak, while families are built, measured on cubes
+  !> [bytes].
+  real(wp), parameter :: memory_per_point = 400.0_wp
   real(wp), parameter :: most_points = 1.0e9_wp         !! points and slots have 32-bit numbers
   real(wp), parameter :: ratio_tolerance = 1.0e-3_wp    !! 0.333 is meant to be 1/3
+  integer, parameter :: most_trials = 10000             !! counts that are tried for a proposal
 
 contains
 
@@ -69,7 +74,8 @@ contains
       if (product(real(body%points(:d), wp)) > most_points) then
         call rule_fault(error, 'body', number, 'points', 'too many points: '// &
           & to_text(product(real(body%points(:d), wp)), 3), 'a body has at most '// &
-          & to_text(most_points, 3), source)
+          & to_text(most_points, 3)//'; these would need about '//with_unit(memory_per_point &
+          & *product(real(body%points(:d), wp)), 'B', 3)//' of memory', source)
         return
       end if
       call check_spacing(body, d, number, error, source)
@@ -96,8 +102,8 @@ contains
       call fit(spacing(i))
     end do
     mean = exp(sum(log(spacing))/real(d, wp))
-    start = max(1, nint(length(1)/mean))
-    do k = 0, start
+    start = max(1, nint(min(length(1)/mean, most_points)))
+    do k = 0, min(start, most_trials)
       if (len(note) > 0) exit
       if (k < start) call fit(length(1)/real(start - k, wp))
       if (len(note) == 0) call fit(length(1)/real(start + k, wp))
@@ -105,7 +111,7 @@ contains
     if (len(note) > 0) then
       note = 'equal with points = '//note
     else
-      counts = max(1, nint(length/mean))
+      counts = max(1, nint(min(length/mean, most_points)))
       note = 'no counts near these fit the box; with points = '//listed(counts)// &
         & ' and spacing '//to_text(mean)//' m its lengths would be '
       do i = 1, d
@@ -128,6 +134,7 @@ contains
       real(wp), intent(in) :: h
       integer :: filled(d)
 
+      if (any(length/h > most_points)) return
       filled = nint(length/h)
       if (any(filled < 1)) return
       if (any(abs(real(filled, wp)*h - length) > 0.5_wp*spacing_tolerance*length)) return

@@ -6,12 +6,12 @@ module pd_scene_rules
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: join, nearest_name, newline, to_text
-  use pd_scene_source, only: source_type, source_fault
-  use pd_scene_types, only: is_set, name_length
+  use pd_scene_source, only: source_type, scan_source, source_fault
+  use pd_scene_types, only: scene_type, is_set, name_length
   implicit none (type, external)
   private
-  public :: rule_fault, given, check_known, check_unique, check_components, check_vector, &
-    & check_finite_box, find_section, find_entry
+  public :: rule_fault, scene_fault, place_fault, given, check_known, check_unique, &
+    & check_components, check_vector, check_finite_box, find_section, find_entry
 
 contains
 
@@ -49,6 +49,51 @@ contains
       end associate
     end if
   end subroutine rule_fault
+
+  !> A fault that only the points of a scene show, at the place of the key that is to blame: as
+  !> `rule_fault`, for a scene that has been read before. Its text is scanned again, which costs
+  !> nothing that matters once something is wrong.
+  subroutine scene_fault(error, scene, group, number, key, message, note)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key, message, note
+    type(source_type) :: source
+    type(error_type), allocatable :: ignored
+
+    if (allocated(scene%text)) then
+      if (len(scene%text) > 0) then
+        call scan_source(scene%text, scene%file, source, ignored)
+        if (.not. allocated(ignored)) then
+          call rule_fault(error, group, number, key, message, note, source)
+          return
+        end if
+      end if
+    end if
+    call rule_fault(error, group, number, key, message, note)
+  end subroutine scene_fault
+
+  !> Give the error of a procedure that knows nothing of scene files a place: that of the group it
+  !> blames, or of the one named here. One that has a place keeps it.
+  subroutine place_fault(error, scene, group, number, key)
+    type(error_type), allocatable, intent(inout) :: error
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key
+    type(error_type), allocatable :: placed
+
+    if (.not. allocated(error)) return
+    if (index(error%message, newline//' --> ') > 0) return
+    if (allocated(error%group)) then
+      call scene_fault(placed, scene, error%group, error%number, '', error%message, '')
+    else
+      call scene_fault(placed, scene, group, number, key, error%message, '')
+    end if
+    placed%status = error%status
+    call move_alloc(placed, error)
+  end subroutine place_fault
 
   !> Whether the file gives this key; false for a scene built in memory.
   pure logical function given(group, number, key, source)

@@ -9,7 +9,7 @@ module pd_scene_table
   use pd_scene_file, only: read_text_file, split_lines
   use pd_scene_source, only: source_type, source_fault
   use pd_scene_types, only: name_length
-  use pd_scene_values, only: parse_real
+  use pd_scene_values, only: parse_real, largest_real
   implicit none (type, external)
   private
   public :: table_type, read_table, read_table_text, column_of
@@ -154,7 +154,7 @@ contains
       ! The common case in one read; the slow way below finds the place of a fault.
       if (is_plain(text(:last))) then
         read (text(:last), *, iostat=status) values
-        if (status == 0) return
+        if (status == 0 .and. all(abs(values) <= largest_real)) return
       end if
       final = 0
       do i = 1, size(values)

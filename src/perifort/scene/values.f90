@@ -9,9 +9,15 @@ module pd_scene_values
   private
   public :: parse_real, parse_integer, parse_logical, exact_text, quoted_text, list_text, &
     & vector_text
+  public :: largest_real
 
   character(*), parameter :: digits = '0123456789'
-  integer, parameter :: largest_exponent = 300  !! beyond it a sum of squares overflows anyway
+  integer, parameter :: largest_power = 300     !! that is surely read without overflow
+  !> Sizes beyond 1e-30 .. 1e30 stand for nothing in SI units, and products of a few powers of
+  !> smaller ones, such as E/delta^4 and its square, stay finite.
+  integer, parameter :: largest_exponent = 30
+
+  real(wp), parameter :: largest_real = 10.0_wp**largest_exponent  !! largest size of a value
 
   !> Values as they stand after a key, parted by commas.
   interface list_text
@@ -58,12 +64,15 @@ contains
       if (status /= 0) return
     end if
     ! A read of 1e999 would raise an overflow, which a build with traps turns into a crash.
-    if (abs(exponent + whole) > largest_exponent .and. scan(text(:mark - 1), '123456789') > 0) then
+    if (abs(exponent + whole) > largest_power .and. scan(text(:mark - 1), '123456789') > 0) then
       note = out_of_range()
       return
     end if
     read (word, *, iostat=status) value
-    if (status == 0) note = ''
+    if (status /= 0) return
+    note = ''
+    if (abs(value) > largest_real .or. (abs(value)*largest_real < 0.999_wp .and. &
+      & abs(value) > 0.0_wp)) note = out_of_range()
   end subroutine parse_real
 
   !> What is said of a real too large or too small to compute with.
