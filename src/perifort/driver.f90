@@ -7,7 +7,7 @@ module pd_driver
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: watch_for_interrupt
-  use pd_base_text, only: to_text, with_unit
+  use pd_base_text, only: printable, to_text, with_unit
   use pd_scene_check_bodies, only: memory_per_point
   use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_types, only: scene_type, is_set, material_group
@@ -431,7 +431,7 @@ contains
   subroutine say(options, text)
     type(run_options_type), intent(in) :: options
     character(*), intent(in) :: text
-    if (.not. options%quiet) write (output_unit, '(a)') text
+    if (.not. options%quiet) write (output_unit, '(a)') printable(text)
   end subroutine say
 
 end module pd_driver

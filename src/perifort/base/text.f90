@@ -4,6 +4,7 @@ module pd_base_text
   implicit none (type, external)
   private
   public :: to_text, lower_case, nearest_name, edit_distance, join, with_unit, newline
+  public :: is_control, printable
 
   character(*), parameter :: newline = new_line('a')
 
@@ -112,6 +113,26 @@ contains
       lower(i:i) = achar(code)
     end do
   end function lower_case
+
+  !> Whether a byte is a control character of ASCII.
+  pure logical function is_control(byte)
+    character, intent(in) :: byte
+    is_control = iachar(byte) < 32 .or. iachar(byte) == 127
+  end function is_control
+
+  !> A text as it may be shown on a terminal: control characters, by which a file name or a line of
+  !> a file could move the cursor or worse, become question marks. Line ends and tabs stay.
+  pure function printable(text) result(shown)
+    character(*), intent(in) :: text
+    character(len(text)) :: shown
+    integer :: i
+
+    shown = text
+    do i = 1, len(text)
+      if (is_control(text(i:i)) .and. text(i:i) /= newline .and. text(i:i) /= achar(9)) &
+        & shown(i:i) = '?'
+    end do
+  end function printable
 
   !> The one of `names` that `name` was probably meant to be; '' if none is near.
   pure function nearest_name(name, names) result(nearest)

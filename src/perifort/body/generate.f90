@@ -8,7 +8,7 @@ module pd_body_generate
   use pd_base_text, only: newline, to_text, with_unit
   use pd_scene_types, only: scene_type, body_group, is_set
   use pd_scene_file, only: resolve_path
-  use pd_scene_rules, only: scene_fault
+  use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_shapes, only: inside
@@ -171,11 +171,8 @@ contains
 
     path = resolve_path(trim(scene%bodies(i)%file), scene%file)
     call read_table(path, table, error, columns=4)
+    call place_fault(error, scene, 'body', i, 'file')
     if (allocated(error)) return
-    if (size(table%values, 2) == 0) then
-      call fail(error, 'the cloud '//path//' has no points')
-      return
-    end if
     call allocate_points(body, scene%header%dimension, size(table%values, 2))
     body%x = transpose(table%values(:body%dim, :))
     body%volume = table%values(4, :)

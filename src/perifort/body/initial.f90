@@ -5,7 +5,7 @@ module pd_body_initial
   use pd_base_text, only: to_text
   use pd_scene_types, only: scene_type, is_set
   use pd_scene_file, only: resolve_path
-  use pd_scene_rules, only: scene_fault
+  use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_table, only: table_type, read_table
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
@@ -82,6 +82,7 @@ contains
 
     path = resolve_path(trim(scene%initial(number)%file), scene%file)
     call read_table(path, table, error, allowed=pack(known, of_dimension(body%dim)))
+    call place_fault(error, scene, 'initial', number, 'file')
     if (allocated(error)) return
     if (size(table%values, 2) /= body%n_points) then
       call scene_fault(error, scene, 'initial', number, 'file', 'the initial state in '//path// &

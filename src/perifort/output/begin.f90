@@ -152,6 +152,8 @@ contains
     stem = scene%file(index(scene%file, '/', back=.true.) + 1:)
     dot = index(stem, '.', back=.true.)
     if (dot > 1) stem = stem(:dot - 1)
+    ! a folder of dots would be another one
+    if (verify(stem, '.') == 0) stem = 'scene'
   end function stem_of
 
   !> The command that goes on with a run.

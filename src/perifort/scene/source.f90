@@ -5,11 +5,12 @@
 !> silence or report without a place.
 module pd_scene_source
   use pd_base_error, only: error_type, fail
-  use pd_base_text, only: lower_case, to_text, newline
+  use pd_base_text, only: is_control, lower_case, to_text, newline
   use pd_scene_file, only: line_type, split_lines
   implicit none (type, external)
   private
-  public :: source_type, section_type, entry_type, token_type, scan_source, source_fault
+  public :: source_type, section_type, entry_type, token_type, scan_source, source_fault, &
+    & check_text
 
   !> One value as written: a word or the inside of a quoted text.
   type :: token_type
@@ -69,6 +70,8 @@ contains
 
     source%file = file
     call split_lines(text, source%lines)
+    call check_text(source, error)
+    if (allocated(error)) return
     allocate (source%sections(8), source%entries(32), source%tokens(64))
     inside = .false.
     state = after_name
@@ -92,6 +95,25 @@ contains
     if (allocated(error)) return
     call trim_lists(source)
   end subroutine scan_source
+
+  !> An error if the lines hold a control character other than a tab: no text file does, and shown
+  !> on a terminal or put into a name it does harm.
+  subroutine check_text(source, error)
+    type(source_type), intent(in) :: source
+    type(error_type), allocatable, intent(out) :: error
+    integer :: line, column
+
+    do line = 1, size(source%lines)
+      associate (text => source%lines(line)%text)
+        do column = 1, len(text)
+          if (.not. is_control(text(column:column)) .or. text(column:column) == tab) cycle
+          call source_fault(source, line, column, 1, 'a control character, byte '// &
+            & to_text(iachar(text(column:column))), 'expected plain text in ASCII or UTF-8', error)
+          return
+        end do
+      end associate
+    end do
+  end subroutine check_text
 
   !> `&name`, or the error that text stands outside of groups.
   subroutine open_section(source, line, column, error)

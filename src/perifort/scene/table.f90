@@ -7,7 +7,7 @@ module pd_scene_table
   use pd_base_error, only: error_type
   use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_file, only: read_text_file, split_lines
-  use pd_scene_source, only: source_type, source_fault
+  use pd_scene_source, only: source_type, check_text, source_fault
   use pd_scene_types, only: name_length
   use pd_scene_values, only: parse_real, largest_real
   implicit none (type, external)
@@ -59,6 +59,8 @@ contains
 
     source%file = name
     call split_lines(text, source%lines)
+    call check_text(source, error)
+    if (allocated(error)) return
     allocate (table%names(0), table%lines(size(source%lines)))
     named = .false.
     row = 0
