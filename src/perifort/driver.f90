@@ -7,7 +7,7 @@ module pd_driver
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: watch_for_interrupt
-  use pd_base_text, only: printable, to_text, with_unit
+  use pd_base_text, only: newline, printable, to_text, with_unit
   use pd_scene_check_bodies, only: memory_per_point
   use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_types, only: scene_type, is_set, material_group
@@ -104,6 +104,7 @@ contains
       if (allocated(error)) return
       call keep_checkpoints(scene, options, plan, start, directory, stem, restart, recorder)
       call watch_for_interrupt()
+      system%stable_step = plan%limit
       call recorder%timer%start('time stepping')
       if (plan%relaxes) then
         call run_relaxation(system, plan%relaxation, recorder, error)
@@ -114,6 +115,8 @@ contains
         ! what the motion finds wrong with the input, it finds before the first iteration
         if (error%status == status_input .and. recorder%rows == 0) &
           & call place_fault(error, scene, 'time', 1, 'method')
+        if (allocated(recorder%rescued)) error%message = error%message//newline//'  '// &
+          & recorder%rescued
       end if
       call recorder%timer%stop('time stepping')
       call recorder%progress%finish()

@@ -10,13 +10,15 @@ module pd_motion_explicit
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, evaluate, account, add_loads, inverse_density, &
-    & faulty_slot, place
-  use pd_motion_watch, only: cause_of_fault
-  use pd_motion_time_step, only: integrator_limit, stable_step, stiffness_bound
+  use pd_motion_fault, only: explain_fault, faulty_slot
+  use pd_motion_rescue, only: good_state_type, keep_good, show_good
+  use pd_motion_system, only: system_type, energies_type, energies_of, evaluate, account, &
+    & add_loads, inverse_density, velocities_now
   implicit none (type, external)
   private
   public :: run_explicit, begin_memory
+
+  integer, parameter :: kinetic_every = 20  !! steps from one look at the kinetic energy to the next
 
   !> The state at the beginning of a step, for integrators that look back at it.
   type :: start_type
@@ -36,6 +38,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(start_type) :: start
     type(instant_type) :: instant
+    type(good_state_type) :: good
     logical :: sound
     integer :: n, seen
 
@@ -53,11 +56,13 @@ contains
         instant%kick = 0.0_wp
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
         call account(system, instant%time)
+        call system%watch%supplied(system%external_work)
         system%memory%step = n
         call observer%observe(system, instant, error)
         if (allocated(error)) return
       end if
       if (n == steps) exit
+      call look(system, instant, good)
       if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, sound)
@@ -65,12 +70,61 @@ contains
         call advance(system, integrator, instant%time, dt, start)
         sound = faulty_slot(system, system%state%v, dt) == 0
       end if
-      if (sound) cycle
-      call explain_fault(system, integrator, instant%time + dt, dt, error)
+      if (sound .and. system%watch%sound) cycle
+      call explain_fault(system, n + 1, dt, error)
+      call show_good(good, system, observer, error)
       return
     end do
     system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_explicit
+
+  !> Look at the energies if nobody has for long, and keep a state in which they agree.
+  subroutine look(system, instant, good)
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    type(good_state_type), intent(inout) :: good
+    type(energies_type) :: energies
+    real(wp), allocatable :: v(:, :)
+
+    if (mod(instant%step, kinetic_every) == 0) &
+      & call system%watch%look_at_kinetic(kinetic_energy(system))
+    if (system%watch%look_is_due(instant%step)) then
+      call velocities_now(system, instant%time, instant%kick, v)
+      call energies_of(system, v, energies)
+      call system%watch%look(instant%step, energies%kinetic, energies%strain, &
+        & system%dissipated, system%external_work)
+    end if
+    if (system%watch%keeps(instant%step)) call keep_good(good, system, instant)
+  end subroutine look
+
+  !> Kinetic energy of the velocities as the integrator keeps them [J], for the watch only: its
+  !> rounding depends on the number of threads.
+  real(wp) function kinetic_energy(system) result(kinetic)
+    type(system_type), intent(in) :: system
+    real(wp) :: part(size(system%model%materials))
+    integer :: k, c, m
+
+    part = 0.0_wp
+    do c = 1, system%body%dim
+      if (size(part) == 1) then
+        kinetic = 0.0_wp
+        !$omp parallel do simd schedule(static) default(none) shared(system, c) private(k) &
+        !$omp reduction(+:kinetic)
+        do k = 1, system%body%n_slots
+          kinetic = kinetic + system%body%volume(k)*system%state%v(k, c)**2
+        end do
+        part(1) = part(1) + kinetic
+      else
+        !$omp parallel do schedule(static) default(none) shared(system, c) private(k, m) &
+        !$omp reduction(+:part)
+        do k = 1, system%body%n_slots
+          m = system%model%material(k)
+          part(m) = part(m) + system%body%volume(k)*system%state%v(k, c)**2
+        end do
+      end if
+    end do
+    kinetic = sum(part*system%model%materials%density)/2
+  end function kinetic_energy
 
   !> Whether the integrator's velocities belong to the middle of the steps.
   pure logical function at_half_steps(integrator)

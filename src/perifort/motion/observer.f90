@@ -20,6 +20,7 @@ module pd_motion_observer
     logical :: settled = .true.       !! relaxation: a load step has converged
     logical :: resumable = .true.     !! a run can go on from the system as it is
     logical :: gave_way = .false.     !! the conjugate gradient left this to dynamic relaxation
+    logical :: rescued = .false.      !! the last good state of a motion that has gone wrong since
   end type instant_type
 
   type, abstract :: observer_type

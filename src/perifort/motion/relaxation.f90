@@ -11,8 +11,9 @@ module pd_motion_relaxation
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_residual, only: relaxation_type, squared_force, fail_unconverged
   use pd_motion_rigid, only: rigid_type, find_free_motions, check_balance, remove_free_motions
-  use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads, faulty_slot, &
-    & place
+  use pd_motion_fault, only: faulty_slot, greatest_stretch, place
+  use pd_motion_rescue, only: good_state_type, keep_good, show_good
+  use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads
   implicit none (type, external)
   private
   public :: relaxation_type, run_relaxation, begin_memory
@@ -39,6 +40,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(instant_type) :: instant
     type(rigid_type) :: rigid
+    type(good_state_type) :: good
     integer(i8) :: number
     integer :: i, first
     logical :: dynamic, going_on
@@ -57,6 +59,7 @@ contains
     end if
     instant%step = system%memory%step
     if (.not. allocated(system%memory%trend)) allocate (system%memory%trend(0, system%body%dim))
+    call keep_good(good, system, instant)
     first = system%memory%load_step
     if (system%memory%iteration == 0) first = first + 1
     do i = first, relaxation%load_steps
@@ -72,12 +75,15 @@ contains
           call relax_by_conjugate_gradient(system, relaxation, rigid, system%memory%trend, &
             & instant, observer, dynamic, error)
           instant%resumable = .true.
-          if (allocated(error)) return
           instant%gave_way = dynamic
         end if
-        if (dynamic) call relax(system, relaxation, instant, observer, error)
+        if (dynamic .and. .not. allocated(error)) &
+          & call relax(system, relaxation, instant, observer, error)
         instant%gave_way = .false.
-        if (allocated(error)) return
+        if (allocated(error)) then
+          if (error%status == status_no_answer) call show_good(good, system, observer, error)
+          return
+        end if
         going_on = .false.
         system%memory%trend = system%memory%trend(:0, :)
         ! the forces that did the work are those before the bonds break
@@ -94,6 +100,7 @@ contains
       instant%last = i == relaxation%load_steps
       call settle(system, instant, observer, error)
       if (allocated(error)) return
+      call keep_good(good, system, instant)
     end do
     system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_relaxation
@@ -160,7 +167,9 @@ contains
           if (fault > 0) then
             call fail(error, 'the relaxation diverges at iteration '//to_text(instant%step)// &
               & ': point '//to_text(int(system%body%point(fault)))//' at ('// &
-              & place(system, fault)//') moves more than a horizon in one iteration. Likely '// &
+              & place(system, fault)//') moves more than a horizon in one iteration, its '// &
+              & 'bonds are stretched by up to '//to_text(greatest_stretch(system, fault), 3)// &
+              & '. Likely '// &
               & 'cause: loads that the body cannot bear, or a density matrix too small for '// &
               & 'it (density_matrix = ''frame_invariant'' is stable, with others raise safety)', &
               & status_no_answer)

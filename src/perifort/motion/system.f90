@@ -1,11 +1,8 @@
 !> A body in motion: points, families, force model, state and conditions, and the one call that
 !> brings the forces up to date. Integrators and relaxation work on this type alone.
 module pd_motion_system
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_error, only: error_type
   use pd_base_numbers, only: inner
-  use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
@@ -15,10 +12,11 @@ module pd_motion_system
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
     & moved_by_velocity
   use pd_motion_memory, only: memory_type
+  use pd_motion_watch, only: watch_type
   implicit none (type, external)
   private
   public :: system_type, state_type, start_system, evaluate, break_now, account, energies_type, &
-    & energies_of, add_loads, inverse_density, faulty_slot, place
+    & energies_of, add_loads, inverse_density, velocities_now
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -47,6 +45,8 @@ module pd_motion_system
     type(memory_type) :: memory                 !! what the motion carries from instant to instant
     logical :: break_late = .false.             !! bonds break after the step's forces
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
+    type(watch_type) :: watch                   !! over the energies
+    real(wp) :: stable_step = 0.0_wp            !! the integrator's limit at the start, 0: unknown [s]
   end type system_type
 
   !> Energies at one instant [J].
@@ -323,6 +323,26 @@ contains
     allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
   end subroutine allocate_account
 
+  !> Velocities at the time `t` of the displacements [m/s], half a kick [s] on from those that the
+  !> integrator keeps.
+  subroutine velocities_now(system, t, kick, v)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t, kick
+    real(wp), allocatable, intent(out) :: v(:, :)
+    integer :: k, c
+
+    allocate (v, source=system%state%v)
+    if (kick <= 0.0_wp) return
+    do c = 1, size(v, 2)
+      !$omp parallel do schedule(static) default(none) shared(system, kick, v, c) private(k)
+      do k = 1, size(v, 1)
+        v(k, c) = v(k, c) + kick*system%state%force(k, c)*inverse_density(system%model, k)
+      end do
+    end do
+    call add_loads(system, t, kick, .true., v)
+    where (system%held == 1) v = system%state%v
+  end subroutine velocities_now
+
   !> Kinetic and strain energy [J]; `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
     type(system_type), intent(inout) :: system
@@ -344,44 +364,5 @@ contains
     end do
     energies%kinetic = inner(mass, density)/2
   end subroutine energies_of
-
-  !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
-  !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step.
-  integer function faulty_slot(system, rate, dt) result(slot)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: rate(:, :)
-    real(wp), intent(in) :: dt
-    real(wp) :: largest, sum_of_squares
-    integer :: k, c, at(2)
-
-    slot = 0
-    largest = 0.0_wp
-    sum_of_squares = 0.0_wp
-    do c = 1, size(rate, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(rate, c) private(k) &
-      !$omp reduction(max:largest) reduction(+:sum_of_squares)
-      do k = 1, size(rate, 1)
-        largest = max(largest, abs(rate(k, c)))
-        sum_of_squares = sum_of_squares + rate(k, c)**2
-      end do
-    end do
-    if (ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta) return
-    at = findloc(ieee_is_finite(rate), .false.)
-    if (at(1) == 0) at = maxloc(abs(rate))
-    slot = at(1)
-  end function faulty_slot
-
-  !> Position of a slot as text.
-  pure function place(system, k) result(text)
-    type(system_type), intent(in) :: system
-    integer, intent(in) :: k
-    character(:), allocatable :: text
-    integer :: c
-
-    text = to_text(system%body%x(k, 1))
-    do c = 2, system%body%dim
-      text = text//', '//to_text(system%body%x(k, c))
-    end do
-  end function place
 
 end module pd_motion_system

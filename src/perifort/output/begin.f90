@@ -54,7 +54,6 @@ contains
     if (restart%found) kept = restart%about%kept
     associate (body => system%body, schedule => recorder%schedule)
       schedule = schedule_of(scene, plan)
-      if (.not. plan%relaxes) recorder%watch%stable_step = plan%limit
       allocate (recorder%fields(size(scene%output%fields)))
       do f = 1, size(recorder%fields)
         recorder%fields(f) = field_of(trim(scene%output%fields(f)))

@@ -11,8 +11,7 @@ module pd_output_recorder
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
-  use pd_motion_watch, only: watch_type
+  use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
   use pd_output_checkpoint, only: about_type, checkpoint_type
   use pd_output_contact, only: touching_points
   use pd_output_results, only: results_type
@@ -48,10 +47,10 @@ module pd_output_recorder
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(energies_type) :: energies          !! of the last row
-    type(watch_type) :: watch
     real(wp) :: supply = 0.0_wp              !! energy at the first row, with breaking at t = 0 [J]
     integer :: rows = 0
     integer :: outputs = 0
+    integer :: output_step = -1              !! of the last output
     integer :: steps_done = 0
     integer :: first_step = 0                !! steps that were done before this start
     real(wp) :: time = 0.0_wp
@@ -64,6 +63,7 @@ module pd_output_recorder
     integer :: more_outputs = 0              !! which goes on would not have
     real(wp) :: most_seconds = 0.0_wp        !! wall time until the run stops by itself, if > 0 [s]
     character(:), allocatable :: command     !! goes on with the run
+    character(:), allocatable :: rescued     !! what was saved of a motion that has gone wrong
   contains
     procedure :: observe
     procedure :: keep_state
@@ -180,6 +180,10 @@ contains
     logical :: row, output, row_due, output_due_now, may_stop, stopping, keeping
     real(wp), allocatable :: v(:, :)
 
+    if (instant%rescued) then
+      call write_rescued(observer, system, instant, error)
+      return
+    end if
     associate (schedule => observer%schedule)
       observer%steps_done = instant%step
       observer%time = instant%time
@@ -205,7 +209,7 @@ contains
     observer%more_outputs = merge(1, 0, output .and. .not. output_due_now)
     if (.not. (row .or. output .or. keeping)) return
     call observer%timer%stop('time stepping')
-    call velocities_now(system, instant, v)
+    call velocities_now(system, instant%time, instant%kick, v)
     if (row) then
       call observer%timer%start('energies and history')
       call write_row(observer, system, instant, v, error)
@@ -250,6 +254,32 @@ contains
       & time_is_over = recorder%timer%total() >= recorder%most_seconds
   end function time_is_over
 
+  !> The last good state of a motion that has gone wrong becomes the last output, unless there is
+  !> one of its step or a later one. Rows of the history go on to the fault.
+  subroutine write_rescued(recorder, system, instant, error)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: v(:, :)
+    character(:), allocatable :: state
+
+    state = 'the last good state, of step '//to_text(instant%step)//' (t = '// &
+      & to_text(instant%time)//'),'
+    if (recorder%output_step > instant%step) then
+      recorder%rescued = state//' is older than the last output, of step '// &
+        & to_text(recorder%output_step)
+      return
+    end if
+    if (recorder%output_step < instant%step) then
+      call velocities_now(system, instant%time, instant%kick, v)
+      call write_output(recorder, system, instant, v, error)
+      if (allocated(error)) return
+    end if
+    recorder%rescued = state//' is the last output'
+  end subroutine write_rescued
+
+  !> Why the run is to stop now, '' if it isn't.
   function reason_to_stop(recorder) result(reason)
     class(recorder_type), intent(in) :: recorder
     character(:), allocatable :: reason
@@ -297,25 +327,6 @@ contains
     note = trim(text)
   end function relaxation_note
 
-  !> Velocities at the instant of the displacements [m/s].
-  subroutine velocities_now(system, instant, v)
-    type(system_type), intent(in) :: system
-    type(instant_type), intent(in) :: instant
-    real(wp), allocatable, intent(out) :: v(:, :)
-    integer :: k, c
-
-    allocate (v, source=system%state%v)
-    if (instant%kick <= 0.0_wp) return
-    do c = 1, size(v, 2)
-      !$omp parallel do schedule(static) default(none) shared(system, instant, v, c) private(k)
-      do k = 1, size(v, 1)
-        v(k, c) = v(k, c) + instant%kick*system%state%force(k, c)*inverse_density(system%model, k)
-      end do
-    end do
-    call add_loads(system, instant%time, instant%kick, .true., v)
-    where (system%held == 1) v = system%state%v
-  end subroutine velocities_now
-
   !> One row of the history.
   subroutine write_row(recorder, system, instant, v, error)
     class(recorder_type), intent(inout) :: recorder
@@ -325,13 +336,13 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     call energies_of(system, v, recorder%energies)
+    call system%watch%look(instant%step, recorder%energies%kinetic, recorder%energies%strain, &
+      & system%dissipated, system%external_work)
     if (recorder%rows == 0) recorder%supply = recorder%energies%kinetic + recorder%energies%strain &
       & + system%dissipated
     recorder%rows = recorder%rows + 1
     call recorder%results%add_row(history_row(system, recorder%probes, &
       & recorder%schedule%relaxation, instant, v, recorder%energies), error)
-    if (.not. allocated(error)) call recorder%watch%look(system, recorder%energies, &
-      & instant, error)
   end subroutine write_row
 
   !> The values of `history_columns` at an instant; `v` are the velocities and `energies` the
@@ -438,6 +449,7 @@ contains
     end do
     call recorder%results%end_output(error)
     recorder%outputs = recorder%outputs + 1
+    recorder%output_step = instant%step
     if (.not. recorder%touched) call warn_of_contact(recorder, system, instant)
 
   contains

@@ -1,0 +1,93 @@
+!> An archive in memory, for a state that may be wanted back before the program ends.
+module pd_base_shelf
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
+  use pd_base_archive, only: archive_type
+  use pd_base_error, only: fail
+  use pd_base_kinds, only: i1, i8
+  implicit none (type, external)
+  private
+  public :: shelf_type
+
+  !> One value that is kept.
+  type :: parcel_type
+    integer(i8), allocatable :: extents(:)
+    integer(i1), allocatable :: bytes(:)
+  end type parcel_type
+
+  !> Values in the order in which they came. Between writing and reading, and before each use, call
+  !> `rewind`. Writing again takes the room that is there.
+  type, extends(archive_type) :: shelf_type
+    private
+    type(parcel_type), allocatable :: parcels(:)
+    integer :: at = 0                          !! the parcel in hand
+  contains
+    procedure :: describe
+    procedure :: move
+    procedure :: rewind => rewind_shelf
+  end type shelf_type
+
+contains
+
+  !> Begin anew, to read or to write.
+  subroutine rewind_shelf(self, reading)
+    class(shelf_type), intent(inout) :: self
+    logical, intent(in) :: reading
+
+    self%reading = reading
+    self%at = 0
+    if (allocated(self%error)) deallocate (self%error)
+    if (.not. allocated(self%parcels)) allocate (self%parcels(32))
+  end subroutine rewind_shelf
+
+  subroutine describe(self, name, kind_name, extents)
+    class(shelf_type), intent(inout) :: self
+    character(*), intent(in) :: name, kind_name
+    integer(i8), intent(inout) :: extents(:)
+    type(parcel_type), allocatable :: more(:)
+    integer :: i
+
+    self%at = self%at + 1
+    if (self%reading) then
+      if (self%at <= size(self%parcels)) then
+        if (allocated(self%parcels(self%at)%extents)) then
+          if (size(self%parcels(self%at)%extents) == size(extents)) then
+            extents = self%parcels(self%at)%extents
+            return
+          end if
+        end if
+      end if
+      call fail(self%error, name//' of kind '//kind_name//' was not kept')
+      return
+    end if
+    if (self%at > size(self%parcels)) then
+      allocate (more(2*size(self%parcels)))
+      do i = 1, size(self%parcels)
+        call move_alloc(self%parcels(i)%extents, more(i)%extents)
+        call move_alloc(self%parcels(i)%bytes, more(i)%bytes)
+      end do
+      call move_alloc(more, self%parcels)
+    end if
+    self%parcels(self%at)%extents = extents
+  end subroutine describe
+
+  subroutine move(self, place, bytes)
+    class(shelf_type), intent(inout) :: self
+    type(c_ptr), intent(in) :: place
+    integer(i8), intent(in) :: bytes
+    integer(i1), pointer, contiguous :: there(:)
+
+    call c_f_pointer(place, there, [bytes])
+    associate (parcel => self%parcels(self%at))
+      if (self%reading) then
+        there(:) = parcel%bytes
+      else
+        if (allocated(parcel%bytes)) then
+          if (size(parcel%bytes, kind=i8) /= bytes) deallocate (parcel%bytes)
+        end if
+        if (.not. allocated(parcel%bytes)) allocate (parcel%bytes(bytes))
+        parcel%bytes(:) = there
+      end if
+    end associate
+  end subroutine move
+
+end module pd_base_shelf

@@ -1,0 +1,140 @@
+!> A motion that is none any more: where it went wrong, how, and the likely cause.
+module pd_motion_fault
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_text, only: newline, to_text, with_unit
+  use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_force_reference, only: bond_state_type, state_of_bond
+  use pd_motion_system, only: system_type
+  implicit none (type, external)
+  private
+  public :: faulty_slot, explain_fault, place, greatest_stretch
+
+  real(wp), parameter :: large_stretch = 0.1_wp  !! beyond it a bond is noticeably stiffer [-]
+
+contains
+
+  !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
+  !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step.
+  integer function faulty_slot(system, rate, dt) result(slot)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: rate(:, :)
+    real(wp), intent(in) :: dt
+    real(wp) :: largest, sum_of_squares
+    integer :: k, c
+
+    slot = 0
+    largest = 0.0_wp
+    sum_of_squares = 0.0_wp
+    do c = 1, size(rate, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(rate, c) private(k) &
+      !$omp reduction(max:largest) reduction(+:sum_of_squares)
+      do k = 1, size(rate, 1)
+        largest = max(largest, abs(rate(k, c)))
+        sum_of_squares = sum_of_squares + rate(k, c)**2
+      end do
+    end do
+    if (ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta) return
+    slot = fastest_slot(rate)
+  end function faulty_slot
+
+  !> The slot with a rate that is not finite, else that with the largest component.
+  integer function fastest_slot(rate) result(slot)
+    real(wp), intent(in) :: rate(:, :)
+    integer :: at(2)
+    at = findloc(ieee_is_finite(rate), .false.)
+    if (at(1) == 0) at = maxloc(abs(rate))
+    slot = at(1)
+  end function fastest_slot
+
+  !> The error for a motion that is none any more after `step` steps of `dt` [s]. Which of the two
+  !> faults it is stands in the system: a point flies off, or energy comes from nowhere.
+  subroutine explain_fault(system, step, dt, error)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: step
+    real(wp), intent(in) :: dt
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: text
+    real(wp) :: speed, stretch, energy, supply
+    integer :: k
+
+    k = fastest_slot(system%state%v)
+    speed = norm2(system%state%v(k, :))
+    stretch = greatest_stretch(system, k)
+    text = 'unstable at step '//to_text(step)//', t = '//with_unit(step*dt, 's')//': point '// &
+      & to_text(int(system%body%point(k)))//' at ('//place(system, k)//') '
+    if (.not. ieee_is_finite(speed)) then
+      text = text//'has a velocity that is not a finite number'
+    else if (speed*dt > system%family%rule%delta) then
+      text = text//'moves '//to_text(speed*dt/system%family%rule%delta, 3)//' horizons in a step'
+    else
+      call system%watch%found(energy, supply)
+      text = text//'is the fastest, with '//with_unit(speed, 'm/s', 3)//', while the body has '// &
+        & with_unit(energy, 'J', 3)//' of energy, of which no more than '// &
+        & with_unit(supply, 'J', 3)//' were put in'
+    end if
+    if (ieee_is_finite(stretch)) then
+      text = text//'; its bonds are stretched by up to '//to_text(stretch, 3)
+    else
+      text = text//'; its bonds'' stretches are not finite numbers'
+    end if
+    text = text//'; the step of '//with_unit(dt, 's')
+    if (system%stable_step > 0.0_wp) then
+      text = text//' is '//to_text(dt/system%stable_step, 4)//' of the stable one'
+    end if
+    call fail(error, text//newline//'  likely cause: '//likely_cause(), status_no_answer)
+
+  contains
+
+    function likely_cause() result(cause)
+      character(:), allocatable :: cause
+      if (system%stable_step > 0.0_wp .and. dt > system%stable_step) then
+        cause = 'the step is above the stable one; leave &time step out, or safety at 0.8'
+      else if (.not. stretch <= large_stretch) then
+        cause = 'bonds crushed or stretched by so much are stiffer than at rest; lower &time '// &
+          & 'safety, give what moves at once a ramp_time, or the material a critical_stretch'
+      else
+        cause = 'something is moved faster than the waves in the body; give it a ramp_time, or '// &
+          & 'lower &time safety'
+      end if
+    end function likely_cause
+  end subroutine explain_fault
+
+  !> The largest stretch, in size, of the intact bonds of slot `k`; not finite if displacements
+  !> around it are not.
+  real(wp) function greatest_stretch(system, k) result(stretch)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: k
+    type(bonds_type) :: bonds
+    type(bond_state_type) :: bond
+    integer :: i
+
+    stretch = 0.0_wp
+    call allocate_bonds(system%family, bonds)
+    call system%family%bonds_of(k, bonds)
+    do i = 1, bonds%n
+      if (.not. bonds%intact(i)) cycle
+      if (.not. all(ieee_is_finite(system%state%u(bonds%j(i), :)))) then
+        stretch = sum(abs(system%state%u(bonds%j(i), :)))
+        return
+      end if
+      bond = state_of_bond(system%model, system%state%u, k, bonds, i)
+      if (abs(bond%stretch) > abs(stretch)) stretch = bond%stretch
+    end do
+  end function greatest_stretch
+
+  !> Position of a slot as text.
+  pure function place(system, k) result(text)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: k
+    character(:), allocatable :: text
+    integer :: c
+
+    text = to_text(system%body%x(k, 1))
+    do c = 2, system%body%dim
+      text = text//', '//to_text(system%body%x(k, c))
+    end do
+  end function place
+
+end module pd_motion_fault
