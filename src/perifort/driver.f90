@@ -7,8 +7,10 @@ module pd_driver
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: watch_for_interrupt
+  use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, printable, to_text, with_unit
   use pd_scene_check_bodies, only: memory_per_point
+  use pd_scene_doubts, only: doubts_of_scene
   use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_types, only: scene_type, is_set, material_group
   use pd_scene_write, only: scene_text
@@ -26,6 +28,7 @@ module pd_driver
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
   use pd_force_weights, only: build_weights
+  use pd_motion_bounds, only: check_bounds
   use pd_motion_explicit, only: run_explicit, begin_steps => begin_memory
   use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, region_mask
   use pd_motion_keep, only: checksum_of_start
@@ -47,13 +50,15 @@ module pd_driver
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads, &
     & check_memory, output_directory, history_interval
 
+  real(wp), parameter :: doubtful_balance = 0.1_wp  !! of the energy in play
+
   !> Everything that stands before the first step.
   type :: set_up_type
     type(system_type) :: system
     type(plan_type) :: plan
     type(probe_type), allocatable :: probes(:)
     integer(i8) :: cut = 0_i8                      !! bonds cut by cracks
-    integer :: lonely = 0                          !! points without a neighbour
+    type(warnings_type) :: warnings                !! found before the first step
     type(phase_timer_type) :: timer
   end type set_up_type
 
@@ -71,6 +76,7 @@ contains
     character(:), allocatable :: directory, stem
     integer(i8) :: start
     logical :: stopped
+    real(wp) :: balance, share
 
     stem = stem_of(scene)
     directory = output_directory(scene, options)
@@ -97,9 +103,10 @@ contains
         return
       end if
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
-        & set_up%lonely, omp_get_max_threads()))
+        & set_up%warnings, omp_get_max_threads()))
       recorder%timer = set_up%timer
       recorder%probes = set_up%probes
+      recorder%warnings = set_up%warnings
       call open_recorder(scene, options, system, plan, directory, stem, restart, recorder, error)
       if (allocated(error)) return
       call keep_checkpoints(scene, options, plan, start, directory, stem, restart, recorder)
@@ -120,6 +127,11 @@ contains
       end if
       call recorder%timer%stop('time stepping')
       call recorder%progress%finish()
+      call recorder%energy_balance(system, balance, share)
+      if (share > doubtful_balance .and. .not. allocated(error)) call recorder%warn('balance', &
+        & 'the energies are off by '//to_text(100*share, 2)//' %: the answer is doubtful; a '// &
+        & 'smaller step may help')
+      call recorder%results%put_warnings(recorder%warnings%text())
       stopped = .false.
       if (allocated(error)) stopped = error%status == status_interrupted
       call recorder%results%close(late, stopped, keep_mark=.true.)
@@ -148,7 +160,7 @@ contains
     call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
-        & set_up%lonely, omp_get_max_threads()))
+        & set_up%warnings, omp_get_max_threads()))
       ! the first evaluation touches the memory, the others are timed
       call evaluate(system, 0.0_wp, breaking=.false.)
       begin = wall_time()
@@ -242,6 +254,8 @@ contains
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)
     real(wp) :: delta
+    integer(i8) :: cut
+    integer :: lonely, i
 
     call check_memory(scene, error)
     if (allocated(error)) return
@@ -256,7 +270,7 @@ contains
       call make_family(scene, volume_rule_type(volume_rule_number( &
         & trim(scene%horizon%volume_correction)), delta), system, error)
       if (allocated(error)) return
-      call check_overlap(system%body, system%family, set_up%lonely, error)
+      call check_overlap(system%body, system%family, lonely, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
       call timer%stop('families')
@@ -281,7 +295,12 @@ contains
       call timer%stop('surface correction')
 
       call timer%start('cracks')
-      call cut_bonds(scene%cracks, system%body, system%family, set_up%cut)
+      do i = 1, size(scene%cracks)
+        call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
+        if (cut == 0_i8) call set_up%warnings%add('idle crack '//to_text(i), '&crack number '// &
+          & to_text(i)//' cuts no bond, or none that another has not cut', tell=.false.)
+        set_up%cut = set_up%cut + cut
+      end do
       if (set_up%cut > 0_i8) then
         allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
         call damage_of(system%body, system%family, system%state%damage)
@@ -293,10 +312,43 @@ contains
       call start_system(system)
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return
+      call check_bounds(scene, system, set_up%plan, error)
+      if (allocated(error)) return
       call timer%stop('time step')
       call find_probes(scene, system%body, set_up%probes)
+      call warn_before(scene, system, set_up%plan, set_up%probes, lonely, set_up%warnings)
     end associate
   end subroutine prepare
+
+  !> Warn of what is allowed, but hardly meant.
+  subroutine warn_before(scene, system, plan, probes, lonely, warnings)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(plan_type), intent(in) :: plan
+    type(probe_type), intent(in) :: probes(:)
+    integer, intent(in) :: lonely          !! points without a bond
+    type(warnings_type), intent(inout) :: warnings
+    real(wp) :: distance
+    integer :: i, k
+
+    call doubts_of_scene(scene, warnings)
+    if (lonely > 0) call warnings%add('lonely', to_text(lonely)// &
+      & ' points have no neighbour and stay put', tell=.false.)
+    if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &
+      & 'the time step is above the stable one', tell=.false.)
+    do i = 1, size(scene%regions)
+      if (any(region_mask(scene, system%body, scene%regions(i)%name))) cycle
+      call warnings%add('empty region '//to_text(i), 'the region '// &
+        & trim(scene%regions(i)%name)//' holds no point', tell=.false.)
+    end do
+    do i = 1, size(probes)
+      k = int(probes(i)%slot)
+      distance = norm2(system%body%x(k, :) - scene%probes(i)%point(:system%body%dim))
+      if (distance > system%body%spacing(k)) call warnings%add('probe '//to_text(i), 'probe '// &
+        & probes(i)%name//' lies outside the bodies: the nearest point is '// &
+        & with_unit(distance, 'm', 3)//' away', tell=.false.)
+    end do
+  end subroutine warn_before
 
   !> Families of the kind that suits the points; the body is arranged in their slots.
   subroutine make_family(scene, rule, system, error)

@@ -123,6 +123,7 @@ contains
 
     recorder%about = new_about(scene_text(scene), start, plan%steps, plan%step)
     recorder%command = command_of(options)
+    recorder%quiet = options%quiet
     recorder%most_seconds = 60*options%max_minutes
     call recorder%checkpoint%start(checkpoint_path(directory, stem), &
       & scene%output%checkpoint_every, scene%output%checkpoint_minutes, goes_on=restart%found, &
@@ -136,7 +137,7 @@ contains
     recorder%supply = restart%about%supply
     recorder%energies%kinetic = restart%about%kinetic
     recorder%energies%strain = restart%about%strain
-    recorder%touched = restart%about%touched
+    recorder%warnings = restart%about%warnings
   end subroutine keep_checkpoints
 
   !> The scene file's name without folder and ending.

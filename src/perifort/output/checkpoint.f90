@@ -7,6 +7,7 @@
 module pd_output_checkpoint
   use pd_base_archive, only: archive_type
   use pd_base_clock, only: wall_time
+  use pd_base_warnings, only: warnings_type
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i8
   use pd_base_version, only: compiler_flags, compiler_name, program_version
@@ -32,7 +33,7 @@ module pd_output_checkpoint
     logical :: finished = .false.       !! the run has come to its end
     real(wp) :: supply = 0.0_wp         !! energy at the first row [J]
     real(wp) :: kinetic = 0.0_wp, strain = 0.0_wp  !! energies of the last row [J]
-    logical :: touched = .false.        !! contact has been reported
+    type(warnings_type) :: warnings     !! so far
   end type about_type
 
   !> The checkpoints of a run that is under way.
@@ -88,7 +89,7 @@ contains
     call archive%keep('supply', about%supply)
     call archive%keep('kinetic energy', about%kinetic)
     call archive%keep('strain energy', about%strain)
-    call archive%keep('touched', about%touched)
+    call about%warnings%keep(archive)
     call archive%keep('history', about%kept%rows)
     call archive%keep('times of outputs', about%kept%times)
   end subroutine keep_about

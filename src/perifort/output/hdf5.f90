@@ -11,7 +11,8 @@ module pd_output_hdf5
     & h5aclose_f, h5acreate_f, h5aopen_by_name_f, h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, &
     & h5dcreate_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, h5dread_f, h5dwrite_f, &
     & h5eset_auto_f, h5fclose_f, h5fcreate_f, &
-    & h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, h5lexists_f, &
+    & h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, h5ldelete_f, &
+    & h5lexists_f, &
     & h5oclose_f, h5ocopy_f, h5oopen_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, &
     & h5pset_sieve_buf_size_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, &
     & h5tcopy_f, h5tget_size_f, h5tset_cset_f, h5tset_size_f, hid_t, hsize_t, size_t
@@ -22,7 +23,7 @@ module pd_output_hdf5
   implicit none (type, external)
   private
   public :: hdf5_file, start_hdf5, hdf5_version, create_file, open_file, flush_file, close_file
-  public :: make_group, copy_object, object_exists, put_attribute, change_attribute, get_attribute
+  public :: make_group, copy_object, object_exists, remove_object, put_attribute, change_attribute, get_attribute
   public :: put_text, get_text, explain
 
   !> An open file.
@@ -249,6 +250,17 @@ contains
     call h5lexists_f(file%id, path, object_exists, status)
     if (status /= 0) object_exists = .false.
   end function object_exists
+
+  !> Remove the object at `path`.
+  subroutine remove_object(file, path, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: path
+    type(error_type), allocatable, intent(out) :: error
+    integer :: status
+
+    call h5ldelete_f(file%id, path, status)
+    if (status /= 0) call explain(error, 'remove '//path//' from', file%name)
+  end subroutine remove_object
 
   !> Add the attribute `name` of the given type and dataspace to the object at `path`.
   subroutine add_attribute(file, path, name, kind_id, space, values, status)

@@ -1,11 +1,11 @@
 !> Writes what a run is asked to keep: outputs of fields, rows of history with energies, reactions
 !> and probes, and the progress line.
 module pd_output_recorder
-  use, intrinsic :: iso_fortran_env, only: error_unit
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_clock, only: duration_text, phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
+  use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, to_text
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
@@ -54,9 +54,10 @@ module pd_output_recorder
     integer :: steps_done = 0
     integer :: first_step = 0                !! steps that were done before this start
     real(wp) :: time = 0.0_wp
-    logical :: touched = .false.             !! contact has been reported
     integer :: gave_way = 0                  !! load steps left to dynamic relaxation
     integer :: gave_way_at = 0               !! the last of them
+    type(warnings_type) :: warnings
+    logical :: quiet = .false.               !! warnings are kept, but not told
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
@@ -67,6 +68,8 @@ module pd_output_recorder
   contains
     procedure :: observe
     procedure :: keep_state
+    procedure :: warn
+    procedure :: energy_balance
   end type recorder_type
 
 contains
@@ -307,16 +310,24 @@ contains
       about%supply = recorder%supply
       about%kinetic = recorder%energies%kinetic
       about%strain = recorder%energies%strain
-      about%touched = recorder%touched
+      about%warnings = recorder%warnings
       call recorder%results%sync(error)
       if (.not. allocated(error)) call recorder%checkpoint%write(about, system, error)
     end associate
     call recorder%timer%stop('checkpoints')
     if (.not. allocated(error)) return
-    call recorder%progress%finish()
-    write (error_unit, '(a)') 'warning: no checkpoint of step '//to_text(recorder%steps_done)// &
-      & ' could be written: '//error%message
+    call recorder%warn('checkpoint', 'no checkpoint of step '//to_text(recorder%steps_done)// &
+      & ' could be written: '//error%message)
   end subroutine keep_state
+
+  !> Note a warning; the first of a subject is told at once.
+  subroutine warn(recorder, subject, text)
+    class(recorder_type), intent(inout) :: recorder
+    character(*), intent(in) :: subject, text
+
+    call recorder%progress%finish()
+    call recorder%warnings%add(subject, text, tell=.not. recorder%quiet)
+  end subroutine warn
 
   !> What the progress line adds in relaxation.
   pure function relaxation_note(instant) result(note)
@@ -370,6 +381,25 @@ contains
       end do
     end do
   end function history_row
+
+  !> How far the energies of the last row are from what was there and has been supplied [J], and
+  !> that as a share of the energy in play; the share is -1 where there is no balance.
+  pure subroutine energy_balance(recorder, system, balance, share)
+    class(recorder_type), intent(in) :: recorder
+    type(system_type), intent(in) :: system
+    real(wp), intent(out) :: balance, share
+    real(wp) :: supply, largest
+
+    balance = 0.0_wp
+    share = -1.0_wp
+    if (recorder%schedule%relaxation) return
+    supply = recorder%supply + system%external_work
+    associate (now => recorder%energies)
+      balance = now%kinetic + now%strain + system%dissipated - supply
+      largest = max(abs(now%kinetic) + abs(now%strain) + system%dissipated, abs(supply))
+    end associate
+    if (largest > 0.0_wp) share = abs(balance)/largest
+  end subroutine energy_balance
 
   !> Greatest local damage of all points, 0 where nothing can be damaged.
   pure real(wp) function greatest_damage(system)
@@ -450,7 +480,8 @@ contains
     call recorder%results%end_output(error)
     recorder%outputs = recorder%outputs + 1
     recorder%output_step = instant%step
-    if (.not. recorder%touched) call warn_of_contact(recorder, system, instant)
+    call warn_of_contact(recorder, system, instant)
+    call recorder%results%put_warnings(recorder%warnings%text())
 
   contains
 
@@ -474,7 +505,7 @@ contains
     end subroutine put_scalars
   end subroutine write_output
 
-  !> Say once that points pass through each other, which the method doesn't hinder.
+  !> Warn of points that pass through each other, which the method doesn't hinder.
   subroutine warn_of_contact(recorder, system, instant)
     class(recorder_type), intent(inout) :: recorder
     type(system_type), intent(in) :: system
@@ -482,13 +513,11 @@ contains
     integer :: first, second
 
     call touching_points(system%body, system%family, system%state%u, first, second)
-    recorder%touched = first > 0
-    if (.not. recorder%touched) return
-    call recorder%progress%finish()
-    write (error_unit, '(a)') 'warning: at t = '//to_text(instant%time)//' s points '// &
+    if (first == 0) return
+    call recorder%warn('contact', 'at t = '//to_text(instant%time)//' s points '// &
       & to_text(first)//' and '//to_text(second)// &
       & ', which share no intact bond, are closer than half a spacing: '// &
-      & 'there is no contact, pieces pass through each other from here on'
+      & 'there is no contact, pieces pass through each other from here on')
   end subroutine warn_of_contact
 
 end module pd_output_recorder

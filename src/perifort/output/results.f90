@@ -19,6 +19,7 @@ module pd_output_results
   use pd_output_earlier, only: existing_results, mark_complete, mark_unfinished, refuse_existing
   use pd_output_files, only: in_directory, make_directory, remove_file
   use pd_output_history, only: csv_type, history_type
+  use pd_output_sink, only: sink_type
   use pd_output_types, only: column_type, field_type, kept_type, label_length
   use pd_output_vtkhdf, only: vtkhdf_file
   use pd_output_vtu, only: remove_series, vtu_series
@@ -40,6 +41,7 @@ module pd_output_results
     integer :: points = 0
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
+    character(:), allocatable :: warnings       !! a line for each
     real(wp), allocatable :: times(:)    !! of them [s]
     real(wp) :: time = 0.0_wp            !! of the output under way [s]
     logical :: in_output = .false.
@@ -61,6 +63,7 @@ module pd_output_results
     generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     procedure :: end_output
     procedure :: add_row
+    procedure :: put_warnings
     procedure :: close => close_results
     procedure :: sync
     procedure :: kept => rows_and_times
@@ -355,6 +358,30 @@ contains
     if (self%history%is_due()) call write_rows(self, error)
   end subroutine add_row
 
+  !> Keep the warnings so far, a line for each, in place of those of an earlier call: at once in
+  !> `warnings.txt`, and in the HDF5 file when the results are complete. What goes wrong with them
+  !> is no reason to end a run.
+  subroutine put_warnings(self, text)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: text
+    type(sink_type) :: sink
+    type(error_type), allocatable :: ignored
+
+    if (.not. self%started .or. self%failed) return
+    if (allocated(self%warnings)) then
+      if (self%warnings == text) return
+    end if
+    self%warnings = text
+    if (text == '') then
+      call remove_file(in_directory(self%directory, 'warnings.txt'))
+      return
+    end if
+    call sink%open(in_directory(self%directory, 'warnings.txt'), ignored)
+    if (allocated(ignored)) return
+    call sink%put(text, ignored)
+    call sink%close(ignored)
+  end subroutine put_warnings
+
   !> Write the rows that wait.
   subroutine write_rows(self, error)
     class(results_type), intent(inout) :: self
@@ -453,6 +480,7 @@ contains
       if (leave) then
         call self%vtkhdf%leave(error)
       else
+        if (allocated(self%warnings)) call self%vtkhdf%put_warnings(self%warnings)
         call self%vtkhdf%finish(error)
       end if
     end if

@@ -2,8 +2,9 @@
 module pd_output_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
+  use pd_base_warnings, only: warnings_type
   use pd_base_text, only: to_text, with_unit, newline
-  use pd_scene_types, only: scene_type, is_set
+  use pd_scene_types, only: scene_type
   use pd_motion_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_recorder, only: recorder_type, probe_type
@@ -14,16 +15,15 @@ module pd_output_summary
 contains
 
   !> The scene as it will be computed: points, bonds, memory, kernels and why, time step, probes.
-  function summary_before(scene, system, plan, probes, cut, lonely, threads) result(text)
+  function summary_before(scene, system, plan, probes, cut, warnings, threads) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     type(plan_type), intent(in) :: plan
     type(probe_type), intent(in) :: probes(:)
     integer(i8), intent(in) :: cut        !! bonds removed by cracks
-    integer, intent(in) :: lonely         !! points without a bond
+    type(warnings_type), intent(in) :: warnings  !! found so far
     integer, intent(in) :: threads
     character(:), allocatable :: text
-    real(wp) :: distance
     integer :: p, k
 
     text = ''
@@ -35,8 +35,6 @@ contains
     if (size(scene%cracks) > 0) &
       & text = text//line('cracks', to_text(size(scene%cracks))//', which cut '// &
       & to_text(cut)//' bonds')
-    if (lonely > 0) &
-      & text = text//line('warning', to_text(lonely)//' points have no neighbour and stay put')
     text = text//line('memory', with_unit(real(memory_of(system), wp), 'B', 3))
     text = text//kernels(scene, system)
     text = text//line('threads', to_text(threads))
@@ -44,10 +42,6 @@ contains
       text = text//line('relaxation', to_text(plan%relaxation%load_steps)// &
         & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', '// &
         & solver_of(scene))
-      if (scene%time%steps > 0 .or. is_set(scene%time%step) .or. is_set(scene%time%duration) &
-        & .or. scene%time%limit == 'spectral') &
-        & text = text//line('note', '&time steps, step, limit and duration mean nothing here; '// &
-        & 'see &relaxation load_steps')
     else
       text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
         & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &
@@ -60,8 +54,6 @@ contains
         & '7.25, because the largest frequency allows no more here')
       text = text//line('', '7.25 as printed '//printed(plan)//', the book''s estimate '// &
         & with_unit(plan%book, 's', 6))
-      if (plan%step > plan%limit) &
-        & text = text//line('warning', 'the time step is above the stable one')
       text = text//line('steps', to_text(plan%steps)//', to t = '//&
         & with_unit(plan%steps*plan%step, 's', 6))
     end if
@@ -69,10 +61,9 @@ contains
       k = int(probes(p)%slot)
       text = text//line('probe', probes(p)%name//' is point '// &
         & to_text(int(system%body%point(k)))//' at ('//position(system, k)//') m')
-      distance = norm2(system%body%x(k, :) - scene%probes(p)%point(:system%body%dim))
-      if (distance > system%body%spacing(k)) text = text//line('warning', 'probe '// &
-        & probes(p)%name//' lies outside the bodies: the nearest point is '// &
-        & with_unit(distance, 'm', 3)//' away')
+    end do
+    do p = 1, warnings%count()
+      text = text//line('warning', warnings%line(p))
     end do
   end function summary_before
 
@@ -144,7 +135,7 @@ contains
     type(recorder_type), intent(in) :: recorder
     character(*), intent(in) :: directory
     character(:), allocatable :: text
-    real(wp) :: supply, balance, largest
+    real(wp) :: balance, share
     integer :: steps
 
     text = recorder%timer%table()//newline
@@ -164,15 +155,12 @@ contains
         text = text//line('damage', 'at most '//to_text(maxval(system%state%damage), 3))
       end if
       text = text//line('external work', with_unit(system%external_work, 'J'))
-      if (.not. recorder%schedule%relaxation) then
-        supply = recorder%supply + system%external_work
-        balance = now%kinetic + now%strain + system%dissipated - supply
-        largest = max(abs(now%kinetic) + abs(now%strain) + system%dissipated, abs(supply))
-        if (largest > 0.0_wp) &
-          & text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '// &
-          & to_text(100*abs(balance)/largest, 2)//' % of the energy')
-      end if
+      call recorder%energy_balance(system, balance, share)
+      if (share >= 0.0_wp) text = text//line('energy balance', 'off by '// &
+        & with_unit(balance, 'J')//', '//to_text(100*share, 2)//' % of the energy')
     end associate
+    if (recorder%warnings%count() > 0) text = text//line('warnings', &
+      & to_text(recorder%warnings%count())//', kept in warnings.txt')
     text = text//line('results', directory)
   end function summary_after
 

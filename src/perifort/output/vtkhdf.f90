@@ -12,8 +12,9 @@ module pd_output_vtkhdf
   use pd_base_text, only: to_text
   use pd_output_datasets, only: get_chunk, get_shape, put_array, read_rows, set_rows, write_rows
   use pd_output_files, only: remove_file, rename_file, sync_path
-  use pd_output_hdf5, only: change_attribute, close_file, create_file, flush_file, get_attribute, &
-    & get_text, hdf5_file, make_group, open_file, start_hdf5
+  use pd_output_hdf5, only: change_attribute, close_file, create_file, flush_file, &
+    & get_attribute, get_text, hdf5_file, make_group, object_exists, open_file, put_text, &
+    & remove_object, start_hdf5
   use pd_output_layout, only: block_rows, copy_scene, copy_static, layout_type, put_geometry, &
     & put_scene, &
     & to_single, write_vectors
@@ -48,6 +49,7 @@ module pd_output_vtkhdf
     procedure :: append_rows
     procedure :: publish
     procedure :: sync
+    procedure :: put_warnings
     procedure :: finish
     procedure :: leave
     procedure :: abandon
@@ -452,6 +454,19 @@ contains
     type(error_type), allocatable, intent(out) :: error
     call close_file(self%file, error)
   end subroutine leave
+
+  !> Keep the warnings of a run as `/scene/warnings`, in place of those that are there. To be called
+  !> before `finish`, since it changes HDF5's own records. A file without them is as good.
+  subroutine put_warnings(self, text)
+    class(vtkhdf_file), intent(inout) :: self
+    character(*), intent(in) :: text
+    type(error_type), allocatable :: ignored
+
+    if (self%file%id < 0) return
+    if (object_exists(self%file, '/scene/warnings')) &
+      & call remove_object(self%file, '/scene/warnings', ignored)
+    if (text /= '') call put_text(self%file, '/scene/warnings', text, ignored)
+  end subroutine put_warnings
 
   !> Cut off room that wasn't needed and close the file.
   subroutine finish(self, error)
