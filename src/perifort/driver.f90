@@ -6,7 +6,7 @@ module pd_driver
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
   use pd_base_error, only: error_type, status_input, status_interrupted
-  use pd_base_interrupt, only: watch_for_interrupt
+  use pd_base_interrupt, only: let_writes_fail, watch_for_interrupt
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, printable, to_text, with_unit
   use pd_scene_check_bodies, only: memory_per_point
@@ -78,6 +78,7 @@ contains
     logical :: stopped
     real(wp) :: balance, share
 
+    call let_writes_fail()
     stem = stem_of(scene)
     directory = output_directory(scene, options)
     if (options%restart) then

@@ -5,10 +5,11 @@ module pd_base_interrupt
   use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int, c_null_funptr
   implicit none (type, external)
   private
-  public :: watch_for_interrupt, interrupted
+  public :: watch_for_interrupt, interrupted, let_writes_fail
 
   integer(c_int), parameter :: sigint = 2_c_int, sigterm = 15_c_int  ! POSIX
   integer(c_int), parameter :: sigusr1 = 10_c_int                    ! Linux
+  integer(c_int), parameter :: sigxfsz = 25_c_int                    ! Linux on common processors
   logical, volatile :: noted = .false.
 
   interface
@@ -32,6 +33,19 @@ contains
     before = posix_signal(sigterm, c_funloc(note))
     before = posix_signal(sigusr1, c_funloc(note))
   end subroutine watch_for_interrupt
+
+  !> A file beyond the size that the system allows the user (`ulimit -f`) ends the program by a
+  !> signal unless that is ignored; then the write fails, and can be told like a full disk.
+  subroutine let_writes_fail()
+    type(c_funptr) :: before
+    before = posix_signal(sigxfsz, c_funloc(ignore))
+  end subroutine let_writes_fail
+
+  !> Do nothing.
+  subroutine ignore(number) bind(c)
+    integer(c_int), value :: number
+    if (number == 0) return
+  end subroutine ignore
 
   !> Whether a request has been noted.
   logical function interrupted()

@@ -23,6 +23,7 @@ module pd_motion_watch
     real(wp) :: start = 0.0_wp             !! energy at the start, without what was supplied [J]
     real(wp) :: supply = -1.0_wp           !! greatest energy that there can have been [J]
     real(wp) :: energy = 0.0_wp            !! at the last look [J]
+    logical :: doubtful = .false.          !! the last look found too much
     integer :: looked = -1                 !! step of the last look, -1: none yet
     integer :: kept = -1                   !! step of the last state that was kept
     logical, public :: sound = .true.      !! nothing has been found
@@ -47,7 +48,7 @@ contains
     if (self%looked < 0) self%start = self%energy - work
     self%looked = step
     call self%supplied(work)
-    if (.not. self%energy <= too_much*self%supply) self%sound = .false.
+    self%doubtful = .not. self%energy <= too_much*self%supply
   end subroutine look
 
   !> Whether the energies must be looked at after `step` steps, since nobody has for long.
@@ -73,11 +74,15 @@ contains
     is_long = to - from >= min(longest, max(first_look, from))
   end function is_long
 
-  !> Note the work of loads and imposed motion since the start [J].
+  !> Note the work of loads and imposed motion since the start [J], in every step. A load that has
+  !> just begun to push has given velocity, but its work is known a step later; hence a look that
+  !> found too much is judged then.
   pure subroutine supplied(self, work)
     class(watch_type), intent(inout) :: self
     real(wp), intent(in) :: work
     self%supply = max(self%supply, self%start + work, 0.0_wp)
+    if (self%doubtful .and. .not. self%energy <= too_much*self%supply) self%sound = .false.
+    self%doubtful = .false.
   end subroutine supplied
 
   !> Look at the kinetic energy alone [J], at any step.

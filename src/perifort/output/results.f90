@@ -17,7 +17,7 @@ module pd_output_results
   use pd_output_checkpoint, only: remove_checkpoints
   use pd_output_description, only: check_description
   use pd_output_earlier, only: existing_results, mark_complete, mark_unfinished, refuse_existing
-  use pd_output_files, only: in_directory, make_directory, remove_file
+  use pd_output_files, only: file_exists, in_directory, make_directory, remove_file
   use pd_output_history, only: csv_type, history_type
   use pd_output_sink, only: sink_type
   use pd_output_types, only: column_type, field_type, kept_type, label_length
@@ -309,6 +309,7 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%end_output(self%time, error)
     if (.not. allocated(error)) call start_files(self, error)
     if (.not. allocated(error) .and. self%csv%is_open()) call self%csv%append(table, error)
+    if (.not. allocated(error)) call check_there(self, error)
     if (allocated(error)) then
       call explain_output(self, error)
     else
@@ -317,6 +318,23 @@ contains
       self%in_output = .false.
     end if
   end subroutine end_output
+
+  !> An error if the files are no longer where they are written: the system goes on to write files
+  !> whose names or folder have been removed, and they vanish with the program.
+  subroutine check_there(self, error)
+    class(results_type), intent(in) :: self
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: path
+
+    path = in_directory(self%directory, self%stem//'.vtkhdf')
+    if (self%use_vtkhdf .and. .not. file_exists(path)) then
+      call fail(error, path//' has been removed while it is written')
+      return
+    end if
+    path = in_directory(self%directory, 'history.csv')
+    if (self%csv%is_open() .and. .not. file_exists(path)) &
+      & call fail(error, path//' has been removed while it is written')
+  end subroutine check_there
 
   !> Put the files in their places, once: here, and not before, older results go.
   subroutine start_files(self, error)
@@ -471,6 +489,8 @@ contains
       if (.not. self%started .and. self%history%has_rows()) call start_files(self, error)
       if (self%started .and. .not. allocated(error)) call write_rows(self, error)
     end if
+    if (self%started .and. .not. self%failed .and. .not. allocated(error)) &
+      & call check_there(self, error)
     if (self%failed .or. allocated(error) .or. .not. self%started) then
       if (self%use_vtkhdf) call self%vtkhdf%abandon()
       if (self%csv%is_open()) call self%csv%close(ignored)

@@ -84,7 +84,10 @@ contains
     if (allocated(error)) return
     call remove_file(path//'.grow')  ! a killed run may have left it
     call create_file(self%current, self%file, error)
-    if (allocated(error)) return
+    if (allocated(error)) then
+      call remove_file(self%current)  ! there may be a file, with nothing in it
+      return
+    end if
     call self%layout%make_heart(self%file, error)
     if (.not. allocated(error)) call put_geometry(self%file, positions, error)
     if (.not. allocated(error)) call put_scene(self%file, scene_text, command, version, error)
