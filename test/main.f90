@@ -50,6 +50,8 @@ program main
   use test_output_results, only: collect_output_results
   use test_scene_change, only: collect_scene_change
   use test_scene_check, only: collect_scene_check
+  use test_scene_hostile, only: collect_scene_hostile
+  use test_motion_watch, only: collect_motion_watch
   use test_scene_compare, only: collect_scene_compare
   use test_scene_elements, only: collect_scene_elements
   use test_scene_file, only: collect_scene_file
@@ -116,6 +118,8 @@ program main
   call register('output_results', collect_output_results)
   call register('scene_change', collect_scene_change)
   call register('scene_check', collect_scene_check)
+  call register('scene_hostile', collect_scene_hostile)
+  call register('motion_watch', collect_motion_watch)
   call register('scene_compare', collect_scene_compare)
   call register('scene_elements', collect_scene_elements)
   call register('scene_file', collect_scene_file)

@@ -3,7 +3,8 @@ module test_driver
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
   use pd_base_kinds, only: wp, i8
-  use pd_driver, only: check_scene, run_options_type, run_scene
+  use pd_base_text, only: to_text
+  use pd_driver, only: check_scene, prepare, run_options_type, run_scene, set_up_type
   use pd_output_datasets, only: get_shape, read_rows
   use pd_output_files, only: directory_exists, file_bytes, file_exists, make_directory, remove_file
   use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
@@ -31,6 +32,10 @@ contains
       & new_unittest('a relaxation leaves its history', test_relaxation), &
       & new_unittest('a run without an answer keeps its history', test_unstable), &
       & new_unittest('a relaxation without rest keeps its history', test_restless), &
+      & new_unittest('the last good state is the last output', test_last_good), &
+      & new_unittest('a wrong condition has a place', test_bounds), &
+      & new_unittest('warnings are counted and kept', test_warnings), &
+      & new_unittest('results cannot leave their folder', test_inside), &
       & new_unittest('a scene that cannot be leaves no files', test_impossible), &
       & new_unittest('checking a scene leaves no files', test_check), &
       & new_unittest('quiet prints nothing', test_quiet)]
@@ -362,6 +367,146 @@ contains
       call expect_true(error, all(residual(2:) > 1.0e-6_wp), 'residual')
     end do
   end subroutine test_restless
+
+  !> At some ratio above 1, which the bound of the step does not tell, the highest frequency of the
+  !> plate grows, out of rounding errors if there is nothing else. That must be found before the
+  !> energy is a hundred times what it was, with the step, the point, its stretch and the ratio; and
+  !> the last output is of a state before that.
+  subroutine test_last_good(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: path = here//'/last_good/plate.vtkhdf'
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    type(hdf5_file) :: file
+    real(wp), allocatable :: kinetic(:), strain(:), times(:)
+    integer(i8) :: outputs
+    integer :: n, tenths
+
+    call flight('plate', scene)
+    scene%initial(1)%velocity = 0.0_wp
+    scene%initial(1)%velocity_gradient(1, 1) = 10.0_wp
+    call prepare(scene, set_up, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    scene%time%steps = 2000
+    scene%output%every = 1500
+    scene%output%history_every = 1
+    do tenths = 12, 30
+      scene%time%step = tenths*set_up%plan%limit/10
+      call run(scene, 'last_good', fault)
+      if (allocated(fault)) exit
+    end do
+    call expect_true(error, allocated(fault), 'an unstable run ended as if it were sound')
+    if (allocated(error)) return
+    call check(error, fault%status, status_no_answer, 'exit status')
+    call expect_true(error, index(fault%message, 'unstable at step ') > 0 .and. &
+      & index(fault%message, ': point ') > 0 .and. &
+      & index(fault%message, 'stretched by up to ') > 0 .and. &
+      & index(fault%message, ' is '//to_text(tenths/10.0_wp)//' of the stable one') > 0, &
+      & fault%message)
+    call column_of(path, 'kinetic_energy', kinetic, error)
+    call column_of(path, 'strain_energy', strain, error)
+    if (allocated(error)) return
+    n = size(kinetic)
+    call expect_true(error, kinetic(n) + strain(n) < 100*(kinetic(1) + strain(1)), 'found late')
+    call open_file(path, .false., file, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call get_attribute(file, '/VTKHDF/Steps', 'NSteps', outputs, fault)
+    allocate (times(outputs))
+    call read_rows(file, '/VTKHDF/Steps/Values', 0_i8, times, fault)
+    n = nint(times(outputs)/scene%time%step)
+    call close_file(file, fault)
+    call expect_true(error, n < size(kinetic) - 1, 'the last output is the bad state')
+    if (allocated(error)) return
+    call expect_true(error, kinetic(n + 1) + strain(n + 1) < 1.2_wp*(kinetic(1) + strain(1)), &
+      & 'the last output is no good state')
+    call check(error, int(outputs), merge(1, 2, n == 0), 'outputs')
+  end subroutine test_last_good
+
+  !> What cannot be followed is refused before anything is computed, with the group to blame.
+  subroutine test_bounds(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call flight('plate', scene)
+    scene%initial(1)%velocity(1) = 1.0e6_wp
+    call run(scene, 'bounds', fault)
+    call expect_place('&initial number 1', 'crosses its horizon')
+    call flight('plate', scene)
+    scene%initial(1)%displacement_gradient(1, 1) = 1.0e12_wp
+    call run(scene, 'bounds', fault)
+    call expect_place('&initial number 1', 'a million horizons')
+    call flight('plate', scene)
+    scene%horizon%ratio = 1.0e9_wp
+    call run(scene, 'bounds', fault)
+    call expect_place('&horizon number 1', 'too large')
+
+  contains
+
+    subroutine expect_place(place, what)
+      character(*), intent(in) :: place, what
+      if (allocated(error)) return
+      call expect_true(error, allocated(fault), 'accepted: '//what)
+      if (allocated(error)) return
+      call expect_true(error, fault%status == status_input .and. index(fault%message, &
+        & ' --> group '//place) > 0 .and. index(fault%message, what) > 0, fault%message)
+    end subroutine expect_place
+  end subroutine test_bounds
+
+  !> A crack and a region that hold nothing: two lines in the results, and none after a run that has
+  !> nothing to warn of.
+  subroutine test_warnings(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: kept = here//'/warnings/warnings.txt'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    type(line_type), allocatable :: lines(:)
+    type(hdf5_file) :: file
+
+    call flight('plate', scene)
+    if (allocated(scene%cracks)) deallocate (scene%cracks)
+    allocate (scene%cracks(1))
+    scene%cracks(1)%from = [5.0_wp, 5.0_wp, 0.0_wp]
+    scene%cracks(1)%to = [6.0_wp, 5.0_wp, 0.0_wp]
+    scene%regions(1)%upper(1) = -5.0_wp
+    call run(scene, 'warnings', fault)
+    call accept(error, fault)
+    call lines_of(kept, lines, error)
+    if (allocated(error)) return
+    call check(error, count_filled(lines), 2, 'lines of warnings')
+    if (allocated(error)) return
+    call expect_true(error, index(lines(1)%text, '1 &crack number 1 cuts no bond') == 1 .and. &
+      & index(lines(2)%text, '1 the region left holds no point') == 1, lines(1)%text)
+    call open_file(here//'/warnings/plate.vtkhdf', .false., file, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call expect_true(error, object_exists(file, '/scene/warnings'), 'warnings in the file')
+    call close_file(file, fault)
+    call flight('plate', scene)
+    call run(scene, 'warnings', fault)
+    call accept(error, fault)
+    call expect_true(error, .not. file_exists(kept), 'warnings of an earlier run')
+  end subroutine test_warnings
+
+  !> Names of a scene file that mean another folder do not lead there.
+  subroutine test_inside(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: names(3) = [character(4) :: '.', '..', '...']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: i
+
+    do i = 1, size(names)
+      if (allocated(error)) return
+      call flight(trim(names(i)), scene)
+      call run(scene, 'inside', fault)
+      call accept(error, fault)
+      call expect_true(error, file_exists(here//'/inside/scene.vtkhdf'), names(i))
+    end do
+  end subroutine test_inside
 
   subroutine test_impossible(error)
     type(error_type), allocatable, intent(out) :: error

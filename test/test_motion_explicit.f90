@@ -305,8 +305,8 @@ contains
     call expect_true(error, allocated(fault), 'an unstable run went to its end')
     if (.not. allocated(fault)) return
     call expect_true(error, fault%status == status_no_answer, 'exit status')
-    call expect_true(error, index(fault%message, 'unstable at t = ') == 1 .and. &
-      & index(fault%message, 'step') > 0 .and. index(fault%message, 'point') > 0, 'message: ' &
+    call expect_true(error, index(fault%message, 'unstable at step ') == 1 .and. &
+      & index(fault%message, 't = ') > 0 .and. index(fault%message, 'point') > 0, 'message: ' &
       & //fault%message)
     call expect_true(error, diary%n > 1, 'the rows before are kept')
   end subroutine test_unstable

@@ -52,7 +52,7 @@ contains
     close (unit)
     if (allocated(error)) return
     call read_text_file(path, text, found)
-    call check(error, text, '')
+    call expect_parts(error, found, path//"' is empty")
     open (newunit=unit, file=path)
     close (unit, status='delete')
   end subroutine test_whole

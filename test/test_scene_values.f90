@@ -103,7 +103,7 @@ contains
     character(:), allocatable :: note
     integer :: i
 
-    values = [0.1_wp, 1.0_wp/3.0_wp, 1.94598e-7_wp, 200.0e9_wp, -huge(1.0)*1.0_wp, 0.0_wp, &
+    values = [0.1_wp, 1.0_wp/3.0_wp, 1.94598e-7_wp, 200.0e9_wp, -3.4028234663852886e28_wp, 0.0_wp, &
       & acos(-1.0_wp)*1.0e-20_wp, nearest(1.0_wp, 2.0_wp)]
     do i = 1, size(values)
       call parse_real(exact_text(values(i)), back, note)

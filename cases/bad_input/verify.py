@@ -147,11 +147,13 @@ def main():
     parser.add_argument("--seed", default="1")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--program", default=os.environ.get("PERIFORT", ""))
+    parser.add_argument("--run-program", help="another build of the program for the runs")
     parser.add_argument("--folder", default="out/bad_input")
     options = parser.parse_args()
     program = str(Path(options.program).resolve())
     if not Path(program).is_file():
         sys.exit("error: start this as ./pf verify bad_input: PERIFORT does not name the program")
+    programs = {"check": program, "run": str(Path(options.run_program or program).resolve())}
     project = Path(__file__).resolve().parents[2]
     top = Path(options.folder).resolve()
     scenes, known = bases(program, project), keys(program)
@@ -161,7 +163,7 @@ def main():
         folders.put(top / f"job-{job}")
     for name, files in scenes.items():
         for word in ("check", "run"):
-            fault, answer = try_one(program, word, files, top / "base")
+            fault, answer = try_one(programs[word], word, files, top / "base")
             if fault or answer[0] != 0:
                 sys.exit(f"error: {word} of the untouched scene '{name}': status {answer[0]} {fault}"
                          f"\n{answer[4]}")
@@ -172,7 +174,8 @@ def main():
         try:
             results = []
             for word in ["check"] + (["run"] if number % options.every == 0 else []):
-                results.append((number, word, name, done, *try_one(program, word, files, folder)))
+                results.append((number, word, name, done,
+                                *try_one(programs[word], word, files, folder)))
             kept = top / "failed" / str(number)
             if any(result[4] for result in results):
                 shutil.rmtree(kept, ignore_errors=True)

@@ -9,14 +9,13 @@ module pd_driver
   use pd_base_interrupt, only: let_writes_fail, watch_for_interrupt
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, printable, to_text, with_unit
-  use pd_scene_check_bodies, only: memory_per_point
-  use pd_scene_doubts, only: doubts_of_scene
   use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_types, only: scene_type, is_set, material_group
   use pd_scene_write, only: scene_text
   use pd_body_body, only: body_type
-  use pd_body_generate, only: generate_body, horizon_of, touch
+  use pd_body_generate, only: generate_body, touch
   use pd_body_initial, only: initial_state
+  use pd_body_memory, only: any_critical, check_memory
   use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
   use pd_body_shapes, only: inside
   use pd_family_cracks, only: cut_bonds
@@ -39,12 +38,12 @@ module pd_driver
   use pd_output_begin, only: run_options_type, open_recorder, keep_checkpoints, schedule_of, &
     & history_interval, output_directory, stem_of, command_of, text_of
   use pd_output_checkpoint, only: about_type, checkpoint_bytes, new_about
+  use pd_output_doubts, only: warn_before
   use pd_output_earlier, only: mark_complete, refuse_existing
   use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, &
     & planned_outputs, planned_rows, schedule_type
   use pd_output_restart, only: find_restart, put_back, restart_type
   use pd_output_summary, only: checkpoint_line, summary_before, summary_after
-  use pd_base_system, only: available_memory
   implicit none (type, external)
   private
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads, &
@@ -206,46 +205,6 @@ contains
     end associate
   end function bytes_of_checkpoint
 
-  !> An error if the lattice bodies of a scene need more memory than there is, at the body with the
-  !> most points. Measured on cubes, a list takes about 10 bytes a bond, a lattice whose bonds can
-  !> break has a bit for each, and conjugate gradients take up to 250 bytes a point.
-  subroutine check_memory(scene, error)
-    type(scene_type), intent(in) :: scene
-    type(error_type), allocatable, intent(out) :: error
-    real(wp), parameter :: per_bond = 10.0_wp, per_bit = 0.125_wp, per_solver = 250.0_wp
-    real(wp) :: points, most, number, spacing, members, need, there
-    integer :: i, dim, largest
-
-    dim = scene%header%dimension
-    points = 0.0_wp
-    most = 0.0_wp
-    spacing = 0.0_wp
-    largest = 1
-    do i = 1, size(scene%bodies)
-      if (scene%bodies(i)%file /= '') cycle
-      number = product(real(scene%bodies(i)%points(:dim), wp))
-      points = points + number
-      if (number > most) largest = i
-      most = max(most, number)
-      spacing = max(spacing, (scene%bodies(i)%upper(1) - scene%bodies(i)%lower(1)) &
-        & /scene%bodies(i)%points(1))
-    end do
-    if (points <= 0.0_wp) return
-    need = points*memory_per_point
-    if (scene%time%method == 'relaxation' .and. scene%relaxation%solver == 'conjugate_gradient') &
-      & need = need + points*per_solver
-    members = min(points, (2*min(horizon_of(scene, spacing)/spacing, points))**dim)
-    if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
-      need = need + points*per_bond*members
-    else if (size(scene%cracks) > 0 .or. any_critical(scene)) then
-      need = need + points*per_bit*members
-    end if
-    there = real(available_memory(), wp)
-    if (need <= there) return
-    call scene_fault(error, scene, 'body', largest, 'points', 'the scene has '// &
-      & to_text(int(points, i8))//' points and needs about '//with_unit(need, 'B', 3)// &
-      & ' of memory', 'only '//with_unit(there, 'B', 3)//' are available')
-  end subroutine check_memory
 
   !> Points, families, corrections, cracks, conditions and the plan of a scene.
   subroutine prepare(scene, set_up, error)
@@ -321,36 +280,6 @@ contains
     end associate
   end subroutine prepare
 
-  !> Warn of what is allowed, but hardly meant.
-  subroutine warn_before(scene, system, plan, probes, lonely, warnings)
-    type(scene_type), intent(in) :: scene
-    type(system_type), intent(in) :: system
-    type(plan_type), intent(in) :: plan
-    type(probe_type), intent(in) :: probes(:)
-    integer, intent(in) :: lonely          !! points without a bond
-    type(warnings_type), intent(inout) :: warnings
-    real(wp) :: distance
-    integer :: i, k
-
-    call doubts_of_scene(scene, warnings)
-    if (lonely > 0) call warnings%add('lonely', to_text(lonely)// &
-      & ' points have no neighbour and stay put', tell=.false.)
-    if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &
-      & 'the time step is above the stable one', tell=.false.)
-    do i = 1, size(scene%regions)
-      if (any(region_mask(scene, system%body, scene%regions(i)%name))) cycle
-      call warnings%add('empty region '//to_text(i), 'the region '// &
-        & trim(scene%regions(i)%name)//' holds no point', tell=.false.)
-    end do
-    do i = 1, size(probes)
-      k = int(probes(i)%slot)
-      distance = norm2(system%body%x(k, :) - scene%probes(i)%point(:system%body%dim))
-      if (distance > system%body%spacing(k)) call warnings%add('probe '//to_text(i), 'probe '// &
-        & probes(i)%name//' lies outside the bodies: the nearest point is '// &
-        & with_unit(distance, 'm', 3)//' away', tell=.false.)
-    end do
-  end subroutine warn_before
-
   !> Families of the kind that suits the points; the body is arranged in their slots.
   subroutine make_family(scene, rule, system, error)
     type(scene_type), intent(in) :: scene
@@ -396,13 +325,6 @@ contains
       call build_weights(family, system%model)
     end select
   end subroutine finish_family
-
-  !> Whether some material of the scene can fail.
-  pure logical function any_critical(scene)
-    type(scene_type), intent(in) :: scene
-    any_critical = any(is_set(scene%materials%critical_stretch)) .or. &
-      & any(is_set(scene%materials%critical_energy_release_rate))
-  end function any_critical
 
   !> The materials with the horizon's parameters.
   pure function materials_of_scene(scene, delta) result(materials)

@@ -107,8 +107,8 @@ contains
       if (any(body%grid == g)) room = room + padded(body, rule, g)
     end do
     suits = room <= most_slots
-    if (.not. suits) reason = 'with its padding the grid has '//to_text(room, 3)//' cells, more than '// &
-      & to_text(most_slots)
+    if (.not. suits) reason = 'with its padding the grid has '//to_text(room, 3)// &
+      & ' cells, more than '//to_text(most_slots)
   end subroutine lattice_suits
 
   !> Slots of the box around the points of grid `g` with its padding, or a few less.

@@ -1,8 +1,8 @@
 !> Conditions that no computation follows, found before the first step: displacements of millions of
 !> horizons, points that cross their horizon in a step, bodies that double their length by heat.
 !>
-!> These are slips of units or signs. Within these bounds the powers of a strain that the force loops
-!> form stay finite.
+!> These are slips of units or signs. Within these bounds the powers of a strain that the force
+!> loops form stay finite.
 module pd_motion_bounds
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type

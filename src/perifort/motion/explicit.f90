@@ -12,6 +12,7 @@ module pd_motion_explicit
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_fault, only: explain_fault, faulty_slot
   use pd_motion_rescue, only: good_state_type, keep_good, show_good
+  use pd_motion_watch, only: watch_type
   use pd_motion_system, only: system_type, energies_type, energies_of, evaluate, account, &
     & add_loads, inverse_density, velocities_now
   implicit none (type, external)
@@ -45,6 +46,7 @@ contains
     instant%dt = dt
     seen = system%memory%step
     if (seen == not_begun) call begin_memory(system, integrator)
+    system%watch = watch_type()
     call allocate_start(system, integrator, start)
     do n = max(0, seen), steps
       instant%step = n

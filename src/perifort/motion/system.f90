@@ -46,7 +46,7 @@ module pd_motion_system
     logical :: break_late = .false.             !! bonds break after the step's forces
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
     type(watch_type) :: watch                   !! over the energies
-    real(wp) :: stable_step = 0.0_wp            !! the integrator's limit at the start, 0: unknown [s]
+    real(wp) :: stable_step = 0.0_wp            !! the integrator's limit, 0: unknown [s]
   end type system_type
 
   !> Energies at one instant [J].

@@ -2,8 +2,8 @@
 !> start and has been supplied since (doc/theory.md, 9).
 !>
 !> Every few steps the integrator compares the kinetic energy, which alone must not exceed what was
-!> supplied. Strain and dissipated energy are added when somebody looks at all energies: the history,
-!> or the integrator if that has not been for long.
+!> supplied. Strain and dissipated energy are added when somebody looks at all energies: the
+!> history, or the integrator if that has not been for long.
 module pd_motion_watch
   use pd_base_kinds, only: wp
   implicit none (type, external)
@@ -80,6 +80,7 @@ contains
   pure subroutine supplied(self, work)
     class(watch_type), intent(inout) :: self
     real(wp), intent(in) :: work
+    if (self%looked < 0) return
     self%supply = max(self%supply, self%start + work, 0.0_wp)
     if (self%doubtful .and. .not. self%energy <= too_much*self%supply) self%sound = .false.
     self%doubtful = .false.

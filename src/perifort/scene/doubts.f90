@@ -23,6 +23,7 @@ contains
     integer :: i, b
 
     do i = 1, size(scene%materials)
+      if (size(scene%materials) == 1) exit  ! bodies need not name it
       if (any([(scene%bodies(b)%material == scene%materials(i)%name, &
         & b=1, size(scene%bodies))])) cycle
       call warnings%add('unused material '//to_text(i), "the material '"// &

@@ -35,9 +35,9 @@ contains
     else if (length <= 0_i8) then
       call fail(error, "the file '"//path//"' is empty, or no plain file")
     else if (length > available_memory()/copies) then
-      call fail(error, "the file '"//path//"' is too large: its "//with_unit(real(length, wp), 'B', &
-        & 3)//' are more than can be read with '//with_unit(real(available_memory(), wp), 'B', 3)// &
-        & ' of memory')
+      call fail(error, "the file '"//path//"' is too large: its "//with_unit(real(length, wp), &
+        & 'B', 3)//' are more than can be read with '// &
+        & with_unit(real(available_memory(), wp), 'B', 3)//' of memory')
     end if
     if (allocated(error)) return
     reason = ''
