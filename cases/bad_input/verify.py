@@ -68,9 +68,10 @@ def fault_of_message(message, files):
         return "no message that begins with 'error: '"
     place = re.search(r"^ --> (\S.*?)(?::(\d+))?$", message, re.M)
     if not place:
-        return "the message names no place"
-    lines = files.get(place[1])
-    if place[2] and lines is not None and int(place[2]) > lines.count(b"\n") + 1:
+        # What cannot be read at all is named as a whole
+        return "" if message.startswith("error: the file '") else "the message names no place"
+    data = files.get(place[1])
+    if place[2] and data is not None and int(place[2]) > len(re.split(b"\r\n|\r|\n", data)):
         return "the message names a line that the file has not"
     return ""
 
