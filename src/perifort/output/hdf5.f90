@@ -11,7 +11,6 @@ module pd_output_hdf5
     & h5aclose_f, h5acreate_f, h5aopen_by_name_f, h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, &
     & h5dcreate_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, h5dread_f, h5dwrite_f, &
     & h5eset_auto_f, h5fclose_f, h5fcreate_f, &
-    & h5dcreate_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, h5fclose_f, h5fcreate_f, &
     & h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5get_libversion_f, h5ldelete_f, &
     & h5lexists_f, &
     & h5oclose_f, h5ocopy_f, h5oopen_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, &
