@@ -159,7 +159,8 @@ contains
   subroutine test_too_many_points(error)
     type(error_type), allocatable, intent(out) :: error
     call expect_fault(error, '&scene dimension = 3 /&time steps = 1 /'// &
-      & '&material youngs_modulus = 1 density = 1 poissons_ratio = 0 /'//line//'&body lower = 0 0 0 upper = 1 1 1'//line// &
+      & '&material youngs_modulus = 1 density = 1 '// &
+      & 'poissons_ratio = 0 /'//line//'&body lower = 0 0 0 upper = 1 1 1'//line// &
       & 'points = 10000 10000 10000 /', 'too many points: 1e12|a/b.nml:3|400 TB of memory')
   end subroutine test_too_many_points
 
