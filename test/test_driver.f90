@@ -403,7 +403,7 @@ contains
     call expect_true(error, index(fault%message, 'unstable at step ') > 0 .and. &
       & index(fault%message, ': point ') > 0 .and. &
       & index(fault%message, 'stretched by up to ') > 0 .and. &
-      & index(fault%message, ' is '//to_text(tenths/10.0_wp)//' of the stable one') > 0, &
+      & index(fault%message, ' is '//to_text(tenths/10.0_wp)//' times the stable one') > 0, &
       & fault%message)
     call column_of(path, 'kinetic_energy', kinetic, error)
     call column_of(path, 'strain_energy', strain, error)

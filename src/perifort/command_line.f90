@@ -262,7 +262,9 @@ contains
     case ('--surface')
       line%bench%surface = .true.
     case ('--seconds')
-      call read_positive(value, line%bench%seconds, status)
+      status = 1
+      if (len(value) > 0 .and. verify(value, '0123456789.') == 0) &
+        & read (value, *, iostat=status) line%bench%seconds
       line%seconds = line%bench%seconds
       if (status /= 0) call usage(error, line, "'--seconds' needs a number, as in "// &
         & "--seconds 0.5, found '"//value//"'")

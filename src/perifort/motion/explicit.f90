@@ -26,6 +26,8 @@ module pd_motion_explicit
     real(wp), allocatable :: u(:, :), v(:, :), a(:, :)
   end type start_type
 
+  real(wp), parameter :: smallest_strain = 1.0e-12_wp  !! what is below is rounding
+
 contains
 
   !> Move `system` through `steps` steps of `dt` [s] from t = 0, or from where it stands if its
@@ -47,6 +49,8 @@ contains
     seen = system%memory%step
     if (seen == not_begun) call begin_memory(system, integrator)
     system%watch = watch_type()
+    system%watch%rounding = maxval(system%model%materials%youngs_modulus)*smallest_strain**2 &
+      & *sum(system%body%volume)
     call allocate_start(system, integrator, start)
     do n = max(0, seen), steps
       instant%step = n
@@ -323,26 +327,5 @@ contains
     system%state%u = start%u + dt*du
     system%state%v = start%v + dt*dv
   end subroutine runge_kutta
-
-  !> The error for a motion that is none any more at time `t` [s] with steps of `dt` [s]. Whether
-  !> the step is to blame is looked up, not guessed.
-  subroutine explain_fault(system, integrator, t, dt, error)
-    type(system_type), intent(in) :: system
-    character(*), intent(in) :: integrator
-    real(wp), intent(in) :: t, dt
-    type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: bound(:)
-    real(wp) :: stable
-    integer :: k
-
-    k = max(1, faulty_slot(system, system%state%v, dt))
-    allocate (bound(system%body%n_slots))
-    call stiffness_bound(system%body, system%family, system%model, bound)
-    stable = stable_step(system%body, system%model, bound)*integrator_limit(integrator)/2
-    call fail(error, 'unstable at t = '//to_text(t)//' s (step '//to_text(nint(t/dt))// &
-      & '): point '//to_text(int(system%body%point(k)))//' at ('//place(system, k)// &
-      & ') moves more than a horizon in a step of '//to_text(dt)//' s. '// &
-      & cause_of_fault(dt, stable), status_no_answer)
-  end subroutine explain_fault
 
 end module pd_motion_explicit

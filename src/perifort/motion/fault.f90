@@ -6,10 +6,10 @@ module pd_motion_fault
   use pd_base_text, only: newline, to_text, with_unit
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_reference, only: bond_state_type, state_of_bond
-  use pd_motion_system, only: system_type
+  use pd_motion_system, only: system_type, energies_type
   implicit none (type, external)
   private
-  public :: faulty_slot, explain_fault, place, greatest_stretch
+  public :: faulty_slot, explain_fault, check_strain_energy, place, greatest_stretch
 
   real(wp), parameter :: large_stretch = 0.1_wp  !! beyond it a bond is noticeably stiffer [-]
 
@@ -81,7 +81,10 @@ contains
     end if
     text = text//'; the step of '//with_unit(dt, 's')
     if (system%stable_step > 0.0_wp) then
-      text = text//' is '//to_text(dt/system%stable_step, 4)//' of the stable one'
+      text = text//' is '//to_text(dt/system%stable_step, 4)
+      if (dt > system%stable_step) text = text//' times'
+      if (.not. dt > system%stable_step) text = text//' of'
+      text = text//' the stable one'
     end if
     call fail(error, text//newline//'  likely cause: '//likely_cause(), status_no_answer)
 
@@ -92,14 +95,36 @@ contains
       if (system%stable_step > 0.0_wp .and. dt > system%stable_step) then
         cause = 'the step is above the stable one; leave &time step out, or safety at 0.8'
       else if (.not. stretch <= large_stretch) then
-        cause = 'bonds crushed or stretched by so much are stiffer than at rest; lower &time '// &
-          & 'safety, give what moves at once a ramp_time, or the material a critical_stretch'
+        cause = 'a load or an imposed velocity beyond what the body bears, or bonds crushed '// &
+          & 'or stretched by so much, which are stiffer than at rest; lower &time safety, give '// &
+          & 'what moves at once a ramp_time, or the material a critical_stretch'
       else
-        cause = 'something is moved faster than the waves in the body; give it a ramp_time, or '// &
-          & 'lower &time safety'
+        cause = 'something is moved faster than the waves in the body, or a load is beyond '// &
+          & 'what it bears; give it a ramp_time, or lower &time safety'
       end if
     end function likely_cause
   end subroutine explain_fault
+
+  !> An error if the strain energy at time `t` [s] is below zero [J]. Only a < 0 can make it so, by
+  !> dilatation: with a Poisson's ratio near -1 the corrected dilatation of corners outweighs the
+  !> energy of their bonds. Such a body has no state of rest and blows itself up, at any step. The
+  !> projected dilatation leaves the sign of energies open that are small beside the kinetic one.
+  subroutine check_strain_energy(system, energies, t, error)
+    type(system_type), intent(in) :: system
+    type(energies_type), intent(in) :: energies
+    real(wp), intent(in) :: t
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: advice
+
+    if (energies%strain >= -max(system%watch%rounding, 0.01_wp*energies%kinetic)) return
+    if (.not. any(system%model%materials%a < 0.0_wp)) return
+    advice = ''
+    if (system%model%surface) advice = ' with surface correction, which strengthens the '// &
+      & 'dilatation of corners (surface_correction = ''none'' does not)'
+    call fail(error, 'unstable by t = '//to_text(t)//' s: the strain energy is negative, '// &
+      & with_unit(energies%strain, 'J', 3)//'. The cause is not the step but a Poisson''s ratio '// &
+      & 'of '//to_text(minval(system%model%materials%poissons_ratio))//advice, status_no_answer)
+  end subroutine check_strain_energy
 
   !> The largest stretch, in size, of the intact bonds of slot `k`; not finite if displacements
   !> around it are not.

@@ -10,9 +10,10 @@ module pd_motion_watch
   private
   public :: watch_type
 
-  !> A step near the limit carries up to some times the energy that the highest frequencies began
-  !> with back and forth between its two halves; what grows without limit gets far beyond soon.
-  real(wp), parameter :: too_much = 10.0_wp
+  !> A wave of frequency omega keeps an energy that differs from this one by
+  !> 1/(1 - (omega dt/2)^2), which is 50 at 0.99 of the limit; beyond the limit it grows without
+  !> end.
+  real(wp), parameter :: too_much = 100.0_wp
   !> More than the balance is off where many bonds break (doc/theory.md, 9).
   real(wp), parameter :: good = 1.1_wp
   integer, parameter :: first_look = 50   !! steps; then at 100, 200, 400, 800, 1200, ...
@@ -20,6 +21,7 @@ module pd_motion_watch
 
   type :: watch_type
     private
+    real(wp), public :: rounding = 0.0_wp  !! energy that is none [J]
     real(wp) :: start = 0.0_wp             !! energy at the start, without what was supplied [J]
     real(wp) :: supply = -1.0_wp           !! greatest energy that there can have been [J]
     real(wp) :: energy = 0.0_wp            !! at the last look [J]
@@ -34,6 +36,7 @@ module pd_motion_watch
     procedure :: look_at_kinetic
     procedure :: supplied
     procedure :: found
+    procedure, private :: most
   end type watch_type
 
 contains
@@ -48,7 +51,7 @@ contains
     if (self%looked < 0) self%start = self%energy - work
     self%looked = step
     call self%supplied(work)
-    self%doubtful = .not. self%energy <= too_much*self%supply
+    self%doubtful = .not. self%energy <= self%most()
   end subroutine look
 
   !> Whether the energies must be looked at after `step` steps, since nobody has for long.
@@ -82,7 +85,7 @@ contains
     real(wp), intent(in) :: work
     if (self%looked < 0) return
     self%supply = max(self%supply, self%start + work, 0.0_wp)
-    if (self%doubtful .and. .not. self%energy <= too_much*self%supply) self%sound = .false.
+    if (self%doubtful .and. .not. self%energy <= self%most()) self%sound = .false.
     self%doubtful = .false.
   end subroutine supplied
 
@@ -90,10 +93,16 @@ contains
   pure subroutine look_at_kinetic(self, kinetic)
     class(watch_type), intent(inout) :: self
     real(wp), intent(in) :: kinetic
-    if (self%supply < 0.0_wp .or. kinetic <= too_much*self%supply) return
+    if (self%supply < 0.0_wp .or. kinetic <= self%most()) return
     self%sound = .false.
     self%energy = kinetic
   end subroutine look_at_kinetic
+
+  !> The energy beyond which there is too much [J].
+  pure real(wp) function most(self)
+    class(watch_type), intent(in) :: self
+    most = too_much*self%supply + self%rounding
+  end function most
 
   !> The energy that was found and the greatest one that there can have been [J].
   pure subroutine found(self, energy, supply)

@@ -10,6 +10,7 @@ module pd_output_recorder
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
+  use pd_motion_fault, only: check_strain_energy
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
   use pd_output_checkpoint, only: about_type, checkpoint_type
@@ -242,11 +243,8 @@ contains
     if (recorder%gave_way_at == instant%load_step) return
     recorder%gave_way_at = instant%load_step
     recorder%gave_way = recorder%gave_way + 1
-    if (recorder%gave_way > 1) return
-    call recorder%progress%finish()
-    write (error_unit, '(a)') 'note: in load step '//to_text(instant%load_step)// &
-      & ' the conjugate gradient finds no rest (iteration '//to_text(instant%step)// &
-      & '): dynamic relaxation goes on from there'
+    call recorder%warn('conjugate gradient', 'the conjugate gradient finds no rest in load step '// &
+      & to_text(instant%load_step)//': dynamic relaxation goes on from where it stands')
   end subroutine note_giving_way
 
   !> Whether the run has had the time that it was given.
@@ -354,6 +352,8 @@ contains
     recorder%rows = recorder%rows + 1
     call recorder%results%add_row(history_row(system, recorder%probes, &
       & recorder%schedule%relaxation, instant, v, recorder%energies), error)
+    if (.not. allocated(error)) call check_strain_energy(system, recorder%energies, instant%time, &
+      & error)
   end subroutine write_row
 
   !> The values of `history_columns` at an instant; `v` are the velocities and `energies` the

@@ -8,8 +8,9 @@ module pd_study_limits
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text, with_unit
   use pd_driver, only: choose_threads, prepare, run_options_type, set_up_type
+  use pd_motion_fault, only: place
   use pd_motion_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, stable_step_of
-  use pd_motion_system, only: system_type, inverse_density, place
+  use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   use pd_motion_time_step, only: printed_stiffness, stiffness_bound
   use pd_scene_types, only: scene_type

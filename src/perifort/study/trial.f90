@@ -244,7 +244,7 @@ contains
     end if
     if (.not. row .or. observer%quick) return
     begin = wall_time()
-    call velocities_now(system, instant, v)
+    call velocities_now(system, instant%time, instant%kick, v)
     call energies_of(system, v, energies)
     call balance(observer, system, energies)
     if (observer%measure%kind == of_field) then
