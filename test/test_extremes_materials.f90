@@ -4,11 +4,10 @@ module test_extremes_materials
   use pd_base_numbers, only: pi
   use pd_base_error, only: fault_type => error_type, status_no_answer
   use pd_driver, only: set_up_type
+  use pd_motion_fault, only: check_strain_energy
   use pd_motion_explicit, only: run_explicit
-  use pd_motion_observer, only: instant_type
   use pd_motion_system, only: energies_of, energies_type, evaluate
   use pd_motion_time_step, only: stiffness_bound
-  use pd_motion_watch, only: watch_type
   use pd_scene_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: at_point, box_scene, density_of_steel, diary_type, expect, expect_true, noise, &
@@ -359,7 +358,6 @@ contains
     type(scene_type) :: scene
     type(set_up_type) :: set_up
     type(energies_type) :: energies
-    type(watch_type) :: watch
     type(fault_type), allocatable :: fault
     integer :: i
 
@@ -374,7 +372,7 @@ contains
         end associate
       end do
       call energies_of(system, system%state%v, energies)
-      call watch%look(system, energies, instant_type(), fault)
+      call check_strain_energy(system, energies, 0.0_wp, fault)
     end associate
     call expect_true(error, energies%strain < 0.0_wp, 'the block is stable')
     call expect_true(error, allocated(fault), 'negative energy is not refused')
@@ -385,7 +383,7 @@ contains
       & index(fault%message, 'surface_correction = ''none''') > 0, fault%message)
     ! the energy of a body at rest is no fault
     energies = energies_type()
-    call watch%look(set_up%system, energies, instant_type(), fault)
+    call check_strain_energy(set_up%system, energies, 0.0_wp, fault)
     call expect_true(error, .not. allocated(fault), 'rest is refused')
   end subroutine test_negative
 

@@ -99,6 +99,7 @@ contains
     type(fault_type), allocatable, intent(out) :: error
 
     if (allocated(error)) return
+    if (instant%rescued) return
     observer%seen = observer%seen + 1
     observer%iterations = instant%step
     if (instant%gave_way) observer%gave_way = observer%gave_way + 1

@@ -71,7 +71,7 @@ contains
             call refuse_all(info%name, no_count)
           else if (index(info%kind, 'text') == 1) then
             call refuse_all(info%name, no_text)
-          else
+          else if (info%kind /= 'list') then  ! of which any value is right
             call check(error, info%kind, 'logical')
             call refuse_all(info%name, no_logical)
           end if

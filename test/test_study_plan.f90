@@ -163,7 +163,7 @@ contains
     call refused("&study vary = 'output%fields' values = 'damage'"//rest, &
       & "'fields' is a text list|vary one element of it, as in fields(2)")
     call refused("&study vary = 'body(1)%points' values = 20, 40000"//rest, &
-      & 'body(1)%points = 40000|of memory, but only')
+      & 'body(1)%points = 40000|of memory|only')
 
   contains
 

@@ -18,6 +18,7 @@ module pd_body_generate
 
   real(wp), parameter :: same_grid = 1.0e-6_wp  !! how far two grids may differ [spacings]
   real(wp), parameter :: touch = 1.0e-6_wp      !! what counts as on a surface [spacings]
+  real(wp), parameter :: largest_ratio = 1.0e4_wp  !! of horizon to spacing
   real(wp), parameter :: most_members = 2.0e5_wp  !! of the box around a horizon [points]
 
 contains
@@ -73,10 +74,19 @@ contains
     integer, intent(in) :: dim
     real(wp), intent(in) :: delta, spacing
     type(error_type), allocatable, intent(out) :: error
-    real(wp) :: members
+    real(wp) :: members, points
+    integer :: i
 
     members = (2*min(delta/spacing, most_members))**dim
     if (members <= most_members) return
+    if (all(scene%bodies%file == '')) then
+      points = 0.0_wp
+      do i = 1, size(scene%bodies)
+        points = points + product(real(scene%bodies(i)%points(:dim), wp))
+      end do
+      ! a small body may lie in its horizon as a whole
+      if (points <= most_members .and. delta/spacing <= largest_ratio) return
+    end if
     call scene_fault(error, scene, 'horizon', 1, merge('length', 'ratio ', &
       & is_set(scene%horizon%length)), 'the horizon of '//with_unit(delta, 'm')//' is too large &
       &for a smallest spacing of '//with_unit(spacing, 'm'), 'a family of the points around one &

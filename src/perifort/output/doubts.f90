@@ -28,7 +28,7 @@ contains
 
     call doubts_of_scene(scene, warnings)
     if (lonely > 0) call warnings%add('lonely', to_text(lonely)// &
-      & ' points have no neighbour and stay put', tell=.false.)
+      & ' points have no neighbour: nothing pulls at them', tell=.false.)
     if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &
       & 'the time step is above the stable one', tell=.false.)
     do i = 1, size(scene%regions)
