@@ -370,8 +370,8 @@ contains
 
   !> At some ratio above 1, which the bound of the step does not tell, the highest frequency of the
   !> plate grows, out of rounding errors if there is nothing else. That must be found soon after
-  !> the energy is a hundred times what it was, with the step, the point, its stretch and the ratio; and
-  !> the last output is of a state before that.
+  !> the energy is a hundred times what it was, with the step, the point, its stretch and the ratio;
+  !> and the last output is of a state before that.
   subroutine test_last_good(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: path = here//'/last_good/plate.vtkhdf'

@@ -67,8 +67,8 @@ contains
     call check(error, watch%sound)
   end subroutine test_begin
 
-  !> Kinetic energy is found at once, all energies a step later, at a little more than a hundred times
-  !> what there can be.
+  !> Kinetic energy is found at once, all energies a step later, at a little more than a hundred
+  !> times what there can be.
   subroutine test_nowhere(error)
     type(error_type), allocatable, intent(out) :: error
     type(watch_type) :: watch

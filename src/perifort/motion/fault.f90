@@ -122,8 +122,8 @@ contains
     if (system%model%surface) advice = ' with surface correction, which strengthens the '// &
       & 'dilatation of corners (surface_correction = ''none'' does not)'
     call fail(error, 'unstable by t = '//to_text(t)//' s: the strain energy is negative, '// &
-      & with_unit(energies%strain, 'J', 3)//'. The cause is not the step but a Poisson''s ratio '// &
-      & 'of '//to_text(minval(system%model%materials%poissons_ratio))//advice, status_no_answer)
+      & with_unit(energies%strain, 'J', 3)//'. The cause is not the step but a Poisson''s '// &
+      & 'ratio of '//to_text(minval(system%model%materials%poissons_ratio))//advice, status_no_answer)
   end subroutine check_strain_energy
 
   !> The largest stretch, in size, of the intact bonds of slot `k`; not finite if displacements
