@@ -21,11 +21,11 @@ module force_subjects
   use bodies, only: youngs_modulus
   implicit none (type, external)
   private
-  public :: subject_type, kinds, spacing, build, build_pair, subject_number, name_of, fast_force, &
-    & some_gradient
+  public :: subject_type, kinds, tolerance, spacing, build, build_pair, subject_number, &
+    & name_of, fast_force, some_gradient
 
   !> The kinds of families that must keep the contract.
-  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'lattice']
+  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'lattice', 'mixed']
 
   !> Of every body here [m]; a power of 2, so that positions are exact.
   real(wp), parameter :: spacing = 2.0_wp**(-10)
@@ -70,7 +70,7 @@ contains
       call move_alloc(list, family)
     case default
       allocate (lattice)
-      call new_lattice_family(body, rule, breakable, lattice, fault)
+      call new_lattice_family(body, rule, breakable, kind == 'mixed', lattice, fault)
       call move_alloc(lattice, family)
     end select
   end subroutine build_family
@@ -83,6 +83,13 @@ contains
       call build_weights(family, subject%model)
     end select
   end subroutine finish_family
+
+  !> What a kind may be off: `double`, or `mixed` if its bonds are computed in single precision.
+  pure real(wp) function tolerance(kind, double, mixed)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: double, mixed
+    tolerance = merge(mixed, double, kind == 'mixed')
+  end function tolerance
 
   !> Lay out body, family and model of a subject.
   subroutine build(subject)

@@ -1,7 +1,8 @@
 !> Commands, options, and what is said about wrong ones.
 module test_command_line
   use pd_base_error, only: pd_error => error_type, status_usage
-  use pd_command_line, only: command_line_type, command_names, help_text, parse_command_line, &
+  use pd_command_help, only: help_text
+  use pd_command_line, only: command_line_type, command_names, parse_command_line, &
     & restart_command
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)

@@ -362,7 +362,7 @@ contains
           call move_alloc(list, subject%family)
         else
           allocate (lattice)
-          call new_lattice_family(body, rule, breakable, lattice, fault)
+          call new_lattice_family(body, rule, breakable, .false., lattice, fault)
           call move_alloc(lattice, subject%family)
         end if
       end associate

@@ -5,7 +5,8 @@ module pd_commands
   use pd_base_error, only: error_type, fail, status_usage
   use pd_base_text, only: to_text
   use pd_base_version, only: compiler_flags, compiler_name, program_version
-  use pd_command_line, only: command_line_type, help_text, restart_command
+  use pd_command_help, only: help_text
+  use pd_command_line, only: command_line_type, restart_command
   use pd_driver, only: check_scene, run_options_type, run_scene
   use pd_scene_read, only: read_scene
   use pd_scene_reference, only: write_reference

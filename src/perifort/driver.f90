@@ -289,7 +289,7 @@ contains
     type(lattice_family_type), allocatable :: lattice
     type(list_family_type), allocatable :: list
     character(:), allocatable :: reason
-    logical :: suits
+    logical :: suits, mixed
 
     if (scene%horizon%family == 'list') then
       suits = .false.
@@ -302,10 +302,16 @@ contains
         & 'the scene cannot have lattice families, which &horizon family asks for', reason)
       return
     end if
+    mixed = scene%header%precision == 'mixed'
+    if (mixed .and. .not. suits) then
+      call scene_fault(error, scene, 'scene', 1, 'precision', &
+        & "precision = 'mixed' needs lattice families, but the scene gets lists", reason)
+      return
+    end if
     if (suits) then
       allocate (lattice)
       call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), &
-        & lattice, error)
+        & mixed, lattice, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
       call move_alloc(lattice, system%family)

@@ -6,7 +6,7 @@ module pd_base_kinds
   public :: wp, sp, i1, i2, i4, i8
 
   integer, parameter :: wp = real64  !! working precision of state and arithmetic
-  integer, parameter :: sp = real32  !! single precision, for output that asks for it
+  integer, parameter :: sp = real32  !! single precision, for output and bonds that ask for it
   integer, parameter :: i1 = int8    !! flags
   integer, parameter :: i2 = int16   !! numbers of bodies, materials and layers at a point
   integer, parameter :: i4 = int32   !! indices of points

@@ -6,11 +6,12 @@
 !>
 !> Bodies on grids of their own, which no bond joins, lie in boxes of their own, one after another.
 !>
-!> The force loops work on blocks of `lanes` slots of one row. Blocks whose surroundings look the
+!> The force loops work on blocks of slots of one row: `lanes` of them in double precision, twice as
+!> many where bonds are computed in single precision. Blocks whose surroundings look the
 !> same (and most do) share one table of weights with the surface factors in it.
 module pd_family_lattice
   use pd_base_archive, only: archive_type
-  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_error, only: error_type, fail
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
@@ -24,25 +25,40 @@ module pd_family_lattice
   implicit none (type, external)
   private
   public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, &
-    & grid_at, both_ends, lanes, word_bits
+    & use_double, grid_at, both_ends, lanes, word_bits
 
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers
 
   !> Weights of the bonds of one block, or of many that are alike, in the order of `offsets_type`.
+  !> Families in mixed precision keep the single ones; lengths are those of their blocks.
   type :: weights_type
     integer :: n = 0                           !! offsets that any lane has
     integer :: n_forward = 0                   !! forward ones among them, which come first
     integer(i4), allocatable :: offset(:)      !! their numbers (n)
     integer(i8), allocatable :: shift(:)       !! their shifts (n)
     real(wp), allocatable :: geometry(:, :)    !! their geometry (4, n)
-    real(wp), allocatable :: dilatation(:, :)  !! Gd v_c V_j (lanes, n)
-    real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (lanes, n)
+    real(wp), allocatable :: dilatation(:, :)  !! Gd v_c V_j (block_length, n)
+    real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (block_length, n)
+    real(sp), allocatable :: single_geometry(:, :)
+    real(sp), allocatable :: single_dilatation(:, :) !! over the unit of volume of `singles_type`
+    real(sp), allocatable :: single_stretch(:, :)
   end type weights_type
+
+  !> What the loops in mixed precision work on.
+  type :: singles_type
+    real(wp) :: volume = 1.0_wp                !! unit of volume, a power of 2 [m3]
+    real(sp), allocatable :: high(:, :)        !! leading digits of u (n_slots, dim)
+    real(sp), allocatable :: low(:, :)         !! the digits that follow
+    real(sp), allocatable :: p(:)              !! p times the unit of volume (n_slots)
+    real(sp), allocatable :: sums(:, :)        !! what is added to both ends (n_slots, dim), 3D
+  end type singles_type
 
   type, extends(family_type) :: lattice_family_type
     type(offsets_type), allocatable :: grids(:)
     integer :: words = 0                       !! words of bits of one slot
+    logical :: mixed = .false.                 !! bonds are computed in single precision
+    integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
     integer(i4), allocatable :: first_of(:)    !! the first slot of each class
@@ -52,6 +68,7 @@ module pd_family_lattice
     integer(i4), allocatable :: weights(:)     !! which weights each block has; 0: made on the fly
     integer(i1), allocatable :: large(:)       !! 1: the block is strained beyond the fast formula
     type(weights_type), allocatable :: table(:)
+    type(singles_type) :: singles              !! if mixed
   contains
     procedure :: bonds_of
     procedure :: break_bond
@@ -141,16 +158,20 @@ contains
   end function extent
 
   !> Families of a body that `lattice_suits`; the body is arranged in slots. `breakable`: bonds may
-  !> break or be cut, so each gets a bit.
-  subroutine new_lattice_family(body, rule, breakable, family, error)
+  !> break or be cut, so each gets a bit. `mixed`: bonds in single precision, which 1D has no loops
+  !> for.
+  subroutine new_lattice_family(body, rule, breakable, mixed, family, error)
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
     logical, intent(in) :: breakable
+    logical, intent(in) :: mixed
     type(lattice_family_type), intent(out) :: family
     type(error_type), allocatable, intent(out) :: error
     integer :: g
 
     family%dim = body%dim
+    family%mixed = mixed .and. body%dim > 1
+    if (family%mixed) family%block_length = 2*lanes
     family%rule = rule
     allocate (family%grids(0))
     do g = 1, size(body%grids)
@@ -162,13 +183,22 @@ contains
     if (allocated(error)) return
     call classify(body, family)
     call find_blocks(family)
-    call find_slabs(family%grids, family%dim, family%block, family%slabs)
     if (breakable) call family%allow_breaking()
   end subroutine new_lattice_family
 
+  !> Leave mixed precision: what a model needs has no loops for it.
+  subroutine use_double(family)
+    type(lattice_family_type), intent(inout) :: family
+
+    if (.not. family%mixed) return
+    family%mixed = .false.
+    family%block_length = lanes
+    call find_blocks(family)
+  end subroutine use_double
+
   !> The table of offsets and the padded box of grid `g` of the body, behind the boxes that are
   !> there. The padding at the end of one row serves the beginning of the next as well, and so for
-  !> planes. Rows are a multiple of `lanes` long, so that all of them are cut into blocks alike.
+  !> planes. Rows are a multiple of a block long, so that all of them are cut into blocks alike.
   subroutine add_grid(body, g, family)
     type(body_type), intent(in) :: body
     integer, intent(in) :: g
@@ -181,17 +211,19 @@ contains
     grid%spacing = body%spacing(k)
     grid%cell_volume = body%volume(k)
     cells = extent(body, g)
+    grid%alignment = family%block_length
     call make_offsets(family%rule, body%dim, cells, grid)
     associate (m => grid%reach_cells)
-      grid%stride = [1, whole_blocks(cells(1) + m), 0]
+      grid%stride = [1, whole_blocks(cells(1) + m, grid%alignment), 0]
       grid%stride(3) = grid%stride(2)*(cells(2) + m)
       if (body%dim < 3) grid%stride(3) = 0
       if (body%dim < 2) grid%stride(2) = 0
-      margin = whole_blocks(int(min(m*sum(int(grid%stride, i8)), int(most_slots, i8))))
+      margin = whole_blocks(int(min(m*sum(int(grid%stride, i8)), int(most_slots, i8))), &
+        & grid%alignment)
     end associate
     grid%first = 1_i8
     if (size(family%grids) > 0) grid%first = family%grids(size(family%grids))%last + 1
-    grid%last = grid%first - 1 + 2*margin + whole_blocks(cells(1)) &
+    grid%last = grid%first - 1 + 2*margin + whole_blocks(cells(1), grid%alignment) &
       & + sum((cells(2:) - 1)*int(grid%stride(2:), i8))
     do o = 1, grid%n
       grid%shift(o) = 0_i8
@@ -314,16 +346,17 @@ contains
     family%first_of = first_of(:classes%count)
   end subroutine classify
 
-  !> Cover the live slots with blocks. Rows begin at multiples of `lanes`, and so do blocks.
+  !> Cover the live slots with blocks. Rows begin at multiples of their length, and so do blocks.
   subroutine find_blocks(family)
     type(lattice_family_type), intent(inout) :: family
     integer(i8) :: k, n
     integer :: pass
 
+    if (allocated(family%block)) deallocate (family%block, family%weights, family%large)
     do pass = 1, 2
       n = 0_i8
-      do k = 1, family%n_slots - lanes + 1, lanes
-        if (all(family%alive(k:k + lanes - 1) == 0_i1)) cycle
+      do k = 1, family%n_slots - family%block_length + 1, family%block_length
+        if (all(family%alive(k:k + family%block_length - 1) == 0_i1)) cycle
         n = n + 1
         if (pass == 2) family%block(n) = k
       end do
@@ -331,6 +364,7 @@ contains
     end do
     family%weights = 0_i4
     family%large = 0_i1
+    call find_slabs(family%grids, family%dim, family%block_length, family%block, family%slabs)
   end subroutine find_blocks
 
   pure integer function alike(family, k)
@@ -408,9 +442,12 @@ contains
     if (allocated(family%broken)) bytes = bytes + 8_i8*family%n_slots*family%words
     if (allocated(family%block)) bytes = bytes + 8_i8*size(family%block)
     if (allocated(family%weights)) bytes = bytes + 4_i8*size(family%weights)
+    associate (s => family%singles)
+      if (allocated(s%high)) bytes = bytes + 4_i8*(2*size(s%high) + size(s%p) + size(s%sums))
+    end associate
     if (.not. allocated(family%table)) return
     do t = 1, size(family%table)
-      bytes = bytes + family%table(t)%n*(16_i8*lanes + 44)
+      bytes = bytes + family%table(t)%n*(16_i8*lanes + merge(60, 44, family%mixed))
     end do
   end function bytes
 

@@ -8,12 +8,13 @@ module pd_family_offsets
   public :: offsets_type, make_offsets, order_offsets, first_cell, whole_blocks, both_ends, &
     & lanes, word_bits
 
-  integer, parameter :: lanes = 8        !! slots of a block: one 512-bit register of reals
+  integer, parameter :: lanes = 8        !! a 512-bit register of reals: a block or half of it
   integer, parameter :: word_bits = 64   !! bonds in one word of bits
 
   !> One grid: its box of slots and its table of offsets.
   type :: offsets_type
     integer :: n = 0                           !! offsets
+    integer :: alignment = lanes               !! rows are a multiple of this long [slots]
     integer :: reach_cells = 0                 !! farthest offset along an axis
     integer :: stride(3) = 0                   !! from one cell to the next along x, y, z [slots]
     integer(i8) :: first = 0_i8                !! first slot of the box
@@ -103,7 +104,8 @@ contains
   !> back.
   pure integer(i8) function first_cell(grid)
     type(offsets_type), intent(in) :: grid
-    first_cell = grid%first + whole_blocks(int(grid%reach_cells*sum(int(grid%stride, i8))))
+    first_cell = grid%first + whole_blocks(int(grid%reach_cells &
+      & *sum(int(grid%stride, i8))), grid%alignment)
   end function first_cell
 
   !> Whether loops in `dim` dimensions take forward offsets alone and add to both ends of a bond.
@@ -112,10 +114,10 @@ contains
     both_ends = dim > 2
   end function both_ends
 
-  !> The next multiple of `lanes`.
-  pure integer function whole_blocks(slots)
-    integer, intent(in) :: slots
-    whole_blocks = (slots + lanes - 1)/lanes*lanes
+  !> The next multiple of the length of a block.
+  pure integer function whole_blocks(slots, block_length)
+    integer, intent(in) :: slots, block_length
+    whole_blocks = (slots + block_length - 1)/block_length*block_length
   end function whole_blocks
 
 end module pd_family_offsets

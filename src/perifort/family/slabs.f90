@@ -7,7 +7,7 @@
 !> threads.
 module pd_family_slabs
   use pd_base_kinds, only: i8
-  use pd_family_offsets, only: offsets_type, first_cell, both_ends, lanes
+  use pd_family_offsets, only: offsets_type, first_cell, both_ends
   implicit none (type, external)
   private
   public :: slabs_type, find_slabs
@@ -24,11 +24,11 @@ module pd_family_slabs
 
 contains
 
-  !> Cut the blocks of all grids into slabs, and sort `block`, the first slot of each, that way. No
-  !> bond joins two grids.
-  pure subroutine find_slabs(grids, dim, block, slabs)
+  !> Cut the blocks of all grids into slabs, and sort `block`, the first slot of each, that way. All
+  !> blocks are `block_length` slots long. No bond joins two grids.
+  pure subroutine find_slabs(grids, dim, block_length, block, slabs)
     type(offsets_type), intent(in) :: grids(:)
-    integer, intent(in) :: dim
+    integer, intent(in) :: dim, block_length
     integer(i8), intent(inout) :: block(:)
     type(slabs_type), intent(out) :: slabs
     integer, allocatable :: slab(:), of_grid(:), order(:), layer(:, :)
@@ -49,8 +49,8 @@ contains
         ! one layer more, since dead lanes at the end of a row reach into the row behind, if only to
         ! add nothing
         reach = grids(g)%reach_cells + 1
-        reach(1) = (grids(g)%reach_cells - 1)/lanes + 1
-        call find_layers(grids(g), dim, block(blocks), layer)
+        reach(1) = (grids(g)%reach_cells - 1)/block_length + 1
+        call find_layers(grids(g), dim, block_length, block(blocks), layer)
         call cut_grid(layer, reach, of_grid)
         slab(blocks) = of_grid + n
         ! each grid begins with the first colour
@@ -63,9 +63,9 @@ contains
   end subroutine find_slabs
 
   !> The layer of each block along each axis, from 0; along x, layers are as thick as blocks.
-  pure subroutine find_layers(grid, dim, block, layer)
+  pure subroutine find_layers(grid, dim, block_length, block, layer)
     type(offsets_type), intent(in) :: grid
-    integer, intent(in) :: dim
+    integer, intent(in) :: dim, block_length
     integer(i8), intent(in) :: block(:)
     integer, allocatable, intent(out) :: layer(:, :)
     integer(i8) :: rest
@@ -78,7 +78,7 @@ contains
         layer(b, c) = int(rest/grid%stride(c))
         rest = modulo(rest, int(grid%stride(c), i8))
       end do
-      layer(b, 1) = layer(b, 1)/lanes
+      layer(b, 1) = layer(b, 1)/block_length
     end do
   end subroutine find_layers
 

@@ -4,7 +4,7 @@ module pd_force_bound
   use pd_base_kinds, only: wp, i8
   use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, lanes
   use pd_force_model, only: model_type
-  use pd_force_weights, only: allocate_weights, block_weights
+  use pd_force_weights, only: allocate_weights, block_weights, half_of
   implicit none (type, external)
   private
   public :: lattice_bound, lattice_printed_bound
@@ -16,29 +16,51 @@ contains
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(inout), contiguous :: bound(:)
-    type(weights_type) :: scratch
+    type(weights_type) :: scratch, half
     real(wp), allocatable :: inverse(:)
     integer :: b, pass
 
     allocate (inverse(family%n_slots), source=0.0_wp)
     bound = 0.0_wp
-    !$omp parallel default(none) shared(family, model, bound, inverse) private(scratch, b, pass)
+    !$omp parallel default(none) shared(family, model, bound, inverse) &
+    !$omp private(scratch, half, b, pass)
     call allocate_weights(family, model, scratch)
     do pass = merge(1, 2, model%dilatation), 2
       !$omp do schedule(static)
       do b = 1, size(family%block)
         if (family%weights(b) > 0) then
-          call add(model, pass, family%block(b), family%table(family%weights(b)), inverse, bound)
+          call add_block(family, model, pass, b, family%table(family%weights(b)), half, &
+            & inverse, bound)
         else
           call block_weights(family, model, family%block(b), scratch)
-          call add(model, pass, family%block(b), scratch, inverse, bound)
+          call add_block(family, model, pass, b, scratch, half, inverse, bound)
         end if
       end do
     end do
     !$omp end parallel
   end subroutine lattice_bound
 
-  !> Pass 1: m_k I_k of a block into `inverse`; pass 2: its M_k.
+  !> One block of the `pass`; `half` is room for half of it, if it is long.
+  pure subroutine add_block(family, model, pass, b, weights, half, inverse, bound)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: pass, b
+    type(weights_type), intent(in) :: weights
+    type(weights_type), intent(inout) :: half
+    real(wp), intent(inout), contiguous :: inverse(:), bound(:)
+    integer :: l
+
+    if (.not. family%mixed) then
+      call add(model, pass, family%block(b), weights, inverse, bound)
+      return
+    end if
+    do l = 0, family%block_length - lanes, lanes
+      call half_of(family, weights, l, half)
+      call add(model, pass, family%block(b) + l, half, inverse, bound)
+    end do
+  end subroutine add_block
+
+  !> Pass 1: m_k I_k of `lanes` slots into `inverse`; pass 2: their M_k.
   pure subroutine add(model, pass, first, weights, inverse, bound)
     type(model_type), intent(in) :: model
     integer, intent(in) :: pass
@@ -80,41 +102,53 @@ contains
     type(model_type), intent(in) :: model
     real(wp), intent(inout), contiguous :: printed(:)
     real(wp), allocatable :: inverse(:)
-    real(wp) :: sums(lanes), own(lanes), weight, there
-    integer(i8) :: first, j
-    integer :: b, o, l, pass
+    integer :: b, l, pass
 
     allocate (inverse(family%n_slots), source=0.0_wp)
     printed = 0.0_wp
-    !$omp parallel default(none) shared(family, model, printed, inverse) &
-    !$omp private(sums, own, weight, there, first, j, b, o, l, pass)
+    !$omp parallel default(none) shared(family, model, printed, inverse) private(b, l, pass)
     do pass = 1, 2
       !$omp do schedule(static)
       do b = 1, size(family%block)
-        first = family%block(b)
-        do l = 1, lanes
-          associate (m => model%materials(model%material(first + l - 1)))
-            own(l) = 2*m%a*m%t**2
-          end associate
+        do l = 0, family%block_length - lanes, lanes
+          call add_printed(family, model, pass, family%block(b) + l, inverse, printed)
         end do
-        sums = 0.0_wp
-        associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
-          do o = 1, grid%n
-            weight = grid%fraction(o)*grid%cell_volume/grid%length(o)
-            j = first + grid%shift(o)
-            do l = 0, lanes - 1
-              there = weight*real(alive(first + l)*alive(j + l), wp)
-              if (pass == 2) there = there*(own(l + 1)*(inverse(first + l) + inverse(j + l)) &
-                & + 2*model%materials(model%material(first + l))%q)
-              sums(l + 1) = sums(l + 1) + there
-            end do
-          end do
-        end associate
-        if (pass == 1) inverse(first:first + lanes - 1) = sums
-        if (pass == 2) printed(first:first + lanes - 1) = sums
       end do
     end do
     !$omp end parallel
   end subroutine lattice_printed_bound
+
+  !> Pass 1: the sum I of `lanes` slots into `inverse`; pass 2: their share of 7.25.
+  pure subroutine add_printed(family, model, pass, first, inverse, printed)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: pass
+    integer(i8), intent(in) :: first
+    real(wp), intent(inout), contiguous :: inverse(:), printed(:)
+    real(wp) :: sums(lanes), own(lanes), weight, there
+    integer(i8) :: j
+    integer :: o, l
+
+    do l = 1, lanes
+      associate (m => model%materials(model%material(first + l - 1)))
+        own(l) = 2*m%a*m%t**2
+      end associate
+    end do
+    sums = 0.0_wp
+    associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
+      do o = 1, grid%n
+        weight = grid%fraction(o)*grid%cell_volume/grid%length(o)
+        j = first + grid%shift(o)
+        do l = 0, lanes - 1
+          there = weight*real(alive(first + l)*alive(j + l), wp)
+          if (pass == 2) there = there*(own(l + 1)*(inverse(first + l) + inverse(j + l)) &
+            & + 2*model%materials(model%material(first + l))%q)
+          sums(l + 1) = sums(l + 1) + there
+        end do
+      end do
+    end associate
+    if (pass == 1) inverse(first:first + lanes - 1) = sums
+    if (pass == 2) printed(first:first + lanes - 1) = sums
+  end subroutine add_printed
 
 end module pd_force_bound

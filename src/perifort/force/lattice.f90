@@ -3,37 +3,35 @@
 !> offsets. Broken bonds, large strains and terms that few scenes have cost only the blocks that
 !> have them.
 !>
-!> With e = (2 xi.eta + eta.eta)/|xi|^2, the deformed length is |xi| sqrt(1 + e), the stretch
-!> s = sqrt(1 + e) - 1 and |xi|/|xi+eta| = r = 1/sqrt(1 + e). The force needs s r = 1 - r, which for
-!> |e| <= 0.02 is e h(e) with a polynomial h (relative error 3e-16): no root, no division, and no
-!> cancellation. Bonds that are strained further are left to the general formulas, each by its own
-!> strain, so that no bond is added twice or undone.
+!> Bonds that are strained beyond what the fast formulas serve (`pd_force_fast`) are left to the
+!> general formulas, each by its own strain, so that no bond is added twice or undone.
 !>
 !> In 3D each bond is computed once, from the end whose slot comes first, and added to both ends. In
 !> 2D and 1D that costs more than it saves: what was just added to a row cannot be loaded again at
 !> once, and there are few other rows to turn to.
+!>
+!> In mixed precision blocks are twice as long, and the fast loops compute a block's bonds in single
+!> precision; what they leave is computed in double, one half of a block after the other.
 module pd_force_lattice
-  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_kinds, only: wp, sp, i1, i8
   use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends, lanes, &
     & word_bits
+  use pd_force_fast, only: fast_limit, fast_dilatation_1, fast_dilatation_2, fast_dilatation_3, &
+    & fast_force_1, fast_force_2, fast_force_3, mixed_dilatation_2, mixed_dilatation_3, &
+    & mixed_force_2, mixed_force_3
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_model, only: model_type
-  use pd_force_weights, only: block_weights, allocate_weights
+  use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
+  use pd_force_weights, only: weights_now, half_of
   implicit none (type, external)
   private
   public :: lattice_dilatation, lattice_force, lattice_energy
 
-  !> Limit and coefficients of h: (1 - 1/sqrt(1 + e))/e = 1/2 - 3/8 e + e^2 (Chebyshev interpolation
-  !> of the rest).
-  real(wp), parameter :: small_strain = 0.02_wp
-  real(wp), parameter :: h0 = 0.5_wp, h1 = -0.375_wp, h2 = 0.31250000000037114_wp, &
-    & h3 = -0.27343750000352559_wp, h4 = 0.24609373329889834_wp, h5 = -0.22558592163388049_wp, &
-    & h6 = 0.20958398402647260_wp, h7 = -0.19648637700069084_wp
-
   !> Room of one thread.
   type :: scratch_type
-    type(weights_type) :: weights           !! of a block that shares none
-    real(wp), allocatable :: left(:, :)     !! weights of bonds that the fast loop left out
+    real(wp), allocatable :: left(:, :)         !! weights of bonds that the fast loop left out
+    real(sp), allocatable :: single_left(:, :)  !! those of the loops in mixed precision
+    type(weights_type) :: half                  !! half of a block's weights, in double precision
   end type scratch_type
 
 contains
@@ -47,15 +45,18 @@ contains
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     type(scratch_type) :: scratch
+    type(weights_type) :: own
     real(wp) :: limit
     logical :: both
     integer :: b, s, k, colour
 
     both = both_ends(family%dim)
-    limit = fast_limit(model)
+    limit = fast_limit(model, family%mixed)
     !$omp parallel default(none) shared(family, model, u, p, strained, both, limit) &
-    !$omp private(scratch, b, s, k, colour)
-    allocate (scratch%left(lanes, family%most_bonds))
+    !$omp private(scratch, own, b, s, k, colour)
+    call allocate_scratch(family, scratch)
+    if (family%mixed) call split_displacements(family, u)
+    if (family%mixed .and. both) call clear_sums(family, 1)
     if (both) then
       !$omp do simd schedule(static)
       do k = 1, size(p)
@@ -69,15 +70,15 @@ contains
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
           if (shared_weights(family, b, both)) then
             call dilatation_of_block(family, model, both, limit, b, &
-              & family%table(family%weights(b)), scratch%left, u, p, strained)
+              & family%table(family%weights(b)), scratch, u, p, strained)
           else
-            call weights_now(family, model, b, scratch%weights)
-            call dilatation_of_block(family, model, both, limit, b, scratch%weights, scratch%left, &
-              & u, p, strained)
+            call weights_now(family, model, b, own)
+            call dilatation_of_block(family, model, both, limit, b, own, scratch, u, p, strained)
           end if
         end do
       end do
     end do
+    if (family%mixed .and. both) call add_sums(family, 1, family%singles%volume, p)
     if (both) then
       !$omp do schedule(static)
       do k = 1, size(p), lanes
@@ -97,15 +98,19 @@ contains
     real(wp), intent(inout), contiguous :: force(:, :)
     integer(i1), intent(inout), contiguous :: strained(:)
     type(scratch_type) :: scratch
+    type(weights_type) :: own
     real(wp) :: limit
     logical :: both
     integer :: b, c, s, k, colour
 
     both = both_ends(family%dim)
-    limit = fast_limit(model)
+    limit = fast_limit(model, family%mixed)
     !$omp parallel default(none) shared(family, model, u, p, force, strained, both, limit) &
-    !$omp private(scratch, b, c, s, k, colour)
-    allocate (scratch%left(lanes, family%most_bonds))
+    !$omp private(scratch, own, b, c, s, k, colour)
+    call allocate_scratch(family, scratch)
+    if (family%mixed .and. .not. model%dilatation) call split_displacements(family, u)
+    if (family%mixed .and. model%dilatation) call round_dilatation(family, p)
+    if (family%mixed .and. both) call clear_sums(family, size(force, 2))
     if (both) then
       do c = 1, size(force, 2)
         !$omp do simd schedule(static)
@@ -122,15 +127,19 @@ contains
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
           if (shared_weights(family, b, both)) then
             call force_of_block(family, model, both, limit, b, family%table(family%weights(b)), &
-              & scratch%left, u, p, force, strained)
+              & scratch, u, p, force, strained)
           else
-            call weights_now(family, model, b, scratch%weights)
-            call force_of_block(family, model, both, limit, b, scratch%weights, scratch%left, u, &
-              & p, force, strained)
+            call weights_now(family, model, b, own)
+            call force_of_block(family, model, both, limit, b, own, scratch, u, p, force, strained)
           end if
         end do
       end do
     end do
+    if (family%mixed .and. both) then
+      do c = 1, size(force, 2)
+        call add_sums(family, c, 1.0_wp, force(:, c))
+      end do
+    end if
     !$omp end parallel
   end subroutine lattice_force
 
@@ -140,22 +149,31 @@ contains
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(out), contiguous :: energy(:)
-    type(weights_type) :: scratch
+    type(weights_type) :: own, half
     integer :: b
 
     energy = 0.0_wp
-    !$omp parallel default(none) shared(family, model, u, energy) private(scratch, b)
+    !$omp parallel default(none) shared(family, model, u, energy) private(own, half, b)
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, b, .false.)) then
-        call general_energy(model, family%table(family%weights(b)), family%block(b), u, energy)
+        call energy_of_block(family, model, b, family%table(family%weights(b)), half, u, energy)
       else
-        call weights_now(family, model, b, scratch)
-        call general_energy(model, scratch, family%block(b), u, energy)
+        call weights_now(family, model, b, own)
+        call energy_of_block(family, model, b, own, half, u, energy)
       end if
     end do
     !$omp end parallel
   end subroutine lattice_energy
+
+  !> Room of one thread for its blocks.
+  pure subroutine allocate_scratch(family, scratch)
+    type(lattice_family_type), intent(in) :: family
+    type(scratch_type), intent(out) :: scratch
+
+    allocate (scratch%left(lanes, family%most_bonds))
+    if (family%mixed) allocate (scratch%single_left(family%block_length, family%most_bonds))
+  end subroutine allocate_scratch
 
   !> p from theta of the lanes at `first`.
   pure subroutine scale(model, first, p)
@@ -188,17 +206,6 @@ contains
     end do
   end subroutine clear
 
-  !> Bonds with |e| below this are served by the fast formulas; 0: none.
-  pure real(wp) function fast_limit(model) result(limit)
-    type(model_type), intent(in) :: model
-
-    limit = small_strain
-    ! with the tensile limit s, |e| reaches (1 + s)^2 - 1; in compression 1 - (1 - s)^2 is less
-    if (model%breaking) limit = min(small_strain, &
-      & model%least_critical*(2 - model%least_critical)*(1 - 1.0e-9_wp))
-    if (model%thermal .or. (model%dilatation .and. .not. model%projected)) limit = 0.0_wp
-  end function fast_limit
-
   !> Whether the block can take the weights it shares with others: it has some, and no broken bond
   !> (with `forward` among those alone that lie forward).
   pure logical function shared_weights(family, b, forward)
@@ -214,7 +221,7 @@ contains
     any_broken = 0_i8
     associate (grid => family%grids(grid_at(family, first)))
       do w = 1, size(grid%forward_bits)
-        bits = iany(family%broken(first:first + lanes - 1, w))
+        bits = iany(family%broken(first:first + family%block_length - 1, w))
         if (forward) bits = iand(bits, grid%forward_bits(w))
         any_broken = ior(any_broken, bits)
       end do
@@ -222,101 +229,108 @@ contains
     shared_weights = any_broken == 0_i8
   end function shared_weights
 
-  !> The weights of a block as its bonds are now, those of broken bonds 0.
-  pure subroutine weights_now(family, model, b, weights)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: b
-    type(weights_type), intent(inout) :: weights
-    integer :: m, o, w, l, n
-    integer(i8) :: first, bit
-    real(wp) :: intact(lanes)
-
-    first = family%block(b)
-    if (.not. allocated(weights%offset)) call allocate_weights(family, model, weights)
-    if (family%weights(b) > 0) then
-      associate (shared => family%table(family%weights(b)))
-        n = shared%n
-        weights%n = n
-        weights%n_forward = shared%n_forward
-        weights%offset(:n) = shared%offset
-        weights%shift(:n) = shared%shift
-        weights%geometry(:, :n) = shared%geometry
-        weights%stretch(:, :n) = shared%stretch
-        if (model%dilatation) weights%dilatation(:, :n) = shared%dilatation
-      end associate
-    else
-      call block_weights(family, model, first, weights)
-    end if
-    if (.not. allocated(family%broken)) return
-    do m = 1, weights%n
-      o = weights%offset(m)
-      w = (o - 1)/word_bits + 1
-      do l = 1, lanes
-        bit = iand(ishft(family%broken(first + l - 1, w), -mod(o - 1, word_bits)), 1_i8)
-        intact(l) = real(1_i8 - bit, wp)
-      end do
-      weights%stretch(:, m) = weights%stretch(:, m)*intact
-      if (model%dilatation) weights%dilatation(:, m) = weights%dilatation(:, m)*intact
-    end do
-  end subroutine weights_now
-
   !> p of one block; where loops add to both ends of a bond, theta of its bonds added to `p`.
-  subroutine dilatation_of_block(family, model, both, limit, b, weights, left, u, p, strained)
+  subroutine dilatation_of_block(family, model, both, limit, b, weights, scratch, u, p, strained)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     logical, intent(in) :: both
     real(wp), intent(in) :: limit
     integer, intent(in) :: b
     type(weights_type), intent(in) :: weights
-    real(wp), intent(inout), contiguous :: left(:, :), p(:)
+    type(scratch_type), intent(inout) :: scratch
     real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
-    integer(i8) :: first
-    integer :: n
+    integer(i8) :: first, last
+    integer :: n, l
     logical :: missed
 
     first = family%block(b)
+    last = first + family%block_length - 1
     n = weights%n
     if (both) n = weights%n_forward
     missed = limit <= 0.0_wp
-    if (.not. missed) then
+    if (family%mixed) then
+      call mixed_dilatation(family, n, limit, weights, first, p, scratch%single_left, missed)
+    else if (.not. missed) then
       ! constant dimensions, so that each has code of its own
       select case (family%dim)
       case (3)
         call fast_dilatation_3(n, weights%dilatation, weights%shift, weights%geometry, first, &
-          & family%n_slots, u, limit, p, left, missed)
+          & family%n_slots, u, u, limit, p, scratch%left, missed)
       case (2)
         call fast_dilatation_2(n, weights%dilatation, weights%shift, weights%geometry, first, &
-          & family%n_slots, u, limit, p, left, missed)
+          & family%n_slots, u, u, limit, p, scratch%left, missed)
       case default
         call fast_dilatation_1(n, weights%dilatation, weights%shift, weights%geometry, first, &
-          & family%n_slots, u, limit, p, left, missed)
+          & family%n_slots, u, u, limit, p, scratch%left, missed)
       end select
     end if
-    if (missed .and. both .and. limit > 0.0_wp) then
-      call general_dilatation(model, both, n, weights, left, first, u, p, strained)
-    else if (missed) then
-      if (.not. both) p(first:first + lanes - 1) = 0.0_wp
-      call general_dilatation(model, both, n, weights, weights%dilatation, first, u, p, strained)
-    end if
     family%large(b) = merge(1_i1, 0_i1, missed)
-    if (.not. both) call scale(model, first, p)
+    if (missed) then
+      if (.not. both) p(first:last) = 0.0_wp
+      if (family%mixed) then
+        do l = 0, family%block_length - lanes, lanes
+          call half_of(family, weights, l, scratch%half)
+          if (both) scratch%half%dilatation(:, :n) = family%singles%volume &
+            & *scratch%single_left(l + 1:l + lanes, :n)
+          call general_dilatation(model, both, n, scratch%half, scratch%half%dilatation, &
+            & first + l, u, p, strained)
+        end do
+      else if (both .and. limit > 0.0_wp) then
+        call general_dilatation(model, both, n, weights, scratch%left, first, u, p, strained)
+      else
+        call general_dilatation(model, both, n, weights, weights%dilatation, first, u, p, strained)
+      end if
+    end if
+    if (both) return
+    do l = 0, family%block_length - lanes, lanes
+      call scale(model, first + l, p)
+    end do
   end subroutine dilatation_of_block
 
+  !> theta of one block by the loops in mixed precision: in 3D added to the sums, in 2D into `theta`
+  !> (n_slots).
+  subroutine mixed_dilatation(family, n, limit, weights, first, theta, left, missed)
+    type(lattice_family_type), intent(inout) :: family
+    integer, intent(in) :: n
+    real(wp), intent(in) :: limit
+    type(weights_type), intent(in) :: weights
+    integer(i8), intent(in) :: first
+    real(wp), intent(inout), contiguous :: theta(:)
+    real(sp), intent(inout), contiguous :: left(:, :)
+    logical, intent(out) :: missed
+    integer(i8) :: last
+
+    associate (singles => family%singles)
+      if (both_ends(family%dim)) then
+        call mixed_dilatation_3(n, weights%single_dilatation, weights%shift, &
+          & weights%single_geometry, first, family%n_slots, singles%high, singles%low, &
+          & real(limit, sp), singles%sums(:, 1), left, missed)
+      else
+        call mixed_dilatation_2(n, weights%single_dilatation, weights%shift, &
+          & weights%single_geometry, first, family%n_slots, singles%high, singles%low, &
+          & real(limit, sp), theta, left, missed)
+        last = first + family%block_length - 1
+        theta(first:last) = singles%volume*theta(first:last)
+      end if
+    end associate
+  end subroutine mixed_dilatation
+
   !> Forces of one block's bonds, added to `force`.
-  subroutine force_of_block(family, model, both, limit, b, weights, left, u, p, force, strained)
-    type(lattice_family_type), intent(in) :: family
+  subroutine force_of_block(family, model, both, limit, b, weights, scratch, u, p, force, strained)
+    type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     logical, intent(in) :: both
     real(wp), intent(in) :: limit
     integer, intent(in) :: b
     type(weights_type), intent(in) :: weights
-    real(wp), intent(inout), contiguous :: left(:, :), force(:, :)
+    type(scratch_type), intent(inout) :: scratch
+    real(wp), intent(inout), contiguous :: force(:, :)
     real(wp), intent(in), contiguous :: u(:, :), p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first
-    integer :: n
+    integer :: n, l
     logical :: fast, missed
 
     first = family%block(b)
@@ -325,70 +339,83 @@ contains
     fast = limit > 0.0_wp
     if (model%dilatation) fast = family%large(b) == 0_i1
     missed = .not. fast
-    if (fast) then
+    if (fast .and. family%mixed) then
+      call mixed_force(family, model%dilatation, n, limit, weights, first, force, &
+        & scratch%single_left, missed)
+    else if (fast) then
       select case (family%dim)
       case (3)
         call fast_force_3(model%dilatation, n, weights%dilatation, weights%stretch, weights%shift, &
-          & weights%geometry, first, family%n_slots, u, p, limit, force, left, missed)
+          & weights%geometry, first, family%n_slots, u, u, p, limit, force, scratch%left, missed)
       case (2)
         call fast_force_2(model%dilatation, n, weights%dilatation, weights%stretch, weights%shift, &
-          & weights%geometry, first, family%n_slots, u, p, limit, force, left, missed)
+          & weights%geometry, first, family%n_slots, u, u, p, limit, force, scratch%left, missed)
       case default
         call fast_force_1(model%dilatation, n, weights%dilatation, weights%stretch, weights%shift, &
-          & weights%geometry, first, family%n_slots, u, p, limit, force, left, missed)
+          & weights%geometry, first, family%n_slots, u, u, p, limit, force, scratch%left, missed)
       end select
     end if
-    if (missed .and. both .and. fast) then
-      call general_force(model, both, n, weights, left, first, u, p, force, strained)
-    else if (missed) then
-      if (.not. both) force(first:first + lanes - 1, :) = 0.0_wp
+    if (.not. missed) return
+    if (.not. both) force(first:first + family%block_length - 1, :) = 0.0_wp
+    if (family%mixed) then
+      do l = 0, family%block_length - lanes, lanes
+        call half_of(family, weights, l, scratch%half)
+        if (both .and. fast) scratch%half%stretch(:, :n) = scratch%single_left(l + 1:l + lanes, :n)
+        call general_force(model, both, n, scratch%half, scratch%half%stretch, first + l, u, p, &
+          & force, strained)
+      end do
+    else if (both .and. fast) then
+      call general_force(model, both, n, weights, scratch%left, first, u, p, force, strained)
+    else
       call general_force(model, both, n, weights, weights%stretch, first, u, p, force, strained)
     end if
   end subroutine force_of_block
 
-  ! One text for all dimensions, and code of its own for each: the dimension must be a constant
-  ! where the loops are compiled.
+  !> Forces of one block by the loops in mixed precision: in 3D added to the sums, in 2D into
+  !> `force` (n_slots, dim).
+  subroutine mixed_force(family, dilatation, n, limit, weights, first, force, left, missed)
+    type(lattice_family_type), intent(inout) :: family
+    logical, intent(in) :: dilatation
+    integer, intent(in) :: n
+    real(wp), intent(in) :: limit
+    type(weights_type), intent(in) :: weights
+    integer(i8), intent(in) :: first
+    real(wp), intent(inout), contiguous :: force(:, :)
+    real(sp), intent(inout), contiguous :: left(:, :)
+    logical, intent(out) :: missed
 
-  subroutine fast_dilatation_1(n, weight, shift, geometry, first, n_slots, u, limit, theta, left, &
-    & missed)
-    integer, parameter :: dim = 1
-    logical, parameter :: both = .false.
-    include 'fast_dilatation.inc'
-  end subroutine fast_dilatation_1
+    associate (singles => family%singles)
+      if (both_ends(family%dim)) then
+        call mixed_force_3(dilatation, n, weights%single_dilatation, weights%single_stretch, &
+          & weights%shift, weights%single_geometry, first, family%n_slots, singles%high, &
+          & singles%low, singles%p, real(limit, sp), singles%sums, left, missed)
+      else
+        call mixed_force_2(dilatation, n, weights%single_dilatation, weights%single_stretch, &
+          & weights%shift, weights%single_geometry, first, family%n_slots, singles%high, &
+          & singles%low, singles%p, real(limit, sp), force, left, missed)
+      end if
+    end associate
+  end subroutine mixed_force
 
-  subroutine fast_dilatation_2(n, weight, shift, geometry, first, n_slots, u, limit, theta, left, &
-    & missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: both = .false.
-    include 'fast_dilatation.inc'
-  end subroutine fast_dilatation_2
+  !> Strain energy density of one block; `half` is room for half of it, if it is long.
+  subroutine energy_of_block(family, model, b, weights, half, u, energy)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: b
+    type(weights_type), intent(in) :: weights
+    type(weights_type), intent(inout) :: half
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    integer :: l
 
-  subroutine fast_dilatation_3(n, weight, shift, geometry, first, n_slots, u, limit, theta, left, &
-    & missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: both = .true.
-    include 'fast_dilatation.inc'
-  end subroutine fast_dilatation_3
-
-  subroutine fast_force_1(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, p, &
-    & limit, force, left, missed)
-    integer, parameter :: dim = 1
-    logical, parameter :: both = .false.
-    include 'fast_force.inc'
-  end subroutine fast_force_1
-
-  subroutine fast_force_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, p, &
-    & limit, force, left, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: both = .false.
-    include 'fast_force.inc'
-  end subroutine fast_force_2
-
-  subroutine fast_force_3(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, p, &
-    & limit, force, left, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: both = .true.
-    include 'fast_force.inc'
-  end subroutine fast_force_3
+    if (.not. family%mixed) then
+      call general_energy(model, weights, family%block(b), u, energy)
+      return
+    end if
+    do l = 0, family%block_length - lanes, lanes
+      call half_of(family, weights, l, half)
+      call general_energy(model, half, family%block(b) + l, u, energy)
+    end do
+  end subroutine energy_of_block
 
 end module pd_force_lattice

@@ -1,15 +1,17 @@
 !> Weights of lattice blocks: volume correction, surface factors and stiffness of every bond of
-!> `lanes` neighbouring slots. Blocks whose surroundings are alike share them, so that surface
+!> neighbouring slots. Blocks whose surroundings are alike share them, so that surface
 !> correction costs nothing in a step and next to no memory.
 module pd_force_weights
-  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, lanes
+  use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, &
+    & both_ends, lanes, word_bits
   use pd_family_surface, only: bond_factor
+  use pd_force_fast, only: fast_limit
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: build_weights, block_weights, allocate_weights
+  public :: build_weights, block_weights, allocate_weights, weights_now, half_of
 
   integer(i8), parameter :: free_bytes = 64_i8*1024_i8**2  !! tables may always take this much,
   integer(i8), parameter :: bytes_per_slot = 100_i8        !! and this much per slot
@@ -28,19 +30,22 @@ contains
     integer :: b, g, i, number
     logical :: is_new
 
+    if (fast_limit(model, family%mixed) <= 0.0_wp) call use_double(family)
+    if (family%mixed) call allocate_singles(family, model)
     call column_keys(family, column)
     allocate (table(256))
     bytes = 0_i8
     do b = 1, size(family%block)
       g = grid_at(family, family%block(b))
       key = int(g, i8)
-      do i = -family%grids(g)%reach_cells, lanes - 1 + family%grids(g)%reach_cells
+      do i = -family%grids(g)%reach_cells, family%block_length - 1 &
+        & + family%grids(g)%reach_cells
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(key, number, is_new)
       family%weights(b) = int(number, i4)
       if (.not. is_new) cycle
-      bytes = bytes + family%grids(g)%n*(16_i8*lanes + 44)
+      bytes = bytes + family%grids(g)%n*(16_i8*lanes + merge(60, 44, family%mixed))
       if (bytes > free_bytes + bytes_per_slot*family%n_slots) exit
       if (number > size(table)) then
         allocate (longer(2*size(table)))
@@ -91,6 +96,21 @@ contains
     end do
   end subroutine column_keys
 
+  !> What the loops in mixed precision work on; the first pass fills it.
+  pure subroutine allocate_singles(family, model)
+    type(lattice_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    integer :: n
+
+    n = family%n_slots
+    associate (singles => family%singles)
+      singles%volume = 2.0_wp**exponent(maxval(family%grids%cell_volume))
+      allocate (singles%high(n, family%dim), singles%low(n, family%dim))
+      allocate (singles%p(merge(n, 0, model%dilatation)))
+      allocate (singles%sums(merge(n, 0, both_ends(family%dim)), family%dim))
+    end associate
+  end subroutine allocate_singles
+
   !> Room for the weights of any block.
   pure subroutine allocate_weights(family, model, weights)
     type(lattice_family_type), intent(in) :: family
@@ -100,7 +120,11 @@ contains
 
     n = family%most_bonds
     allocate (weights%offset(n), weights%shift(n), weights%geometry(4, n))
-    allocate (weights%stretch(lanes, n), weights%dilatation(lanes, merge(n, 0, model%dilatation)))
+    allocate (weights%stretch(family%block_length, n))
+    allocate (weights%dilatation(family%block_length, merge(n, 0, model%dilatation)))
+    if (.not. family%mixed) return
+    allocate (weights%single_geometry(4, n), weights%single_stretch(family%block_length, n))
+    allocate (weights%single_dilatation(family%block_length, merge(n, 0, model%dilatation)))
   end subroutine allocate_weights
 
   !> Weights of the block that begins at slot `first`, as if no bond were broken, in the grid's
@@ -112,23 +136,24 @@ contains
     type(weights_type), intent(inout) :: weights
     real(wp) :: weight, n(family%dim)
     integer(i8) :: k, j
-    integer :: i, o, l, m
+    integer :: i, o, l, m, length
 
+    length = family%block_length
     m = 0
     weights%n_forward = 0
     associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
       do i = 1, grid%n
         o = grid%order(i)
         j = first + grid%shift(o)
-        if (.not. any(alive(first:first + lanes - 1) == 1_i1 &
-          & .and. alive(j:j + lanes - 1) == 1_i1)) cycle
+        if (.not. any(alive(first:first + length - 1) == 1_i1 &
+          & .and. alive(j:j + length - 1) == 1_i1)) cycle
         m = m + 1
         if (grid%shift(o) > 0_i8) weights%n_forward = m
         weights%offset(m) = int(o, i4)
         weights%shift(m) = grid%shift(o)
         weights%geometry(:, m) = grid%geometry(:, o)
         n = grid%xi(o, :)/grid%length(o)
-        do l = 1, lanes
+        do l = 1, length
           k = first + l - 1
           j = k + grid%shift(o)
           weights%stretch(l, m) = 0.0_wp
@@ -146,9 +171,14 @@ contains
       end do
     end associate
     weights%n = m
+    if (.not. family%mixed) return
+    weights%single_geometry(:, :m) = real(weights%geometry(:, :m), sp)
+    weights%single_stretch(:, :m) = real(weights%stretch(:, :m), sp)
+    if (model%dilatation) weights%single_dilatation(:, :m) = &
+      & real(weights%dilatation(:, :m)/family%singles%volume, sp)
   end subroutine block_weights
 
-  !> Give back the room of offsets that were left out.
+  !> Give back the room of offsets that were left out, and of the precision that is not needed.
   pure subroutine trim_weights(weights)
     type(weights_type), intent(inout) :: weights
     integer :: n
@@ -157,8 +187,90 @@ contains
     weights%offset = weights%offset(:n)
     weights%shift = weights%shift(:n)
     weights%geometry = weights%geometry(:, :n)
+    if (allocated(weights%single_stretch)) then
+      weights%single_geometry = weights%single_geometry(:, :n)
+      weights%single_stretch = weights%single_stretch(:, :n)
+      if (size(weights%single_dilatation) > 0) &
+        & weights%single_dilatation = weights%single_dilatation(:, :n)
+      deallocate (weights%stretch, weights%dilatation)
+      return
+    end if
     weights%stretch = weights%stretch(:, :n)
     if (size(weights%dilatation) > 0) weights%dilatation = weights%dilatation(:, :n)
   end subroutine trim_weights
+
+  !> The weights of a block as its bonds are now, those of broken bonds 0.
+  pure subroutine weights_now(family, model, b, weights)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: b
+    type(weights_type), intent(inout) :: weights
+    integer :: m, o, w, l, n
+    integer(i8) :: first, bit
+    real(wp) :: intact(family%block_length)
+
+    first = family%block(b)
+    if (.not. allocated(weights%offset)) call allocate_weights(family, model, weights)
+    if (family%weights(b) > 0) then
+      associate (shared => family%table(family%weights(b)))
+        n = shared%n
+        weights%n = n
+        weights%n_forward = shared%n_forward
+        weights%offset(:n) = shared%offset
+        weights%shift(:n) = shared%shift
+        weights%geometry(:, :n) = shared%geometry
+        if (family%mixed) then
+          weights%single_geometry(:, :n) = shared%single_geometry
+          weights%single_stretch(:, :n) = shared%single_stretch
+          if (model%dilatation) weights%single_dilatation(:, :n) = shared%single_dilatation
+        else
+          weights%stretch(:, :n) = shared%stretch
+          if (model%dilatation) weights%dilatation(:, :n) = shared%dilatation
+        end if
+      end associate
+    else
+      call block_weights(family, model, first, weights)
+    end if
+    if (.not. allocated(family%broken)) return
+    do m = 1, weights%n
+      o = weights%offset(m)
+      w = (o - 1)/word_bits + 1
+      do l = 1, family%block_length
+        bit = iand(ishft(family%broken(first + l - 1, w), -mod(o - 1, word_bits)), 1_i8)
+        intact(l) = real(1_i8 - bit, wp)
+      end do
+      if (family%mixed) then
+        weights%single_stretch(:, m) = weights%single_stretch(:, m)*real(intact, sp)
+        if (model%dilatation) weights%single_dilatation(:, m) = &
+          & weights%single_dilatation(:, m)*real(intact, sp)
+      else
+        weights%stretch(:, m) = weights%stretch(:, m)*intact
+        if (model%dilatation) weights%dilatation(:, m) = weights%dilatation(:, m)*intact
+      end if
+    end do
+  end subroutine weights_now
+
+  !> The weights in double precision of `lanes` slots of a block, `skipped` slots behind its first,
+  !> from those in single precision.
+  pure subroutine half_of(family, weights, skipped, half)
+    type(lattice_family_type), intent(in) :: family
+    type(weights_type), intent(in) :: weights
+    integer, intent(in) :: skipped
+    type(weights_type), intent(inout) :: half
+    integer :: n
+
+    n = weights%n
+    if (.not. allocated(half%shift)) then
+      allocate (half%shift(family%most_bonds), half%geometry(4, family%most_bonds))
+      allocate (half%stretch(lanes, family%most_bonds), half%dilatation(lanes, family%most_bonds))
+    end if
+    half%n = n
+    half%n_forward = weights%n_forward
+    half%shift(:n) = weights%shift(:n)
+    half%geometry(:, :n) = weights%geometry(:, :n)
+    half%stretch(:, :n) = weights%single_stretch(skipped + 1:skipped + lanes, :n)
+    if (size(weights%single_dilatation) > 0) half%dilatation(:, :n) = &
+      & family%singles%volume*weights%single_dilatation(skipped + 1:skipped + lanes, :n)
+  end subroutine half_of
 
 end module pd_force_weights

@@ -5,6 +5,7 @@ module pd_output_summary
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: to_text, with_unit, newline
   use pd_scene_types, only: scene_type
+  use pd_family_lattice, only: lattice_family_type
   use pd_motion_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_recorder, only: recorder_type, probe_type
@@ -102,8 +103,33 @@ contains
         text = text//line('', 'no bond can break: no material has a critical stretch')
       end if
       text = text//line('', trim(merge('thermal strain   ', 'no thermal strain', model%thermal)))
+      text = text//line('precision', precision_of(scene, system))
     end associate
   end function kernels
+
+  !> The precision of the bonds, and why it is not the one that was asked for.
+  function precision_of(scene, system) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+
+    text = 'double'
+    select type (family => system%family)
+    type is (lattice_family_type)
+      if (family%mixed) text = 'mixed: bonds in single precision, state in double'
+    end select
+    if (text /= 'double' .or. scene%header%precision /= 'mixed') return
+    text = text//': mixed is not there for '
+    if (scene%header%dimension == 1) then
+      text = text//'1D'
+    else if (system%model%thermal) then
+      text = text//'thermal strain'
+    else if (system%model%dilatation .and. .not. system%model%projected) then
+      text = text//trim(scene%horizon%dilatation)//' dilatation'
+    else
+      text = text//'critical stretches this small'
+    end if
+  end function precision_of
 
   pure function printed(plan) result(text)
     type(plan_type), intent(in) :: plan

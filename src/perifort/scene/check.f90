@@ -128,6 +128,13 @@ contains
     else if (size(scene%bodies) == 0) then
       call rule_fault(error, 'body', 1, '', 'the scene has no group &body', &
         & 'expected at least one', source)
+    else if (scene%header%precision == 'mixed' .and. scene%time%method == 'relaxation') then
+      ! residual forces would be those of rounding at a tolerance of some 1e-5
+      call rule_fault(error, 'scene', 1, 'precision', "'mixed' is not for relaxation", &
+        & "expected 'double', or another &time method", source)
+    else if (scene%header%precision == 'mixed' .and. scene%horizon%family == 'list') then
+      call rule_fault(error, 'scene', 1, 'precision', "'mixed' needs lattice families", &
+        & "expected 'double', or another &horizon family", source)
     else if (given('horizon', 1, 'ratio', source) .and. is_set(scene%horizon%length)) then
       call rule_fault(error, 'horizon', 1, 'length', "'ratio' and 'length' are both given", &
         & 'give one of them', source)

@@ -171,6 +171,9 @@ contains
       & allowed=[character(6) :: 'stress', 'strain'])
     call keys%key('thickness', group%thickness, 'm', '2D: thickness h', above=0.0_wp)
     call keys%key('area', group%area, 'm2', '1D: cross section A', above=0.0_wp)
+    call keys%key('precision', group%precision, 'of the bonds: mixed computes them in single '// &
+      & 'precision, from a state in double precision (lattice families)', &
+      & allowed=[character(6) :: 'double', 'mixed'])
   end subroutine visit_scene_header
 
   !> `&body`

@@ -20,6 +20,7 @@ module pd_scene_types
     character(name_length) :: plane = 'stress'   !! 2D: 'stress' or 'strain'
     real(wp) :: thickness = 1.0_wp               !! 2D: h [m]
     real(wp) :: area = 1.0_wp                    !! 1D: cross section A [m2]
+    character(name_length) :: precision = 'double' !! of bonds: 'double' or 'mixed'
   end type header_type
 
   !> `&body`

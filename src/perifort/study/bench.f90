@@ -10,7 +10,7 @@ module pd_study_bench
   use pd_base_system, only: available_memory
   use pd_study_machine, only: machine_type, measure_machine
   use pd_study_options, only: bench_options_type, check_options, chosen, families, given, models, &
-    & switches
+    & precisions, switches
   use pd_study_report, only: csv_head, csv_row, kernel_label, table_head, table_row
   implicit none (type, external)
   private
@@ -96,7 +96,7 @@ contains
     type(kernel_type), allocatable, intent(out) :: kernels(:)
     integer, allocatable :: dimensions(:), points(:)
     type(kernel_type) :: one
-    integer :: d, p, m, f, b
+    integer :: d, p, m, f, b, r
 
     dimensions = [3, 2, 1]
     if (allocated(options%dimensions)) dimensions = options%dimensions
@@ -119,13 +119,28 @@ contains
               if (.not. chosen(options%breaking, trim(switches(b)))) cycle
               ! lists are slow, and looking for breaking bonds costs them little: only if asked for
               if (one%breaking .and. one%family == 'list' .and. .not. given(options%breaking)) cycle
-              kernels = [kernels, one]
+              do r = 1, 2
+                one%precision = precisions(r)
+                if (.not. measured(options, one)) cycle
+                kernels = [kernels, one]
+              end do
             end do
           end do
         end do
       end do
     end do
   end subroutine plan_kernels
+
+  !> Whether a kernel's precision is wanted, and there for its family and dimension.
+  pure logical function measured(options, kernel)
+    type(bench_options_type), intent(in) :: options
+    type(kernel_type), intent(in) :: kernel
+
+    measured = kernel%precision == 'double'
+    if (given(options%precision)) measured = chosen(options%precision, trim(kernel%precision))
+    if (kernel%precision == 'mixed') &
+      & measured = measured .and. kernel%family == 'lattice' .and. kernel%dimension > 1
+  end function measured
 
   !> Threads to measure with, ascending and each once; 1 is always there, since the others are
   !> compared with it.

@@ -27,6 +27,7 @@ module pd_study_kernels
     integer :: points = 80                         !! along an edge
     character(16) :: model = 'state_based'         !! 'bond_based'
     character(16) :: family = 'lattice'            !! 'list'
+    character(8) :: precision = 'double'           !! 'mixed'
     logical :: breaking = .false.                  !! bonds can break; none gets near it
     logical :: surface = .false.                   !! surface correction
     integer :: threads = 1
@@ -111,6 +112,7 @@ contains
     scene%header%dimension = kernel%dimension
     scene%header%thickness = spacing
     scene%header%area = spacing**2
+    scene%header%precision = kernel%precision
     allocate (scene%bodies(1), scene%materials(1))
     scene%bodies(1)%name = 'body'
     scene%bodies(1)%lower(:kernel%dimension) = 0.0_wp
@@ -244,22 +246,27 @@ contains
   !> Lattice, both loops: eta d, x and e 2(2d - 1), 2x + g e 3, polynomial 15. Dilatation: sum 4.
   !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. Where a bond is computed
   !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
-  !> directed bonds. List, both loops: geometry 12d + 15, weight 4. Dilatation: sum 4. Force:
-  !> magnitude 2, sums 3d, with a dilatation 5 more.
+  !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
+  !> loops: geometry 12d + 15, weight 4. Dilatation: sum 4. Force: magnitude 2, sums 3d, with a
+  !> dilatation 5 more.
   pure real(wp) function flops_of_bond(family, dilatation) result(flops)
     class(family_type), intent(in) :: family
     logical, intent(in) :: dilatation      !! there is a pass for it
-    integer :: d
+    integer :: d, geometry
 
     d = family%dim
     select type (family)
     type is (list_family_type)
       flops = (12*d + 15 + 4) + 2 + 3*d
       if (dilatation) flops = flops + 5 + (12*d + 15 + 4) + 4
-    class default
-      flops = (d + 2*(2*d - 1) + 3 + 15) + 1 + 4*d
-      if (dilatation) flops = flops + 8 + (d + 2*(2*d - 1) + 3 + 15) + 4
+    type is (lattice_family_type)
+      geometry = d + 2*(2*d - 1) + 3 + 15
+      if (family%mixed) geometry = geometry + 2*d - 4
+      flops = geometry + 1 + 4*d
+      if (dilatation) flops = flops + 8 + geometry + 4
       if (both_ends(d)) flops = (flops + merge(d + 1, d, dilatation))/2
+    class default
+      flops = 0.0_wp
     end select
   end function flops_of_bond
 
@@ -267,7 +274,8 @@ contains
   !> written once by every pass that needs it. Force pass: u, p read, force written; dilatation
   !> pass: u read, p written; motion: force, v, u read, v, u written. Where bonds can break: the
   !> bits read by each pass, the marks written and read. Where loops add to both ends of a bond, the
-  !> sums are set to zero and read, and p is made of theta in a loop of its own. Lists, by each
+  !> sums are set to zero and read, and p is made of theta in a loop of its own. In mixed precision
+  !> u is split and p rounded, and sums for both ends are set, added to and read. Lists, by each
   !> pass: number and flag of every bond, positions and volumes, spacings read, displacements
   !> written and read once more where each point's stand together.
   pure real(wp) function bytes_of_step(system) result(bytes)
@@ -288,6 +296,10 @@ contains
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
       if (both_ends(d)) bytes = bytes + points*8*(2*d + merge(3, 0, system%model%dilatation))
+      if (family%mixed) then
+        bytes = bytes + points*(16*d + merge(8, 0, system%model%dilatation))
+        if (both_ends(d)) bytes = bytes + points*16*(d + merge(1, 0, system%model%dilatation))
+      end if
     class default
       continue
     end select

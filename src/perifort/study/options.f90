@@ -5,11 +5,14 @@ module pd_study_options
   use pd_base_text, only: join, nearest_name, to_text
   implicit none (type, external)
   private
-  public :: bench_options_type, check_options, chosen, given, models, families, switches
+  public :: bench_options_type, check_options, chosen, given, models, families, switches, &
+    & precisions
 
   character(*), parameter :: models(2) = ['state_based', 'bond_based ']   !! of `model`
   character(*), parameter :: families(2) = ['lattice', 'list   ']         !! of `family`
   character(*), parameter :: switches(2) = ['off', 'on ']                 !! of `breaking`
+
+  character(*), parameter :: precisions(2) = ['double', 'mixed ']         !! of `precision`
 
   !> What to measure. Unallocated, or '' for words, means the default.
   type :: bench_options_type
@@ -19,6 +22,7 @@ module pd_study_options
     character(:), allocatable :: model       !! one of `models` or 'both', the default
     character(:), allocatable :: family      !! one of `families` or 'both', the default
     character(:), allocatable :: breaking    !! one of `switches` or 'both'; default: lists 'off'
+    character(:), allocatable :: precision   !! one of `precisions`, default 'double', or 'both'
     character(:), allocatable :: csv         !! file for the numbers, '' for none
     logical :: surface = .false.             !! with surface correction
     real(wp) :: seconds = 0.25_wp            !! each repeat takes at least so long [s]
@@ -44,10 +48,28 @@ contains
     if (allocated(error)) return
     call check_choice('--breaking', options%breaking, switches, error)
     if (allocated(error)) return
+    call check_choice('--precision', options%precision, precisions, error)
+    if (allocated(error)) return
+    if (given(options%precision)) then
+      if (options%precision == 'mixed') call check_mixed(options, error)
+      if (allocated(error)) return
+    end if
     if (.not. (options%seconds >= 0.001_wp .and. options%seconds <= 3600.0_wp)) &
       & call fail(error, "'--seconds' must be between 0.001 and 3600, found "// &
       & to_text(options%seconds))
   end subroutine check_options
+
+  !> Fails where nothing of what is wanted has loops in mixed precision.
+  pure subroutine check_mixed(options, error)
+    type(bench_options_type), intent(in) :: options
+    type(error_type), allocatable, intent(out) :: error
+    logical :: bars
+
+    bars = .false.
+    if (allocated(options%dimensions)) bars = all(options%dimensions == 1)
+    if (bars .or. .not. chosen(options%family, 'lattice')) &
+      & call fail(error, "'--precision' mixed is for lattices in 2D and 3D")
+  end subroutine check_mixed
 
   !> Every one of `values`, if they are given, must lie between `least` and `most`.
   pure subroutine check_range(option, values, least, most, error)

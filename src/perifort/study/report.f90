@@ -15,7 +15,7 @@ module pd_study_report
     & 'bonds,threads,steps,seconds,ns_per_bond,bytes_per_point,build_seconds,gbytes_per_second,'// &
     & 'gflops,efficiency'
 
-  character(*), parameter :: left = 'body     model       family  breaks thr'
+  character(*), parameter :: left = 'body     model       family  breaks prec   thr'
   character(*), parameter :: middle = ' ns/bond (  least ..   most)     cpu  forces |  steps/s'
   character(*), parameter :: right = '  B/pt build/pt |  GB/s   % | GFLOP/s   % |  eff'
 
@@ -39,7 +39,8 @@ contains
 
     step = timing%seconds/timing%steps
     text = to_text(kernel%dimension)//','//trim(kernel%model)//','//trim(kernel%family)//','// &
-      & switch(kernel%breaking)//',double,'//to_text(timing%points)//','//to_text(timing%bonds)// &
+      & switch(kernel%breaking)//','//trim(kernel%precision)//','//to_text(timing%points)// &
+      & ','//to_text(timing%bonds)// &
       & ','//to_text(kernel%threads)//','//to_text(timing%steps)//','// &
       & to_text(timing%seconds, 9)//','//to_text(1.0e9_wp*step/real(timing%bonds, wp), 9)//','// &
       & to_text(real(timing%bytes, wp)/real(timing%points, wp))//','//to_text(timing%build)//','// &
@@ -56,7 +57,7 @@ contains
     integer :: t
 
     write (unit, '(a)') 'perifort '//program_version//', commit '//commit(), &
-      & compiler_name()//' '//compiler_flags(), processor_name()//', double precision'
+      & compiler_name()//' '//compiler_flags(), processor_name()
     do t = 1, size(machines)
       write (unit, '(a)') machine_row(machines(t))
     end do
@@ -117,7 +118,8 @@ contains
 
     body = to_text(kernel%points)
     if (kernel%dimension > 1) body = trim(body)//'^'//to_text(kernel%dimension)
-    write (text, '(a9, a12, a8, a6)') body, kernel%model, kernel%family, switch(kernel%breaking)
+    write (text, '(a9, a12, a8, a6, 1x, a6)') body, kernel%model, kernel%family, &
+      & switch(kernel%breaking), kernel%precision
   end function kernel_label
 
   pure function switch(on) result(word)

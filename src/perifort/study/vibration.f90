@@ -8,7 +8,7 @@ module pd_study_vibration
   use pd_body_body, only: body_type, allocate_points, in_point_order
   use pd_body_material, only: material_type, never
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_family_lattice, only: lattice_family_type, new_lattice_family
+  use pd_family_lattice, only: lanes, lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
@@ -62,7 +62,8 @@ contains
     select type (family => system%family)
     type is (lattice_family_type)
       allocate (lattice)
-      call new_lattice_family(twin%body, rule, cut, lattice, error)
+      call new_lattice_family(twin%body, rule, cut, &
+        & family%grids(1)%alignment > lanes, lattice, error)
       if (allocated(error)) return
       call move_alloc(lattice, twin%family)
     class default

@@ -1,0 +1,73 @@
+!> The state of a lattice as its loops in mixed precision need it. All procedures are called by all
+!> threads of a parallel region, which wait for each other at the end.
+module pd_force_singles
+  use pd_base_kinds, only: wp, sp, i8
+  use pd_family_lattice, only: lattice_family_type
+  implicit none (type, external)
+  private
+  public :: split_displacements, round_dilatation, clear_sums, add_sums
+
+  !> Bits of a double real but those that a single one has no room for.
+  integer(i8), parameter :: leading = not(2_i8**29 - 1_i8)
+
+contains
+
+  !> u = high + low, each in single precision, to 47 bits. The leading digits are cut out as bits:
+  !> a compiler that may simplify takes a difference from a rounded value for zero.
+  subroutine split_displacements(family, u)
+    type(lattice_family_type), intent(inout) :: family
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp) :: high
+    integer :: k, c
+
+    do c = 1, size(u, 2)
+      !$omp do simd schedule(static) private(high)
+      do k = 1, size(u, 1)
+        high = transfer(iand(transfer(u(k, c), 0_i8), leading), 0.0_wp)
+        family%singles%high(k, c) = real(high, sp)
+        family%singles%low(k, c) = real(u(k, c) - high, sp)
+      end do
+    end do
+  end subroutine split_displacements
+
+  !> The dilatation's coefficients `p` (n_slots) in single precision.
+  subroutine round_dilatation(family, p)
+    type(lattice_family_type), intent(inout) :: family
+    real(wp), intent(in), contiguous :: p(:)
+    integer :: k
+
+    !$omp do simd schedule(static)
+    do k = 1, size(p)
+      family%singles%p(k) = real(family%singles%volume*p(k), sp)
+    end do
+  end subroutine round_dilatation
+
+  !> Set the first `n` sums to zero.
+  subroutine clear_sums(family, n)
+    type(lattice_family_type), intent(inout) :: family
+    integer, intent(in) :: n
+    integer :: k, c
+
+    do c = 1, n
+      !$omp do simd schedule(static)
+      do k = 1, family%n_slots
+        family%singles%sums(k, c) = 0.0_sp
+      end do
+    end do
+  end subroutine clear_sums
+
+  !> Add the `c`-th sum, times `unit`, to `values` (n_slots).
+  subroutine add_sums(family, c, unit, values)
+    type(lattice_family_type), intent(in) :: family
+    integer, intent(in) :: c
+    real(wp), intent(in) :: unit
+    real(wp), intent(inout), contiguous :: values(:)
+    integer :: k
+
+    !$omp do simd schedule(static)
+    do k = 1, size(values)
+      values(k) = values(k) + unit*real(family%singles%sums(k, c), wp)
+    end do
+  end subroutine add_sums
+
+end module pd_force_singles
