@@ -123,7 +123,8 @@ contains
       & 'dilatation of corners (surface_correction = ''none'' does not)'
     call fail(error, 'unstable by t = '//to_text(t)//' s: the strain energy is negative, '// &
       & with_unit(energies%strain, 'J', 3)//'. The cause is not the step but a Poisson''s '// &
-      & 'ratio of '//to_text(minval(system%model%materials%poissons_ratio))//advice, status_no_answer)
+      & 'ratio of '//to_text(minval(system%model%materials%poissons_ratio))//advice, &
+      & status_no_answer)
   end subroutine check_strain_energy
 
   !> The largest stretch, in size, of the intact bonds of slot `k`; not finite if displacements
