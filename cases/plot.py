@@ -288,13 +288,19 @@ class Study:
         except ValueError:
             return None
 
+    def short(self, key):
+        """The name of a key without its group, where no other varied key has it."""
+        name = key.split("%", 1)[-1]
+        same = [other for other in self.keys if other.split("%", 1)[-1] == name]
+        return name if len(same) == 1 else key
+
     def families(self, without):
         """Numbers of runs that differ in one key alone, by a label of the others."""
         found = {}
         for number, row in enumerate(self.settings):
             if not self.shown[number]:
                 continue
-            label = ", ".join(f"{key} = {value}" for key, value in zip(self.keys, row)
+            label = ", ".join(f"{self.short(key)} = {value}" for key, value in zip(self.keys, row)
                               if key != without
                               and len({other[self.keys.index(key)] for other in self.settings}) > 1)
             found.setdefault(label, []).append(number)
@@ -306,9 +312,10 @@ def study_pictures(study, folder):
     error, seconds = study.columns["error"], study.columns["seconds"]
     if not study.shown.any():
         raise KeyError(f"{study.path} has no error to draw")
-    # The key with most values makes the lines
-    line = max(study.keys, key=lambda key: len({row[study.keys.index(key)]
-                                                for row in study.settings}))
+    # The key with most values makes the lines, one of numbers before one of words
+    line = max(study.keys, key=lambda key: (study.values(key) is not None,
+                                            len({row[study.keys.index(key)]
+                                                 for row in study.settings})))
     figure, axis = plt.subplots(figsize=(7.5, 5))
     for label, runs in study.families(line).items():
         runs = sorted(runs, key=lambda run: seconds[run])
@@ -345,7 +352,10 @@ def study_pictures(study, folder):
         axis.set(xlabel=key, ylabel="error")
         axis.grid(alpha=0.3, which="both")
         if any(study.families(key)):
-            axis.legend(fontsize=7)
+            # Many lines leave no room for their names among them
+            beside = len(study.families(key)) > 5
+            axis.legend(fontsize=7, **({"loc": "upper left", "bbox_to_anchor": (1, 1)} if beside
+                                       else {}))
         save(figure, folder / f"study_{''.join(c if c.isalnum() else '_' for c in key)}.png")
 
 

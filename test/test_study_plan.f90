@@ -26,6 +26,7 @@ contains
     testsuite = [ &
       & new_unittest('groups make the product', test_product), &
       & new_unittest('groups go together', test_together), &
+      & new_unittest('orders of a list of runs', test_listed_orders), &
       & new_unittest('points follow in proportion', test_points), &
       & new_unittest('vectors take several values', test_vectors), &
       & new_unittest('columns', test_columns), &
@@ -230,5 +231,32 @@ contains
       & .true.]) .or. outcomes(2)%pareto .and. .not. outcomes(1)%pareto, &
       & 'what others are compared with does not compete')
   end subroutine test_orders
+
+  !> Groups in step that repeat values are a list of runs: errors safety^2/points, orders of runs that
+  !> differ in one of them alone.
+  subroutine test_listed_orders(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(plan_type) :: plan
+    type(outcome_type) :: outcomes(4)
+    type(order_type), allocatable :: orders(:)
+    integer :: t
+
+    call planned("&study vary = 'time%safety' values = 0.8, 0.8, 0.4, 0.4"//rest// &
+      & "&study vary = 'body%points' values = 10, 20, 10, 40 together = .true. /", plan, error)
+    if (allocated(error)) return
+    do t = 1, 4
+      outcomes(t)%done = .true.
+      outcomes(t)%judged = .true.
+      outcomes(t)%error = plan%trials(t)%scene%time%safety**2/plan%trials(t)%scene%bodies(1)%points(1)
+    end do
+    call observed_orders(plan, outcomes, orders)
+    call expect_true(error, size(orders) == 3, 'one of the safety, two of the points')
+    if (allocated(error)) return
+    call expect_true(error, all(orders%variable == [1, 2, 2]) .and. all(orders%from == [1, 1, 3]) &
+      & .and. all(orders%to == [3, 2, 4]), 'which runs')
+    call expect(error, orders(1)%order, 2.0_wp, 1.0e-12_wp, 'of the safety')
+    call expect(error, orders(2)%order, 1.0_wp, 1.0e-12_wp, 'of the points')
+    call expect(error, orders(3)%order, 1.0_wp, 1.0e-12_wp, 'of the points, smaller steps')
+  end subroutine test_listed_orders
 
 end module test_study_plan

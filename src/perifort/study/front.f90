@@ -72,21 +72,25 @@ contains
   end function is_step
 
   !> Orders between neighbouring values of each axis, everything else the same. Of variables that
-  !> go in step the first one counts.
+  !> go in step the first one counts; if it takes a value more than once, they are no sequence but
+  !> a list of runs, and runs are compared that differ in one variable alone.
   pure subroutine observed_orders(plan, outcomes, orders)
     type(plan_type), intent(in) :: plan
     type(outcome_type), intent(in) :: outcomes(:)
     type(order_type), allocatable, intent(out) :: orders(:)
     real(wp) :: fine, coarse, best
+    logical, allocatable :: others(:)   ! variables in which compared runs agree
     integer :: v, i, j, next
 
     allocate (orders(0))
     do v = 1, size(plan%variables)
       if (.not. is_step(plan, v)) cycle
       if (v > 1) then
-        if (any([(is_step(plan, i) .and. plan%variables(i)%axis == plan%variables(v)%axis, &
-          & i=1, v - 1)])) cycle
+        if (any([(is_step(plan, i) .and. plan%variables(i)%axis == plan%variables(v)%axis .and. &
+          & .not. repeats(i), i=1, v - 1)])) cycle
       end if
+      others = plan%variables%axis /= plan%variables(v)%axis
+      if (repeats(v)) others = [(i /= v, i=1, size(others))]
       do i = 1, size(outcomes)
         if (.not. usable(outcomes(i))) cycle
         coarse = step_of(i)
@@ -94,8 +98,7 @@ contains
         best = 0.0_wp
         do j = 1, size(outcomes)
           if (.not. usable(outcomes(j))) cycle
-          if (any(plan%trials(i)%words /= plan%trials(j)%words .and. &
-            & plan%variables%axis /= plan%variables(v)%axis)) cycle
+          if (any(plan%trials(i)%words /= plan%trials(j)%words .and. others)) cycle
           fine = step_of(j)
           if (fine >= coarse .or. fine <= best) cycle
           best = fine
@@ -108,6 +111,15 @@ contains
     end do
 
   contains
+
+    !> Whether a variable takes a value more than once.
+    pure logical function repeats(variable)
+      integer, intent(in) :: variable
+      integer :: k
+      associate (words => plan%variables(variable)%words)
+        repeats = any([(any(words(:k - 1) == words(k)), k=2, size(words))])
+      end associate
+    end function repeats
 
     pure real(wp) function step_of(run)
       integer, intent(in) :: run
