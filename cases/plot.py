@@ -354,6 +354,8 @@ def study_pictures(study, folder):
         if any(study.families(key)):
             # Many lines leave no room for their names among them
             beside = len(study.families(key)) > 5
+            if beside:
+                figure.set_size_inches(11, 4.2)
             axis.legend(fontsize=7, **({"loc": "upper left", "bbox_to_anchor": (1, 1)} if beside
                                        else {}))
         save(figure, folder / f"study_{''.join(c if c.isalnum() else '_' for c in key)}.png")
