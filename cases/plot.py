@@ -300,8 +300,8 @@ class Study:
         for number, row in enumerate(self.settings):
             if not self.shown[number]:
                 continue
-            label = ", ".join(f"{self.short(key)} = {value}" for key, value in zip(self.keys, row)
-                              if key != without
+            label = ", ".join(f"{self.short(key)} = {value}"
+                              for key, value in zip(self.keys, row) if key != without
                               and len({other[self.keys.index(key)] for other in self.settings}) > 1)
             found.setdefault(label, []).append(number)
         return found
@@ -352,12 +352,11 @@ def study_pictures(study, folder):
         axis.set(xlabel=key, ylabel="error")
         axis.grid(alpha=0.3, which="both")
         if any(study.families(key)):
+            axis.legend(fontsize=7)
             # Many lines leave no room for their names among them
-            beside = len(study.families(key)) > 5
-            if beside:
-                figure.set_size_inches(11, 4.2)
-            axis.legend(fontsize=7, **({"loc": "upper left", "bbox_to_anchor": (1, 1)} if beside
-                                       else {}))
+            if len(study.families(key)) > 5:
+                figure.set_size_inches(8.5, 6.5)
+                axis.legend(fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
         save(figure, folder / f"study_{''.join(c if c.isalnum() else '_' for c in key)}.png")
 
 

@@ -232,8 +232,8 @@ contains
       & 'what others are compared with does not compete')
   end subroutine test_orders
 
-  !> Groups in step that repeat values are a list of runs: errors safety^2/points, orders of runs that
-  !> differ in one of them alone.
+  !> Groups in step that repeat values are a list of runs: errors safety^2/points, and orders of
+  !> runs that differ in one of them alone.
   subroutine test_listed_orders(error)
     type(error_type), allocatable, intent(out) :: error
     type(plan_type) :: plan
@@ -247,7 +247,9 @@ contains
     do t = 1, 4
       outcomes(t)%done = .true.
       outcomes(t)%judged = .true.
-      outcomes(t)%error = plan%trials(t)%scene%time%safety**2/plan%trials(t)%scene%bodies(1)%points(1)
+      associate (scene => plan%trials(t)%scene)
+        outcomes(t)%error = scene%time%safety**2/scene%bodies(1)%points(1)
+      end associate
     end do
     call observed_orders(plan, outcomes, orders)
     call expect_true(error, size(orders) == 3, 'one of the safety, two of the points')

@@ -1,5 +1,5 @@
-"""What the studies of this folder show, asked of runs made now: which settings are better, not how fast
-they are. --quick leaves out the long ones."""
+"""What the studies of this folder show, asked of runs made now: which settings are better, not how
+fast they are. --quick leaves out the long ones."""
 import csv
 import subprocess
 import sys
@@ -28,12 +28,13 @@ def quick(case):
     runs = study(case, "surface")
     for points in ("40", "80", "160"):
         case.below(f"surface: error with the correction over that without, {points} points",
-                   runs[points, "energy", "linear"]["error"] / runs[points, "none", "linear"]["error"],
-                   0.2)
+                   runs[points, "energy", "linear"]["error"]
+                   / runs[points, "none", "linear"]["error"], 0.2)
     case.below("surface: without it and with 'linear' the error stays, 80 over 160 points",
                runs["80", "none", "linear"]["error"] / runs["160", "none", "linear"]["error"], 1.2)
     case.above("surface: with it the error falls, 80 over 160 points",
-               runs["80", "energy", "linear"]["error"] / runs["160", "energy", "linear"]["error"], 1.8)
+               runs["80", "energy", "linear"]["error"]
+               / runs["160", "energy", "linear"]["error"], 1.8)
 
     runs = study(case, "volume")
     best = min(runs, key=lambda run: runs[run]["error"])
