@@ -53,7 +53,8 @@ def quick(case):
     runs = study(case, "integrators")
     for name, order in (("forward_backward", 2), ("adams_bashforth", 3), ("runge_kutta", 4)):
         case.near(f"integrators: error at safety 0.4 over 0.2, {name}",
-                  runs[name, "0.4"]["error"] / runs[name, "0.2"]["error"], 2.0**order, relative=0.25)
+                  runs[name, "0.4"]["error"] / runs[name, "0.2"]["error"], 2.0**order,
+                  relative=0.25)
 
 
 def long(case):
@@ -78,6 +79,10 @@ def long(case):
     runs = study(case, "dilatation")
     case.below("dilatation: difference of both, smallest steps",
                runs["unprojected", "0.025"]["error"], 1e-5)
+
+    runs = study(case, "precision")
+    case.below("precision: difference of both on the same points", runs["mixed", "160"]["error"],
+               1e-5)
 
     for name, points, least in (("steps", "160", 1.6), ("steps_block", "20", 2.1)):
         runs = study(case, name)
