@@ -1,9 +1,10 @@
 !> The watch over energies: silent where energy is paid for, and not where it comes from nowhere.
 module test_motion_watch
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: iso_fortran_env, only: compiler_options
   use pd_base_kinds, only: wp
   use pd_motion_watch, only: watch_type
-  use testdrive, only: check, error_type, new_unittest, unittest_type
+  use testdrive, only: check, error_type, new_unittest, skip_test, unittest_type
   implicit none (type, external)
   private
   public :: collect_motion_watch
@@ -98,6 +99,11 @@ contains
     type(watch_type) :: watch
     real(wp) :: none
 
+    ! a build that stops at invalid numbers stops at this one
+    if (index(compiler_options(), 'ffpe-trap') > 0) then
+      call skip_test(error, 'the build stops at invalid numbers')
+      return
+    end if
     none = ieee_value(none, ieee_quiet_nan)
     call watch%look(0, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
     call watch%look(1, none, 0.0_wp, 0.0_wp, 0.0_wp)
