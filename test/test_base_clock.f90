@@ -201,8 +201,8 @@ contains
     end do
     call cpu_time(end_of_looks)
     close (unit)
-    ! Processor time against processor time, so that neither other work on the machine nor a slow build
-    ! counts. If each call looked at the clock, it could not cost less than a look; in truth it is a tenth.
+    ! Processor time against processor time, so that neither other work on the machine nor a slow
+    ! build counts. If each call looked at the clock, it could not cost less than a look.
     call check(error, end_of_updates - start < 0.5_wp*(end_of_looks - end_of_updates), &
       & 'an update costs as much as a look at the clock')
   end subroutine test_cheap
