@@ -156,7 +156,10 @@ contains
       ! The common case in one read; the slow way below finds the place of a fault.
       if (is_plain(text(:last))) then
         read (text(:last), *, iostat=status) values
-        if (status == 0 .and. all(abs(values) <= largest_real)) return
+        ! After a failed read the values are not set.
+        if (status == 0) then
+          if (all(abs(values) <= largest_real)) return
+        end if
       end if
       final = 0
       do i = 1, size(values)
