@@ -70,6 +70,14 @@ def small(text, largest):
                   lambda m: m[1] + str(min(int(m[2]), 100)), text, flags=re.M)
 
 
+def thinned(data, number):
+    """A table of an initial state with rows for fewer points, taken evenly; any other as it is."""
+    head, *rows = data.splitlines(keepends=True)
+    if not head[:1].isalpha() or len(rows) <= number:
+        return data
+    return head + b"".join(rows[i * len(rows) // number] for i in range(number))
+
+
 def bases(program, project, largest=400):
     """The shipped scenes and templates, made small, with the tables they need."""
     table = "".join(f"{0.1 * i:.6g} {0.1 * j:.6g} 0 0.001\n" for j in range(8) for i in range(8))
@@ -83,7 +91,7 @@ def bases(program, project, largest=400):
         for name in re.findall(r"^\s*file\s*=\s*'([^']+)'", text, re.M):
             # Only initial states stand in tables with a header; one row for each point
             if (path.parent / name).is_file():
-                files[name] = (path.parent / name).read_bytes()
+                files[name] = thinned((path.parent / name).read_bytes(), number)
             elif re.search(r"&body[^/]*file", text):
                 files[name] = table.encode()
             else:
