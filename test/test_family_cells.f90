@@ -177,6 +177,7 @@ contains
             call lattice(count(:dim), spacings(i), shifts(s), body)
             call new_list_family(body, volume_rule_type(kind, 3*spacings(i)), family)
             call expect_true(error, family%n_bonds == expected, 'bonds of a shifted lattice')
+            call lattice(count(:dim), spacings(i), shifts(s), body)
             call new_list_family(body, volume_rule_type(kind, &
               & 3*spacings(i)*(1 - 4*epsilon(1.0_wp))), family)
             call expect_true(error, family%n_bonds == expected, 'bonds of a horizon rounded down')

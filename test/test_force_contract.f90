@@ -43,7 +43,6 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
     real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), theta(:), w(:), w_ref(:)
-    integer(i1), allocatable :: strained(:)
     real(wp), parameter :: strains(*) = [1.0e-9_wp, 1.0e-4_wp, 2.0e-3_wp, 0.03_wp, 0.5_wp]
     real(wp) :: largest
     integer :: kind, number, i
@@ -56,10 +55,9 @@ contains
         call subject_number(kinds(kind), number, subject, there)
         if (.not. there) exit
         associate (n => subject%body%n_slots)
-          if (allocated(u)) deallocate (u, f_ref, theta, w, w_ref, strained)
+          if (allocated(u)) deallocate (u, f_ref, theta, w, w_ref)
           allocate (u(n, subject%dim), f_ref(n, subject%dim), theta(n), w(n), w_ref(n), &
             & source=0.0_wp)
-          allocate (strained(n), source=0_i1)
         end associate
         do i = 1, size(strains)
           call shake(subject%body, some_gradient(strains(i)), 0.5_wp*strains(i)*spacing, &
@@ -78,7 +76,7 @@ contains
               & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*maxval(abs(theta)), 'dilatation, &
               & '//name_of(subject, number))
           end if
-          call energy_pass(subject%family, subject%model, u, w, strained)
+          call energy_pass(subject%family, subject%model, u, w)
           call reference_energy(subject%family, subject%model, u, w_ref)
           call expect(error, maxval(abs(w - w_ref)), 0.0_wp, &
             & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-7_wp)*maxval(abs(w_ref)), 'energy, &
@@ -234,11 +232,9 @@ contains
     type(subject_type), intent(inout) :: subject
     real(wp), intent(in) :: u(:, :)
     real(wp), allocatable :: density(:)
-    integer(i1), allocatable :: strained(:)
 
     allocate (density(size(u, 1)), source=0.0_wp)
-    allocate (strained(size(u, 1)), source=0_i1)
-    call energy_pass(subject%family, subject%model, u, density, strained)
+    call energy_pass(subject%family, subject%model, u, density)
     energy = sum(density*subject%body%volume)
   end function total_energy
 
@@ -343,7 +339,6 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
     real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), w(:)
-    integer(i1), allocatable :: strained(:)
     integer :: kind, dim, k, way
 
     do kind = 1, size(kinds)
@@ -351,9 +346,8 @@ contains
         subject = subject_type(kind=kinds(kind), dim=dim, surface=.true.)
         call build(subject)
         associate (n => subject%body%n_slots)
-          if (allocated(u)) deallocate (u, f_ref, w, strained)
+          if (allocated(u)) deallocate (u, f_ref, w)
           allocate (u(n, dim), f_ref(n, dim), w(n), source=0.0_wp)
-          allocate (strained(n), source=0_i1)
         end associate
         do way = 1, 2
           u = 0.0_wp
@@ -366,7 +360,7 @@ contains
           end do
           call fast_force(subject, u, force, p)
           call reference_force(subject%family, subject%model, u, f_ref)
-          call energy_pass(subject%family, subject%model, u, w, strained)
+          call energy_pass(subject%family, subject%model, u, w)
           call expect_true(error, all(abs(force) < 1.0e30_wp) .and. all(abs(p) < 1.0e30_wp), &
             & 'force of crushed bonds, '//name_of(subject, way))
           call expect_true(error, all(abs(f_ref) < 1.0e30_wp), 'reference of crushed bonds, ' &

@@ -1,7 +1,7 @@
 !> The tangent of the forces against the linearised theory written out bond by bond, and against the
 !> energy where the body is deformed.
 module test_motion_tangent
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp
   use pd_driver, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
@@ -168,9 +168,8 @@ contains
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp) :: density(size(u, 1))
-    integer(i1) :: strained(0)
 
-    call energy_pass(system%family, system%model, u, density, strained)
+    call energy_pass(system%family, system%model, u, density)
     energy = dot_product(density, system%body%volume)
   end function energy
 

@@ -1,9 +1,9 @@
 !> Linked cells (7.11): the points within a distance of each point, in time linear in their number.
 module pd_family_cells
-  use pd_base_kinds, only: wp, i2, i4, i8
+  use pd_base_kinds, only: wp, i2, i4
   implicit none (type, external)
   private
-  public :: cells_type, sort_into_cells, count_neighbours, collect_neighbours, neighbours_of, &
+  public :: cells_type, sort_into_cells, count_neighbours, neighbours_of, &
     & joins_labels, brute_force_neighbours, cell_of, cells_around
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
@@ -15,12 +15,6 @@ module pd_family_cells
     integer(i4), allocatable :: order(:)      !! points, cell by cell
     integer(i4), allocatable :: cell(:)       !! each point's cell
   end type cells_type
-
-  !> Neighbours of a batch of points, one after another.
-  type :: batch_type
-    integer :: count = 0
-    integer(i4), allocatable :: neighbour(:)
-  end type batch_type
 
 contains
 
@@ -131,67 +125,6 @@ contains
     end do
   end subroutine count_neighbours
 
-  !> The neighbours of each point in one array (7.11): those of point k stand from `start(k)` to
-  !> `start(k+1) - 1`, ascending. Each batch of points collects into room of its own, so that the
-  !> search is made only once.
-  subroutine collect_neighbours(x, half_reach, cells, start, neighbour)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: half_reach(:)
-    type(cells_type), intent(in) :: cells
-    integer(i8), allocatable, intent(out) :: start(:)
-    integer(i4), allocatable, intent(out) :: neighbour(:)
-    integer, parameter :: batch_length = 1024
-    type(batch_type), allocatable :: batch(:)
-    integer(i4), allocatable :: found(:)
-    integer(i4) :: number
-    integer :: b, k, n
-
-    n = size(x, 1)
-    allocate (batch((n + batch_length - 1)/batch_length), start(n + 1))
-    !$omp parallel default(none) shared(x, half_reach, cells, batch, start, n) &
-    !$omp private(b, k, found, number)
-    !$omp do schedule(dynamic)
-    do b = 1, size(batch)
-      allocate (batch(b)%neighbour(0))
-      do k = (b - 1)*batch_length + 1, min(b*batch_length, n)
-        call neighbours_of(x, half_reach, cells, k, number, found)
-        start(k + 1) = number
-        if (number == 0) cycle
-        call sort(found(:number))
-        call put(batch(b), found(:number))
-      end do
-    end do
-    !$omp end parallel
-    start(1) = 1_i8
-    do k = 1, n
-      start(k + 1) = start(k) + start(k + 1)
-    end do
-    allocate (neighbour(start(n + 1) - 1))
-    !$omp parallel do schedule(dynamic) default(none) shared(batch, start, neighbour) private(b, k)
-    do b = 1, size(batch)
-      k = (b - 1)*batch_length + 1
-      neighbour(start(k):start(k) + batch(b)%count - 1) = batch(b)%neighbour(:batch(b)%count)
-      deallocate (batch(b)%neighbour)
-    end do
-  end subroutine collect_neighbours
-
-  !> Put numbers behind those of a batch, which grows as needed.
-  pure subroutine put(batch, numbers)
-    type(batch_type), intent(inout) :: batch
-    integer(i4), intent(in) :: numbers(:)
-    integer(i4), allocatable :: longer(:)
-    integer :: n
-
-    n = batch%count + size(numbers)
-    if (n > size(batch%neighbour)) then
-      allocate (longer(max(n, 2*size(batch%neighbour))))
-      longer(:batch%count) = batch%neighbour(:batch%count)
-      call move_alloc(longer, batch%neighbour)
-    end if
-    batch%neighbour(batch%count + 1:n) = numbers
-    batch%count = n
-  end subroutine put
-
   !> The neighbours of one point in `found(:number)`, which grows as needed.
   pure subroutine neighbours_of(x, half_reach, cells, k, number, found)
     real(wp), intent(in) :: x(:, :)
@@ -269,22 +202,6 @@ contains
       end do
     end do
   end subroutine visit
-
-  !> Insertion sort: families come nearly sorted when the points do.
-  pure subroutine sort(list)
-    integer(i4), intent(inout) :: list(:)
-    integer(i4) :: value
-    integer :: i, j
-
-    do i = 2, size(list)
-      value = list(i)
-      do j = i - 1, 1, -1
-        if (list(j) <= value) exit
-        list(j + 1) = list(j)
-      end do
-      list(j + 1) = value
-    end do
-  end subroutine sort
 
   !> The same by comparing every pair: the check of the search above.
   pure subroutine brute_force_neighbours(x, half_reach, k, neighbour)

@@ -67,6 +67,7 @@ contains
       crack = new_crack(cracks(c), body%dim)
       !$omp parallel default(none) shared(crack, body, family) private(bonds, k, i) reduction(+:cut)
       call allocate_bonds(family, bonds)
+      ! chunks of whole groups, whose bonds one thread must break
       !$omp do schedule(dynamic, 256)
       do k = 1, body%n_slots
         if (body%point(k) == 0) cycle

@@ -44,7 +44,8 @@ module pd_family_family
       type(bonds_type), intent(inout) :: bonds
     end subroutine bonds_of_interface
 
-    !> Break the `i`-th bond of `bonds_of(k)`; the other direction is another call.
+    !> Break the `i`-th bond of `bonds_of(k)`; the other direction is another call. Bonds of
+    !> `lanes` slots that follow each other may share a byte: only one thread may break them.
     pure subroutine break_interface(family, k, i)
       import :: family_type
       implicit none (type, external)

@@ -1,26 +1,39 @@
-!> List families for any cloud of points: the two arrays of 7.11, and a flag for each bond.
+!> List families for any cloud of points. Points are sorted so that eight that follow each other lie
+!> close together: a cluster, whose families have most of their members in common. What is stored is
+!> each cluster's members, and for each of them a bit for every lane whose family it is in. The loops
+!> take the eight bonds to one member at a time.
 !>
-!> Nothing else is stored per bond: xi, |xi| and v_c come from the points.
+!> Nothing else is stored: xi, |xi| and v_c come from the points.
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_body_body, only: body_type, arrange
-  use pd_family_cells, only: cells_type, sort_into_cells, collect_neighbours
+  use pd_family_clusters, only: rows_type, order_in_rows, collect_members, lane_bit
   use pd_family_family, only: family_type, bonds_type
-  use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact
+  use pd_family_offsets, only: lanes
+  use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact, &
+    & volume_none
   implicit none (type, external)
   private
   public :: list_family_type, new_list_family
+  public :: at_volume, at_moved, at_p
+
+  !> Where things stand in `at`: behind the position come volume, displacement and p.
+  integer, parameter :: at_volume = 4, at_moved = 4, at_p = 8
 
   type, extends(family_type) :: list_family_type
-    integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
-    integer(i4), allocatable :: neighbour(:)   !! slot at each bond's other end
-    integer(i1), allocatable :: intact(:)      !! 1 intact, 0 broken
+    integer(i8), allocatable :: start(:)       !! first member of each cluster (clusters + 1)
+    integer(i4), allocatable :: member(:)      !! slots at the other ends, ascending
+    integer(i1), allocatable :: bits(:)        !! the lanes in whose family a member is
+    integer(i1), allocatable :: intact(:)      !! those of them whose bond is intact
+    integer :: most_members = 0                !! largest number of members of a cluster
     real(wp), allocatable :: spacing(:)        !! [m]
-    real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
     logical :: one_spacing = .false.           !! all points have the same
-    real(wp), allocatable :: place(:, :)       !! position and volume, point by point (4, n_slots)
-    real(wp), allocatable :: moved(:, :)       !! displacement and p, gathered (4, n_slots)
+    integer(i8), allocatable :: first_bond(:)  !! of each cluster in `fraction` (clusters)
+    real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
+    real(wp), allocatable :: at(:, :)          !! of each slot, in one place: position, volume,
+                                               !! displacement and p of the pass (8, n_slots)
+    integer(i1), allocatable :: large(:)       !! 1 for clusters strained beyond the fast formulas
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
@@ -32,58 +45,100 @@ module pd_family_list
 
 contains
 
-  !> Families of all points of `body`, which is sorted cell by cell so that neighbours are near in
-  !> memory. Members are those within the rule's reach for the bond's mean spacing.
+  !> Families of all points of `body`, which is sorted, and filled with dead slots up to whole
+  !> clusters. Members are those within the rule's reach for the bond's mean spacing.
   subroutine new_list_family(body, rule, family)
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
     type(list_family_type), intent(out) :: family
-    type(cells_type) :: cells
+    type(rows_type) :: rows
     real(wp), allocatable :: half_reach(:)
-    integer :: k
+    integer(i4), allocatable :: order(:), point(:)
+    integer :: k, n, edges
 
-    ! fine cells first: they only order the points
-    call sort_into_cells(body%x, 2*maxval(body%spacing), cells)
-    call arrange(body, body%point(cells%order))
+    n = body%n_points
+    ! eight points of a lattice fill a square of three or a cube of two spacings
+    edges = nint(real(lanes, wp)**(1.0_wp/body%dim))
+    call order_in_rows(body%x, edges*maxval(body%spacing), rows, order)
+    allocate (point(lanes*((n + lanes - 1)/lanes)), source=0_i4)
+    point(:n) = body%point(order)
+    call arrange(body, point)
     family%dim = body%dim
     family%n_slots = body%n_slots
     family%rule = rule
-    allocate (half_reach(body%n_slots))
-    do k = 1, body%n_slots
+    allocate (half_reach(n))
+    do k = 1, n
       half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
     end do
-    call sort_into_cells(body%x, 2*maxval(half_reach), cells)
-    call collect_neighbours(body%x, half_reach, cells, family%start, family%neighbour)
-    family%n_bonds = size(family%neighbour, kind=i8)
-    do k = 1, body%n_slots
-      family%most_bonds = max(family%most_bonds, int(family%start(k + 1) - family%start(k)))
-    end do
-    allocate (family%intact(family%n_bonds), source=1_i1)
+    call collect_members(body%x(:n, :), half_reach, rows, family%start, family%member, family%bits)
+    allocate (family%intact, source=family%bits)
+    call count_bonds(family)
     family%spacing = body%spacing
-    family%one_spacing = maxval(family%spacing) <= minval(family%spacing)
-    allocate (family%place(4, family%n_slots), family%moved(4, family%n_slots), source=0.0_wp)
-    do k = 1, family%n_slots
-      family%place(:family%dim, k) = body%x(k, :)
-      family%place(4, k) = body%volume(k)
+    family%one_spacing = maxval(body%spacing(:n)) <= minval(body%spacing(:n))
+    allocate (family%at(at_p, family%n_slots), source=0.0_wp)
+    do k = 1, n
+      family%at(:family%dim, k) = body%x(k, :)
+      family%at(at_volume, k) = body%volume(k)
     end do
+    allocate (family%large(size(family%start) - 1), source=0_i1)
     if (rule%kind == volume_exact) call store_fractions(family)
   end subroutine new_list_family
 
-  !> Keep the covered part of each cell: it is too dear to compute in every step.
+  !> The number of bonds, and the most that one point and the most members that one cluster has.
+  subroutine count_bonds(family)
+    type(list_family_type), intent(inout) :: family
+    integer(i8) :: e, n_bonds
+    integer :: number(lanes), c, most_bonds, most_members
+
+    n_bonds = 0_i8
+    most_bonds = 0
+    most_members = 0
+    !$omp parallel do schedule(static) default(none) shared(family) private(c, e, number) &
+    !$omp reduction(+:n_bonds) reduction(max:most_bonds, most_members)
+    do c = 1, size(family%start) - 1
+      number = 0
+      do e = family%start(c), family%start(c + 1) - 1
+        where (iand(family%bits(e), lane_bit) /= 0_i1) number = number + 1
+      end do
+      n_bonds = n_bonds + sum(number)
+      most_bonds = max(most_bonds, maxval(number))
+      most_members = max(most_members, int(family%start(c + 1) - family%start(c)))
+    end do
+    family%n_bonds = n_bonds
+    family%most_bonds = most_bonds
+    family%most_members = most_members
+  end subroutine count_bonds
+
+  !> Keep the covered part of each cell: it is too dear to compute in every step. Bonds stand member
+  !> by member, and lane by lane for each.
   subroutine store_fractions(family)
     type(list_family_type), intent(inout) :: family
     real(wp) :: xi(family%dim)
-    integer(i8) :: b
-    integer :: k, j
+    integer(i8) :: b, e
+    integer :: c, l, k, j
 
-    allocate (family%fraction(family%n_bonds))
-    !$omp parallel do schedule(dynamic, 256) default(none) shared(family) private(k, b, j, xi)
-    do k = 1, family%n_slots
-      do b = family%start(k), family%start(k + 1) - 1
-        j = family%neighbour(b)
-        xi = family%place(:family%dim, j) - family%place(:family%dim, k)
-        family%fraction(b) = volume_correction(family%rule, xi, norm2(xi), &
-          & (family%spacing(k) + family%spacing(j))/2)
+    allocate (family%fraction(family%n_bonds), family%first_bond(size(family%start) - 1))
+    b = 1_i8
+    do c = 1, size(family%first_bond)
+      family%first_bond(c) = b
+      do e = family%start(c), family%start(c + 1) - 1
+        b = b + popcnt(family%bits(e))
+      end do
+    end do
+    !$omp parallel do schedule(dynamic, 32) default(none) shared(family) &
+    !$omp private(c, l, k, j, b, e, xi)
+    do c = 1, size(family%first_bond)
+      b = family%first_bond(c)
+      do e = family%start(c), family%start(c + 1) - 1
+        j = family%member(e)
+        do l = 1, lanes
+          if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
+          k = lanes*(c - 1) + l
+          xi = family%at(:family%dim, j) - family%at(:family%dim, k)
+          family%fraction(b) = volume_correction(family%rule, xi, norm2(xi), &
+            & (family%spacing(k) + family%spacing(j))/2)
+          b = b + 1
+        end do
       end do
     end do
   end subroutine store_fractions
@@ -92,50 +147,89 @@ contains
     class(list_family_type), intent(in) :: family
     integer, intent(in) :: k
     type(bonds_type), intent(inout) :: bonds
-    integer :: i, c, j
+    real(wp) :: spacing
+    integer(i8) :: e, b
+    integer :: i, n, c, l, d
+    integer(i1) :: below
 
-    bonds%n = int(family%start(k + 1) - family%start(k))
-    do i = 1, bonds%n
-      j = family%neighbour(family%start(k) + i - 1)
-      bonds%j(i) = j
-      bonds%intact(i) = family%intact(family%start(k) + i - 1) == 1_i1
-      bonds%length(i) = 0.0_wp
-      do c = 1, family%dim
-        bonds%xi(i, c) = family%place(c, j) - family%place(c, k)
-        bonds%length(i) = bonds%length(i) + bonds%xi(i, c)**2
+    c = (k - 1)/lanes + 1
+    l = k - lanes*(c - 1)
+    n = 0
+    do e = family%start(c), family%start(c + 1) - 1
+      if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
+      n = n + 1
+      bonds%j(n) = family%member(e)
+      bonds%intact(n) = iand(family%intact(e), lane_bit(l)) /= 0_i1
+    end do
+    bonds%n = n
+    bonds%length(:n) = 0.0_wp
+    do d = 1, family%dim
+      do i = 1, n
+        bonds%xi(i, d) = family%at(d, bonds%j(i)) - family%at(d, k)
+        bonds%length(i) = bonds%length(i) + bonds%xi(i, d)**2
       end do
+    end do
+    do i = 1, n
       bonds%length(i) = sqrt(bonds%length(i))
-      if (allocated(family%fraction)) then
-        bonds%weight(i) = family%place(4, j)*family%fraction(family%start(k) + i - 1)
-      else
-        bonds%weight(i) = family%place(4, j)*volume_correction(family%rule, bonds%xi(i, :), &
-          & bonds%length(i), (family%spacing(k) + family%spacing(j))/2)
+      bonds%weight(i) = family%at(at_volume, bonds%j(i))
+    end do
+    if (.not. allocated(family%fraction)) then
+      if (family%rule%kind == volume_none) return
+      do i = 1, n
+        spacing = (family%spacing(k) + family%spacing(bonds%j(i)))/2
+        bonds%weight(i) = bonds%weight(i) &
+          & *max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - bonds%length(i))/spacing))
+      end do
+      return
+    end if
+    ! the lanes before this one, whose fractions stand before its own
+    below = int(2**(l - 1) - 1, i1)
+    b = family%first_bond(c)
+    i = 0
+    do e = family%start(c), family%start(c + 1) - 1
+      if (iand(family%bits(e), lane_bit(l)) /= 0_i1) then
+        i = i + 1
+        bonds%weight(i) = bonds%weight(i)*family%fraction(b + popcnt(iand(family%bits(e), below)))
       end if
+      b = b + popcnt(family%bits(e))
     end do
   end subroutine bonds_of
 
   pure subroutine break_bond(family, k, i)
     class(list_family_type), intent(inout) :: family
     integer, intent(in) :: k, i
-    family%intact(family%start(k) + i - 1) = 0_i1
+    integer(i8) :: e
+    integer :: c, l, n
+
+    c = (k - 1)/lanes + 1
+    l = k - lanes*(c - 1)
+    n = 0
+    do e = family%start(c), family%start(c + 1) - 1
+      if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
+      n = n + 1
+      if (n < i) cycle
+      family%intact(e) = iand(family%intact(e), not(lane_bit(l)))
+      return
+    end do
   end subroutine break_bond
 
   subroutine keep_bonds(family, archive)
     class(list_family_type), intent(inout) :: family
     class(archive_type), intent(inout) :: archive
-    call archive%keep('intact bonds', family%intact)
+    call archive%keep('intact bonds of clusters', family%intact)
   end subroutine keep_bonds
 
   pure integer(i8) function bytes(family)
     class(list_family_type), intent(in) :: family
-    bytes = 5*family%n_bonds + int(family%n_slots, i8)*8*10
-    if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds
+    bytes = 6_i8*size(family%member, kind=i8) + int(family%n_slots, i8)*8*9 &
+      & + 9_i8*size(family%large)
+    if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds + 8_i8*size(family%first_bond)
   end function bytes
 
   function describe(family) result(text)
     class(list_family_type), intent(in) :: family
     character(:), allocatable :: text
-    text = 'list: the neighbours of every point stored one by one'
+    text = 'list: the neighbours of every eight points stored one by one'
     if (allocated(family%reason)) text = text//' ('//family%reason//')'
     if (allocated(family%fraction)) text = text//', with their volume fractions'
   end function describe

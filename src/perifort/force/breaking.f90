@@ -4,6 +4,7 @@ module pd_force_breaking
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_offsets, only: lanes
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, point_damage
   implicit none (type, external)
@@ -47,36 +48,60 @@ contains
     real(wp), intent(out) :: dissipated
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:)
-    integer, allocatable :: number(:)
+    integer, allocatable :: number(:), first(:)
     logical :: breaks
-    integer :: m, k, i
+    integer :: g, m, k, i
 
     allocate (lost(size(slots)), source=0.0_wp)
     allocate (number(size(slots)), source=0)
-    !$omp parallel default(none) shared(body, family, model, u, slots, damage, lost, number) &
-    !$omp private(bonds, m, k, i, breaks)
+    call group_slots(slots, first)
+    !$omp parallel default(none) shared(body, family, model, u, slots, damage, lost, number, first) &
+    !$omp private(bonds, g, m, k, i, breaks)
     call allocate_bonds(family, bonds)
-    !$omp do schedule(dynamic, 16)
-    do m = 1, size(slots)
-      k = slots(m)
-      call family%bonds_of(k, bonds)
-      do i = 1, bonds%n
-        call decide(model, u, k, bonds, i, breaks)
-        if (.not. breaks) cycle
-        if (number(m) == 0) lost(m) = point_energy(model, u, k, bonds)
-        number(m) = number(m) + 1
-        call family%break_bond(k, i)
+    !$omp do schedule(dynamic, 4)
+    do g = 1, size(first) - 1
+      do m = first(g), first(g + 1) - 1
+        k = slots(m)
+        call family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          call decide(model, u, k, bonds, i, breaks)
+          if (.not. breaks) cycle
+          if (number(m) == 0) lost(m) = point_energy(model, u, k, bonds)
+          number(m) = number(m) + 1
+          call family%break_bond(k, i)
+        end do
+        if (number(m) == 0) cycle
+        call family%bonds_of(k, bonds)
+        lost(m) = (lost(m) - point_energy(model, u, k, bonds))*body%volume(k)
+        damage(k) = point_damage(bonds)
       end do
-      if (number(m) == 0) cycle
-      call family%bonds_of(k, bonds)
-      lost(m) = (lost(m) - point_energy(model, u, k, bonds))*body%volume(k)
-      damage(k) = point_damage(bonds)
     end do
     !$omp end parallel
     broken = sum(int(number, i8))/2_i8
     dissipated = sum(lost)
     slots = pack(slots, number > 0)
   end subroutine break_bonds
+
+  !> Ascending slots in groups that one thread must work on: those whose bonds may share a byte. The
+  !> slots of group g are `slots(first(g):first(g+1) - 1)`.
+  pure subroutine group_slots(slots, first)
+    integer(i4), intent(in) :: slots(:)
+    integer, allocatable, intent(out) :: first(:)
+    integer :: m, n, group, last
+
+    allocate (first(size(slots) + 1))
+    n = 0
+    last = -1
+    do m = 1, size(slots)
+      group = (slots(m) - 1)/lanes
+      if (group == last) cycle
+      last = group
+      n = n + 1
+      first(n) = m
+    end do
+    first(n + 1) = size(slots) + 1
+    first = first(:n + 1)
+  end subroutine group_slots
 
   !> Whether the `i`-th bond of slot `k` breaks now.
   pure subroutine decide(model, u, k, bonds, i, breaks)

@@ -48,16 +48,15 @@ contains
   end subroutine force_pass
 
   !> Strain energy density of all slots [J/m3].
-  subroutine energy_pass(family, model, u, energy, strained)
+  subroutine energy_pass(family, model, u, energy)
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
-    integer(i1), intent(inout), contiguous :: strained(:)
 
     select type (family)
     type is (list_family_type)
-      call list_energy(family, model, u, energy, strained)
+      call list_energy(family, model, u, energy)
     type is (lattice_family_type)
       call lattice_energy(family, model, u, energy)
     end select

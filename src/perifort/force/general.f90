@@ -6,7 +6,7 @@ module pd_force_general
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: general_dilatation, general_force, general_energy
+  public :: general_dilatation, general_force, general_energy, crushed, mark_slot
 
   !> Squared length, over the undeformed one, below which a bond is crushed to a point and has no
   !> direction but that of rounding: it pulls nowhere, rather than anywhere or NaN.

@@ -16,11 +16,12 @@ module pd_force_lattice
   use pd_base_kinds, only: wp, sp, i1, i8
   use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends, lanes, &
     & word_bits
-  use pd_force_fast, only: fast_limit, fast_dilatation_1, fast_dilatation_2, fast_dilatation_3, &
+  use pd_force_fast, only: fast_dilatation_1, fast_dilatation_2, fast_dilatation_3, &
     & fast_force_1, fast_force_2, fast_force_3, mixed_dilatation_2, mixed_dilatation_3, &
     & mixed_force_2, mixed_force_3
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_model, only: model_type
+  use pd_force_polynomial, only: fast_limit, narrow, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
   use pd_force_weights, only: weights_now, half_of
   implicit none (type, external)
@@ -51,7 +52,7 @@ contains
     integer :: b, s, k, colour
 
     both = both_ends(family%dim)
-    limit = fast_limit(model, family%mixed)
+    limit = fast_limit(model, merge(single, narrow, family%mixed))
     !$omp parallel default(none) shared(family, model, u, p, strained, both, limit) &
     !$omp private(scratch, own, b, s, k, colour)
     call allocate_scratch(family, scratch)
@@ -104,7 +105,7 @@ contains
     integer :: b, c, s, k, colour
 
     both = both_ends(family%dim)
-    limit = fast_limit(model, family%mixed)
+    limit = fast_limit(model, merge(single, narrow, family%mixed))
     !$omp parallel default(none) shared(family, model, u, p, force, strained, both, limit) &
     !$omp private(scratch, own, b, c, s, k, colour)
     call allocate_scratch(family, scratch)

@@ -1,27 +1,45 @@
-!> The force loops of list families. The bonds of one point are worked through in stages on short
-!> arrays that stay in the first-level cache: each stage is one loop that vectorises, and a term the
-!> scene doesn't have is a stage that doesn't run.
+!> The passes over the bonds of list families, cluster by cluster. What a cluster needs beyond the
+!> simplest case (surface factors, several materials or spacings, exact volumes) is put into tables
+!> first; what the fast formulas do not serve (large strains, temperature, another dilatation) is
+!> computed by the general ones.
 module pd_force_list
-  use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_family_list, only: list_family_type
+  use pd_base_kinds, only: wp, i1, i8
+  use pd_family_clusters, only: lane_bit
+  use pd_family_list, only: list_family_type, at_volume, at_moved, at_p
+  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_exact
+  use pd_force_general, only: crushed, mark_slot
+  use pd_force_list_fast, only: list_dilatation_2, list_dilatation_3, tabled_dilatation_2, &
+    & tabled_dilatation_3, list_state_2, list_state_3, tabled_state_2, tabled_state_3, &
+    & list_bond_2, list_bond_3, tabled_bond_2, tabled_bond_3
   use pd_force_model, only: model_type
+  use pd_force_polynomial, only: fast_limit, narrow
   implicit none (type, external)
   private
   public :: list_dilatation, list_force, list_energy
 
-  !> Quantities of the bonds of one point.
-  type :: stage_type
-    real(wp), allocatable :: normal(:, :)     !! direction of the deformed bond (bond, dim)
-    real(wp), allocatable :: across(:, :)     !! squares of the undeformed direction (bond, dim)
-    real(wp), allocatable :: length(:)        !! |xi|
-    real(wp), allocatable :: stretch(:)       !! mechanical stretch
-    real(wp), allocatable :: lambda(:)        !! Lambda
-    real(wp), allocatable :: weight(:)        !! v_c V_j, 0 if broken
-    real(wp), allocatable :: factor(:)        !! Gd or Gb
-    real(wp), allocatable :: xi(:, :)         !! undeformed bond and V_j (4, bond)
-    real(wp), allocatable :: eta(:, :)        !! relative displacement and p_k + p_j (4, bond)
-  end type stage_type
+  !> What one cluster is worked with: one for each thread.
+  type :: work_type
+    integer :: cluster = 0
+    integer :: first = 1                       !! its first slot
+    integer :: n = 0                           !! its members
+    logical :: tabled = .false.                !! its weights are in the tables
+    real(wp) :: own(lanes, at_p) = 0.0_wp      !! what `at` has of its own slots
+    real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb vc V_j/|xi|, 0 where there is no
+                                               !! intact bond (lane, member)
+    real(wp), allocatable :: dilatation(:, :)  !! Gd vc V_j
+    real(wp), allocatable :: geometry(:, :)    !! 1/|xi|^2
+    real(wp) :: edge = 0.0_wp                  !! where vc reaches zero [m]
+    real(wp) :: per_spacing = 0.0_wp           !! slope of vc [1/m]
+    real(wp) :: q = 0.0_wp                     !! q_k + q_j
+  end type work_type
+
+  !> State of a cluster's bonds to one member by the general formulas.
+  type :: bonds_state_type
+    real(wp) :: stretch(lanes)    !! mechanical
+    real(wp) :: lambda(lanes)
+    real(wp) :: along(lanes, 3)   !! |xi|/|y| times the deformed bond [m]
+  end type bonds_state_type
 
 contains
 
@@ -33,27 +51,45 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
-    type(stage_type) :: stage
-    integer :: k, n
-    integer(i8) :: first
+    type(work_type) :: work
+    type(bonds_state_type) :: bonds
+    real(wp) :: limit, theta(lanes)
+    integer :: c, i, k, l
+    logical :: missed
 
+    limit = fast_limit(model, narrow)
     call gather_state(family, u)
-    !$omp parallel default(none) shared(family, model, p, strained) private(stage, k, n, first)
-    call allocate_stage(stage, family%most_bonds, model%dim)
-    !$omp do schedule(dynamic, 256)
-    do k = 1, family%n_slots
-      first = family%start(k)
-      n = int(family%start(k + 1) - first)
-      call deform(family, model, k, n, first, stage, strained)
-      call factors(model, n, family%neighbour(first:first + n - 1), k, &
-        & stage%across, model%D, stage%factor)
-      p(k) = model%materials(model%material(k))%p*model%materials(model%material(k))%t* &
-        & sum(stage%factor(:n)*stage%stretch(:n)*stage%lambda(:n)*stage%weight(:n))
+    !$omp parallel default(none) shared(family, model, p, strained, limit) &
+    !$omp private(work, bonds, theta, c, i, k, l, missed)
+    call begin_work(family, model, work)
+    !$omp do schedule(dynamic, 32)
+    do c = 1, size(family%large)
+      call take_up(family, model, c, work)
+      if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
+      missed = limit <= 0.0_wp
+      if (.not. missed) call fast_theta(family, work, limit, theta, missed)
+      family%large(c) = merge(1_i1, 0_i1, missed)
+      if (missed) then
+        if (.not. work%tabled) call fill_tables(family, model, work)
+        theta = 0.0_wp
+        do i = 1, work%n
+          call deform(family, model, work, i, bonds)
+          theta = theta + work%dilatation(:, i)*bonds%stretch*bonds%lambda
+          if (model%breaking) call mark(model, work, i, bonds%stretch, strained)
+        end do
+      end if
+      do l = 1, lanes
+        k = work%first + l - 1
+        associate (m => model%materials(model%material(k)))
+          p(k) = m%p*m%t*theta(l)
+        end associate
+      end do
     end do
     !$omp end parallel
   end subroutine list_dilatation
 
-  !> Force density of all slots (n_slots, dim) [N/m3] from displacements and the coefficients p.
+  !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
+  !> `list_dilatation` at the same displacements.
   subroutine list_force(family, model, u, p, force, strained)
     type(list_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
@@ -61,91 +97,127 @@ contains
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(inout), contiguous :: force(:, :)
     integer(i1), intent(inout), contiguous :: strained(:)
-    type(stage_type) :: stage
-    integer :: k, n, c, i
-    integer(i8) :: first
-    real(wp) :: q
+    type(work_type) :: work
+    type(bonds_state_type) :: bonds
+    real(wp) :: limit, f(lanes, 3), magnitude(lanes)
+    integer :: c, i, d, j
+    logical :: missed
 
+    limit = fast_limit(model, narrow)
     call gather_state(family, u, p)
-    !$omp parallel default(none) shared(family, model, force, strained) &
-    !$omp private(stage, k, n, c, i, first, q)
-    call allocate_stage(stage, family%most_bonds, model%dim)
-    !$omp do schedule(dynamic, 256)
-    do k = 1, family%n_slots
-      first = family%start(k)
-      n = int(family%start(k + 1) - first)
-      call deform(family, model, k, n, first, stage, strained)
-      associate (neighbour => family%neighbour(first:first + n - 1))
-        call factors(model, n, neighbour, k, stage%across, model%S, stage%factor)
-        if (size(model%materials) == 1) then
-          q = 2*model%materials(1)%q
-          stage%stretch(:n) = q*stage%factor(:n)*stage%stretch(:n)
-        else
-          q = model%materials(model%material(k))%q
-          do i = 1, n
-            stage%stretch(i) = (q + model%materials(model%material(neighbour(i)))%q) &
-              & *stage%factor(i)*stage%stretch(i)
+    !$omp parallel default(none) shared(family, model, force, strained, limit) &
+    !$omp private(work, bonds, f, magnitude, c, i, d, j, missed)
+    call begin_work(family, model, work)
+    !$omp do schedule(dynamic, 32)
+    do c = 1, size(family%large)
+      call take_up(family, model, c, work)
+      if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
+      missed = limit <= 0.0_wp
+      if (model%dilatation) missed = family%large(c) == 1_i1
+      if (.not. missed) call fast_pull(family, model%dilatation, work, limit, f, missed)
+      if (missed) then
+        if (.not. work%tabled) call fill_tables(family, model, work)
+        f = 0.0_wp
+        do i = 1, work%n
+          call deform(family, model, work, i, bonds)
+          magnitude = work%stretch(:, i)*bonds%stretch
+          if (model%dilatation) then
+            j = family%member(family%start(c) + i - 1)
+            magnitude = magnitude + (work%own(:, at_p) + family%at(at_p, j)) &
+              & *work%dilatation(:, i)*work%geometry(:, i)*bonds%lambda
+          end if
+          do d = 1, model%dim
+            f(:, d) = f(:, d) + magnitude*bonds%along(:, d)
           end do
-        end if
-        if (model%dilatation) then
-          call factors(model, n, neighbour, k, stage%across, model%D, stage%factor)
-          do i = 1, n
-            stage%stretch(i) = stage%stretch(i) &
-              & + stage%eta(4, i)*stage%factor(i)*stage%lambda(i)/stage%length(i)
-          end do
-        end if
-      end associate
-      do c = 1, model%dim
-        force(k, c) = sum(stage%stretch(:n)*stage%weight(:n)*stage%normal(:n, c))
+          if (model%breaking) call mark(model, work, i, bonds%stretch, strained)
+        end do
+      end if
+      do d = 1, model%dim
+        force(work%first:work%first + lanes - 1, d) = f(:, d)
       end do
     end do
     !$omp end parallel
   end subroutine list_force
 
   !> Strain energy density of all slots [J/m3].
-  subroutine list_energy(family, model, u, energy, strained)
+  subroutine list_energy(family, model, u, energy)
     type(list_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
-    integer(i1), intent(inout), contiguous :: strained(:)
-    type(stage_type) :: stage
-    integer :: k, n
-    integer(i8) :: first
+    type(work_type) :: work
+    type(bonds_state_type) :: bonds
+    real(wp) :: theta(lanes), stretches(lanes), share(lanes)
+    integer :: c, i, k, l
 
     call gather_state(family, u)
-    !$omp parallel default(none) shared(family, model, energy, strained) private(stage, k, n, first)
-    call allocate_stage(stage, family%most_bonds, model%dim)
-    !$omp do schedule(dynamic, 256)
-    do k = 1, family%n_slots
-      first = family%start(k)
-      n = int(family%start(k + 1) - first)
-      call deform(family, model, k, n, first, stage, strained)
-      associate (m => model%materials(model%material(k)), &
-        & neighbour => family%neighbour(first:first + n - 1))
-        call factors(model, n, neighbour, k, stage%across, model%S, stage%factor)
-        energy(k) = m%q/2*sum(stage%factor(:n)*stage%stretch(:n)**2*stage%length(:n) &
-          & *stage%weight(:n))
-        if (abs(m%a) > 0.0_wp) then
-          call factors(model, n, neighbour, k, stage%across, model%D, stage%factor)
-          energy(k) = energy(k) + m%a*(m%t*sum(stage%factor(:n)*stage%stretch(:n)*stage%lambda(:n) &
-            & *stage%weight(:n)))**2
-        end if
-      end associate
+    !$omp parallel default(none) shared(family, model, energy) &
+    !$omp private(work, bonds, theta, stretches, share, c, i, k, l)
+    call begin_work(family, model, work)
+    !$omp do schedule(dynamic, 32)
+    do c = 1, size(family%large)
+      call take_up(family, model, c, work)
+      if (.not. work%tabled) call fill_tables(family, model, work)
+      theta = 0.0_wp
+      stretches = 0.0_wp
+      do i = 1, work%n
+        call deform(family, model, work, i, bonds)
+        theta = theta + work%dilatation(:, i)*bonds%stretch*bonds%lambda
+        ! the tables hold q_k + q_j, the energy takes q_k/2 of the slot's own material
+        share = 0.25_wp
+        if (size(model%materials) > 1) call own_share(family, model, work, i, share)
+        stretches = stretches + share*work%stretch(:, i)*bonds%stretch**2/work%geometry(:, i)
+      end do
+      do l = 1, lanes
+        k = work%first + l - 1
+        associate (m => model%materials(model%material(k)))
+          energy(k) = stretches(l) + m%a*(m%t*theta(l))**2
+        end associate
+      end do
     end do
     !$omp end parallel
   end subroutine list_energy
 
-  pure subroutine allocate_stage(stage, n, dim)
-    type(stage_type), intent(out) :: stage
-    integer, intent(in) :: n, dim
-    allocate (stage%normal(n, dim), stage%across(n, dim), stage%length(n), stage%stretch(n), &
-      & stage%lambda(n), stage%weight(n), stage%factor(n), stage%xi(4, n), stage%eta(4, n))
-  end subroutine allocate_stage
+  ! ---------------------------------------------------------------- one cluster
+
+  !> Room for any cluster, and what is the same for all of them.
+  pure subroutine begin_work(family, model, work)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(work_type), intent(out) :: work
+
+    work%tabled = model%surface .or. size(model%materials) > 1 .or. .not. family%one_spacing &
+      & .or. family%rule%kind == volume_exact
+    allocate (work%stretch(lanes, family%most_members), work%dilatation(lanes, family%most_members), &
+      & work%geometry(lanes, family%most_members))
+    work%q = 2*model%materials(1)%q
+    work%per_spacing = 1/maxval(family%spacing)
+    work%edge = family%rule%delta + maxval(family%spacing)/2
+    ! so far away that vc is 1 everywhere
+    if (family%rule%kind == volume_none) work%edge = 3*work%edge
+  end subroutine begin_work
+
+  !> Turn to cluster `c`.
+  pure subroutine take_up(family, model, c, work)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: c
+    type(work_type), intent(inout) :: work
+    integer :: d, l
+
+    work%cluster = c
+    work%first = lanes*(c - 1) + 1
+    work%n = int(family%start(c + 1) - family%start(c))
+    do d = 1, at_p
+      do l = 1, lanes
+        work%own(l, d) = family%at(d, work%first + l - 1)
+      end do
+    end do
+    if (work%tabled) call fill_tables(family, model, work)
+  end subroutine take_up
 
   !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
-  !> then stands in one place, while gathering each component by itself is what the loops would wait
-  !> for.
+  !> then stands in one place.
   subroutine gather_state(family, u, p)
     type(list_family_type), intent(inout) :: family
     real(wp), intent(in), contiguous :: u(:, :)
@@ -155,174 +227,227 @@ contains
     !$omp parallel do schedule(static) default(none) shared(family, u, p) private(k, c)
     do k = 1, family%n_slots
       do c = 1, size(u, 2)
-        family%moved(c, k) = u(k, c)
+        family%at(at_moved + c, k) = u(k, c)
       end do
       if (.not. present(p)) cycle
-      if (size(p) > 0) family%moved(4, k) = p(k)
+      if (size(p) > 0) family%at(at_p, k) = p(k)
     end do
   end subroutine gather_state
 
-  !> Bond vectors, relative displacements and p_k + p_j of the bonds of slot `k`. Negating and
-  !> adding is what makes both ends of a bond see the same bits.
-  pure subroutine fetch(n, n_slots, neighbour, place, moved, k, xi, eta)
-    integer, intent(in) :: n, n_slots, k
-    integer(i4), intent(in) :: neighbour(n)
-    real(wp), intent(in) :: place(4, n_slots), moved(4, n_slots)
-    real(wp), intent(inout) :: xi(4, n), eta(4, n)
-    real(wp) :: own(4), own_moved(4)
-    integer :: i, j, c
+  !> theta of a cluster by the fast formulas.
+  subroutine fast_theta(family, work, limit, theta, missed)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(in) :: work
+    real(wp), intent(in) :: limit
+    real(wp), intent(out) :: theta(lanes)
+    logical, intent(out) :: missed
 
-    own = [-place(1, k), -place(2, k), -place(3, k), 0.0_wp]
-    own_moved = [-moved(1, k), -moved(2, k), -moved(3, k), moved(4, k)]
-    ! four components at a time, not the bonds: vectors of bonds would be gathered number by number
-    do i = 1, n
-      j = neighbour(i)
-      !$omp simd
-      do c = 1, 4
-        xi(c, i) = place(c, j) + own(c)
-        eta(c, i) = moved(c, j) + own_moved(c)
-      end do
-    end do
-  end subroutine fetch
+    associate (e => family%start(work%cluster), n => work%n)
+      associate (member => family%member(e:e + n - 1), intact => family%intact(e:e + n - 1))
+        if (family%dim == 3 .and. work%tabled) then
+          call tabled_dilatation_3(n, member, intact, family%at, work%own, work%dilatation, &
+            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
+        else if (family%dim == 3) then
+          call list_dilatation_3(n, member, intact, family%at, work%own, work%dilatation, &
+            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
+        else if (work%tabled) then
+          call tabled_dilatation_2(n, member, intact, family%at, work%own, work%dilatation, &
+            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
+        else
+          call list_dilatation_2(n, member, intact, family%at, work%own, work%dilatation, &
+            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
+        end if
+      end associate
+    end associate
+  end subroutine fast_theta
 
-  !> Geometry of the bonds of slot `k`: stretch, direction, Lambda and weight.
-  subroutine deform(family, model, k, n, first, stage, strained)
+  !> Forces of a cluster by the fast formulas; `state`: there is a dilatation.
+  subroutine fast_pull(family, state, work, limit, f, missed)
+    type(list_family_type), intent(in) :: family
+    logical, intent(in) :: state
+    type(work_type), intent(in) :: work
+    real(wp), intent(in) :: limit
+    real(wp), intent(out) :: f(lanes, 3)
+    logical, intent(out) :: missed
+
+    associate (e => family%start(work%cluster), n => work%n)
+      associate (member => family%member(e:e + n - 1), intact => family%intact(e:e + n - 1))
+        select case (merge(4, 0, family%dim == 3) + merge(2, 0, state) + merge(1, 0, work%tabled))
+        case (7)
+          call tabled_state_3(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case (6)
+          call list_state_3(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case (5)
+          call tabled_bond_3(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case (4)
+          call list_bond_3(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case (3)
+          call tabled_state_2(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case (2)
+          call list_state_2(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case (1)
+          call tabled_bond_2(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        case default
+          call list_bond_2(n, member, intact, family%at, work%own, work%stretch, &
+            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+        end select
+      end associate
+    end associate
+  end subroutine fast_pull
+
+  ! ---------------------------------------------------------------- tables
+
+  !> Weights of a cluster's bonds, for any rule, material and surface factor.
+  pure subroutine fill_tables(family, model, work)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    integer, intent(in) :: k, n
-    integer(i8), intent(in) :: first
-    type(stage_type), intent(inout) :: stage
-    integer(i1), intent(inout), contiguous :: strained(:)
-    real(wp) :: limit
-    integer :: i
+    type(work_type), intent(inout) :: work
+    real(wp), dimension(lanes) :: length, spacing, q, weight
+    real(wp) :: xi(lanes, 3)
+    integer(i8) :: e, b
+    integer :: i, j, d, l, last
 
-    associate (neighbour => family%neighbour(first:first + n - 1), &
-      & intact => family%intact(first:first + n - 1), most => family%most_bonds)
-      call fetch(n, family%n_slots, neighbour, family%place, family%moved, k, stage%xi, stage%eta)
-      ! constant dimensions, so that each has a loop of its own
-      select case (model%dim)
-      case (3)
-        call geometry_3(n, most, stage%xi, stage%eta, model%surface, stage%normal, stage%across, &
-          & stage%length, stage%stretch, stage%lambda)
-      case (2)
-        call geometry_2(n, most, stage%xi, stage%eta, model%surface, stage%normal, stage%across, &
-          & stage%length, stage%stretch, stage%lambda)
-      case default
-        call geometry_1(n, most, stage%xi, stage%eta, model%surface, stage%normal, stage%across, &
-          & stage%length, stage%stretch, stage%lambda)
-      end select
-      call weights(family, k, n, neighbour, intact, stage%length, stage%xi, stage%weight)
-      if (.not. model%projected) stage%lambda(:n) = 1.0_wp
-      if (model%thermal) then
-        do i = 1, n
-          stage%stretch(i) = stage%stretch(i) &
-            & - (model%expansion(k) + model%expansion(neighbour(i)))/2
+    last = work%first + lanes - 1
+    b = 0_i8
+    if (allocated(family%fraction)) b = family%first_bond(work%cluster)
+    do i = 1, work%n
+      e = family%start(work%cluster) + i - 1
+      j = family%member(e)
+      do d = 1, 3
+        xi(:, d) = family%at(d, j) - work%own(:, d)
+      end do
+      ! a lane that is no bond may be the member itself
+      where (iand(family%intact(e), lane_bit) == 0_i1) xi(:, 1) = work%edge
+      length = xi(:, 1)**2 + xi(:, 2)**2 + xi(:, 3)**2
+      work%geometry(:, i) = 1/length
+      length = sqrt(length)
+      weight = merge(family%at(at_volume, j), 0.0_wp, iand(family%intact(e), lane_bit) /= 0_i1)
+      select case (family%rule%kind)
+      case (volume_none)
+        continue
+      case (volume_exact)
+        do l = 1, lanes
+          if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
+          weight(l) = weight(l)*family%fraction(b)
+          b = b + 1
         end do
+      case default
+        spacing = family%spacing(j)
+        if (.not. family%one_spacing) spacing = (family%spacing(work%first:last) + spacing)/2
+        weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
+      end select
+      q = work%q
+      if (size(model%materials) > 1) q = model%materials(model%material(work%first:last))%q &
+        & + model%materials(model%material(j))%q
+      work%dilatation(:, i) = weight
+      work%stretch(:, i) = q*weight/length
+      if (model%surface) then
+        do d = 1, 3
+          xi(:, d) = xi(:, d)/length
+        end do
+        if (model%dilatation) work%dilatation(:, i) = weight*factor(model%D, xi, work%first, j)
+        work%stretch(:, i) = work%stretch(:, i)*factor(model%S, xi, work%first, j)
       end if
-      if (.not. model%breaking) return
-      ! marked a hair's breadth early, and by the smallest limit of all: what breaks is decided
-      ! elsewhere
-      strained(k) = 0_i1
-      if (model%critical(k) < 0.0_wp) return
-      limit = model%least_critical*(1 - 1.0e-9_wp)
-      if (any(stage%stretch(:n) > limit .and. intact == 1_i1)) strained(k) = 1_i1
-      if (.not. model%compression) return
-      if (model%compressed(k) == 1_i1 .and. any(-stage%stretch(:n) > limit .and. intact == 1_i1)) &
-        & strained(k) = 1_i1
-    end associate
+    end do
+  end subroutine fill_tables
+
+  !> Surface factors G = ( sum_alpha (n_alpha/g_alpha)^2 )^(-1/2) of a cluster's bonds to slot `j`
+  !> with g = (g_k + g_j)/2 of their ends (7.7), from `g` (n_slots, dim) and directions `n`.
+  pure function factor(g, n, first, j)
+    real(wp), intent(in) :: g(:, :)
+    real(wp), intent(in) :: n(lanes, 3)
+    integer, intent(in) :: first, j
+    real(wp) :: factor(lanes)
+    real(wp) :: s(lanes, 3)
+    integer :: d
+
+    s = 1.0_wp
+    do d = 1, size(g, 2)
+      s(:, d) = g(first:first + lanes - 1, d) + g(j, d)
+    end do
+    ! with a common denominator there is one division
+    factor = 0.5_wp*s(:, 1)*s(:, 2)*s(:, 3)/sqrt((n(:, 1)*s(:, 2)*s(:, 3))**2 &
+      & + (n(:, 2)*s(:, 1)*s(:, 3))**2 + (n(:, 3)*s(:, 1)*s(:, 2))**2)
+  end function factor
+
+  !> q_k/2 of the lanes' own materials over (q_k + q_j), halved.
+  pure subroutine own_share(family, model, work, i, share)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(work_type), intent(in) :: work
+    integer, intent(in) :: i
+    real(wp), intent(out) :: share(lanes)
+    integer :: l, j
+
+    j = family%member(family%start(work%cluster) + i - 1)
+    do l = 1, lanes
+      associate (q => model%materials(model%material(work%first + l - 1))%q)
+        share(l) = q/(2*(q + model%materials(model%material(j))%q))
+      end associate
+    end do
+  end subroutine own_share
+
+  ! ---------------------------------------------------------------- general formulas
+
+  !> State of a cluster's bonds to its `i`-th member.
+  pure subroutine deform(family, model, work, i, bonds)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(work_type), intent(in) :: work
+    integer, intent(in) :: i
+    type(bonds_state_type), intent(out) :: bonds
+    real(wp), dimension(lanes) :: x, e, y, xi, eta, r
+    integer :: j, d
+
+    j = family%member(family%start(work%cluster) + i - 1)
+    x = 0.0_wp
+    e = 0.0_wp
+    y = 0.0_wp
+    do d = 1, model%dim
+      xi = family%at(d, j) - work%own(:, d)
+      eta = family%at(at_moved + d, j) - work%own(:, at_moved + d)
+      x = x + xi*eta
+      e = e + eta**2
+      bonds%along(:, d) = xi + eta
+      y = y + bonds%along(:, d)**2
+    end do
+    x = work%geometry(:, i)*x
+    y = work%geometry(:, i)*y
+    bonds%stretch = (2*x + work%geometry(:, i)*e)/(1 + sqrt(y))
+    r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
+    bonds%lambda = (1 + x)*r
+    if (.not. model%projected) bonds%lambda = 1.0_wp
+    do d = 1, model%dim
+      bonds%along(:, d) = r*bonds%along(:, d)
+    end do
+    if (model%thermal) bonds%stretch = bonds%stretch &
+      & - (model%expansion(work%first:work%first + lanes - 1) + model%expansion(j))/2
   end subroutine deform
 
-  ! One text for all dimensions, code of its own for each: the dimension must be a constant where
-  ! the loops are compiled.
-
-  pure subroutine geometry_1(n, most, r, d, surface, normal, across, length, stretch, lambda)
-    integer, parameter :: dim = 1
-    include 'bond_geometry.inc'
-  end subroutine geometry_1
-
-  pure subroutine geometry_2(n, most, r, d, surface, normal, across, length, stretch, lambda)
-    integer, parameter :: dim = 2
-    include 'bond_geometry.inc'
-  end subroutine geometry_2
-
-  pure subroutine geometry_3(n, most, r, d, surface, normal, across, length, stretch, lambda)
-    integer, parameter :: dim = 3
-    include 'bond_geometry.inc'
-  end subroutine geometry_3
-
-  pure subroutine factors_1(n, most, n_slots, neighbour, k, across, g, factor)
-    integer, parameter :: dim = 1
-    include 'bond_factors.inc'
-  end subroutine factors_1
-
-  pure subroutine factors_2(n, most, n_slots, neighbour, k, across, g, factor)
-    integer, parameter :: dim = 2
-    include 'bond_factors.inc'
-  end subroutine factors_2
-
-  pure subroutine factors_3(n, most, n_slots, neighbour, k, across, g, factor)
-    integer, parameter :: dim = 3
-    include 'bond_factors.inc'
-  end subroutine factors_3
-
-  !> v_c V_j of n bonds, 0 for broken ones.
-  pure subroutine weights(family, k, n, neighbour, intact, length, xi, weight)
-    type(list_family_type), intent(in) :: family
-    integer, intent(in) :: k, n
-    integer(i4), intent(in) :: neighbour(n)
-    integer(i1), intent(in) :: intact(n)
-    real(wp), intent(in) :: length(n), xi(4, n)
-    real(wp), intent(inout) :: weight(n)
-    real(wp) :: spacing, edge, per_spacing
-    integer :: i
-
-    do i = 1, n
-      weight(i) = real(intact(i), wp)*xi(4, i)
-    end do
-    select case (family%rule%kind)
-    case (volume_none)
-      continue
-    case (volume_exact)
-      weight = weight*family%fraction(family%start(k):family%start(k) + n - 1)
-    case default
-      if (family%one_spacing) then
-        edge = family%rule%delta + family%spacing(k)/2
-        per_spacing = 1/family%spacing(k)
-        do i = 1, n
-          weight(i) = weight(i)*max(0.0_wp, min(1.0_wp, (edge - length(i))*per_spacing))
-        end do
-      else
-        do i = 1, n
-          spacing = (family%spacing(k) + family%spacing(neighbour(i)))/2
-          weight(i) = weight(i) &
-            & *max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length(i))/spacing))
-        end do
-      end if
-    end select
-  end subroutine weights
-
-  !> Surface factors G of n bonds from those of their ends (7.7); 1 without surface correction.
-  pure subroutine factors(model, n, neighbour, k, across, g, factor)
+  !> Mark the lanes whose intact bond to the `i`-th member is at its limit, a hair's breadth early
+  !> and by the smallest limit of all: what breaks is decided elsewhere.
+  pure subroutine mark(model, work, i, s, strained)
     type(model_type), intent(in) :: model
-    integer, intent(in) :: n
-    integer(i4), intent(in) :: neighbour(n)
-    integer, intent(in) :: k
-    real(wp), intent(in), contiguous :: across(:, :)
-    real(wp), allocatable, intent(in) :: g(:, :)
-    real(wp), intent(inout), contiguous :: factor(:)
+    type(work_type), intent(in) :: work
+    integer, intent(in) :: i
+    real(wp), intent(in) :: s(lanes)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    real(wp) :: limit
+    integer :: l
 
-    if (.not. model%surface) then
-      factor(:n) = 1.0_wp
-      return
-    end if
-    select case (model%dim)
-    case (3)
-      call factors_3(n, size(across, 1), size(g, 1), neighbour, k, across, g, factor)
-    case (2)
-      call factors_2(n, size(across, 1), size(g, 1), neighbour, k, across, g, factor)
-    case default
-      call factors_1(n, size(across, 1), size(g, 1), neighbour, k, across, g, factor)
-    end select
-  end subroutine factors
+    limit = model%least_critical*(1 - 1.0e-9_wp)
+    if (all(abs(s) <= limit)) return
+    do l = 1, lanes
+      if (work%stretch(l, i) <= 0.0_wp .or. abs(s(l)) <= limit) cycle
+      call mark_slot(model, int(work%first + l - 1, i8), s(l), strained)
+    end do
+  end subroutine mark
 
 end module pd_force_list

@@ -7,8 +7,8 @@ module pd_force_weights
   use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, &
     & both_ends, lanes, word_bits
   use pd_family_surface, only: bond_factor
-  use pd_force_fast, only: fast_limit
   use pd_force_model, only: model_type
+  use pd_force_polynomial, only: fast_limit, narrow, single
   implicit none (type, external)
   private
   public :: build_weights, block_weights, allocate_weights, weights_now, half_of
@@ -30,7 +30,7 @@ contains
     integer :: b, g, i, number
     logical :: is_new
 
-    if (fast_limit(model, family%mixed) <= 0.0_wp) call use_double(family)
+    if (fast_limit(model, merge(single, narrow, family%mixed)) <= 0.0_wp) call use_double(family)
     if (family%mixed) call allocate_singles(family, model)
     call column_keys(family, column)
     allocate (table(256))

@@ -352,7 +352,7 @@ contains
     integer :: k, c
 
     allocate (density(system%body%n_slots), mass(system%body%n_slots))
-    call energy_pass(system%family, system%model, system%state%u, density, system%strained)
+    call energy_pass(system%family, system%model, system%state%u, density)
     energies%strain = inner(density, system%body%volume)
     !$omp parallel do schedule(static) default(none) shared(system, v, density, mass) private(k, c)
     do k = 1, system%body%n_slots

@@ -471,7 +471,7 @@ contains
         call put_scalars(values)
       case default  ! energy_density
         allocate (values(system%body%n_slots))
-        call energy_pass(system%family, system%model, system%state%u, values, system%strained)
+        call energy_pass(system%family, system%model, system%state%u, values)
         call put_scalars(values)
       end select
       if (allocated(error)) return

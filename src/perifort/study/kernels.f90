@@ -247,8 +247,8 @@ contains
   !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. Where a bond is computed
   !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
   !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
-  !> loops: geometry 12d + 15, weight 4. Dilatation: sum 4. Force: magnitude 2, sums 3d, with a
-  !> dilatation 5 more.
+  !> loops: xi and eta 2d, |xi|^2, x and e 3(2d - 1), the rest of them and the weight 9, polynomial
+  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more.
   pure real(wp) function flops_of_bond(family, dilatation) result(flops)
     class(family_type), intent(in) :: family
     logical, intent(in) :: dilatation      !! there is a pass for it
@@ -257,8 +257,9 @@ contains
     d = family%dim
     select type (family)
     type is (list_family_type)
-      flops = (12*d + 15 + 4) + 2 + 3*d
-      if (dilatation) flops = flops + 5 + (12*d + 15 + 4) + 4
+      geometry = 2*d + 3*(2*d - 1) + 9 + 15
+      flops = geometry + 4 + 3*d
+      if (dilatation) flops = flops + 9 + geometry + 4
     type is (lattice_family_type)
       geometry = d + 2*(2*d - 1) + 3 + 15
       if (family%mixed) geometry = geometry + 2*d - 4
@@ -276,8 +277,8 @@ contains
   !> bits read by each pass, the marks written and read. Where loops add to both ends of a bond, the
   !> sums are set to zero and read, and p is made of theta in a loop of its own. In mixed precision
   !> u is split and p rounded, and sums for both ends are set, added to and read. Lists, by each
-  !> pass: number and flag of every bond, positions and volumes, spacings read, displacements
-  !> written and read once more where each point's stand together.
+  !> pass: number and bits of every cluster's members, and what a point has in one place, read and
+  !> written with the displacements in it, and read again by the loop.
   pure real(wp) function bytes_of_step(system) result(bytes)
     type(system_type), intent(in) :: system
     integer :: d, passes
@@ -291,7 +292,7 @@ contains
     if (system%model%breaking) bytes = bytes + 2*points
     select type (family => system%family)
     type is (list_family_type)
-      bytes = bytes + passes*(5*real(family%n_bonds, wp) + points*8*(4 + 4 + 4 + 1))
+      bytes = bytes + passes*(6*real(size(family%member), wp) + points*8*3*8)
       if (allocated(family%fraction)) bytes = bytes + passes*8*real(family%n_bonds, wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
@@ -315,7 +316,7 @@ contains
 
     points = real(kernel%points, wp)**kernel%dimension
     bytes = 400*points
-    if (kernel%family == 'list') bytes = bytes + 13*bonds(kernel%dimension)*points
+    if (kernel%family == 'list') bytes = bytes + 3*bonds(kernel%dimension)*points
   end function bytes_needed
 
 end module pd_study_kernels

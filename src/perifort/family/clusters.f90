@@ -1,0 +1,220 @@
+!> Clusters of neighbouring points, `lanes` of them, for list families: the order in which eight
+!> points that follow each other lie close together, and the points that some of the eight have as
+!> family members. Loops then work on eight bonds at a time, all with the same other end.
+module pd_family_clusters
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_family_cells, only: cells_type, sort_into_cells
+  use pd_family_offsets, only: lanes
+  implicit none (type, external)
+  private
+  public :: rows_type, order_in_rows, collect_members, lane_bit
+
+  !> The bit by which a lane is marked.
+  integer(i1), parameter :: lane_bit(lanes) = int([1, 2, 4, 8, 16, 32, 64, -128], i1)
+
+  !> Points in rows of cells along x. Every other row is walked backwards, so that the end of a row
+  !> and the beginning of the next lie side by side.
+  type :: rows_type
+    integer :: count(3) = 1                !! cells along each direction
+    real(wp) :: lower(3) = 0.0_wp          !! corner of the first cell [m]
+    real(wp) :: size(3) = 1.0_wp           !! edges of a cell [m]
+    integer(i4), allocatable :: first(:)   !! first point of each cell, in the order they are walked
+  end type rows_type
+
+contains
+
+  !> Sort the points `x` (n, dim) into rows of cells about `edge` [m] wide, along the rows by their
+  !> x. `order(i)` is the number of the point that becomes the i-th.
+  subroutine order_in_rows(x, edge, rows, order)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: edge
+    type(rows_type), intent(out) :: rows
+    integer(i4), allocatable, intent(out) :: order(:)
+    type(cells_type) :: cells
+    integer :: row, i, nx, at, n, length
+    logical :: backwards
+
+    call sort_into_cells(x, edge, cells)
+    rows%count = cells%count
+    rows%lower = cells%lower
+    rows%size = cells%size
+    nx = cells%count(1)
+    allocate (rows%first(size(cells%first)), order(size(x, 1)))
+    n = 0
+    do row = 0, product(cells%count)/nx - 1
+      backwards = is_backwards(row)
+      do i = 0, nx - 1
+        at = 1 + nx*row + merge(nx - 1 - i, i, backwards)
+        rows%first(1 + nx*row + i) = int(n + 1, i4)
+        length = cells%first(at + 1) - cells%first(at)
+        order(n + 1:n + length) = cells%order(cells%first(at):cells%first(at + 1) - 1)
+        call sort_along(x(:, 1), backwards, order(n + 1:n + length))
+        n = n + length
+      end do
+    end do
+    rows%first(size(rows%first)) = int(n + 1, i4)
+  end subroutine order_in_rows
+
+  !> Whether a row, counted from 0, is walked backwards.
+  pure logical function is_backwards(row)
+    integer, intent(in) :: row
+    is_backwards = mod(row, 2) == 1
+  end function is_backwards
+
+  !> Sort points by their x, falling if `backwards`; ties keep their order. A cell has few points.
+  pure subroutine sort_along(x, backwards, points)
+    real(wp), intent(in) :: x(:)
+    logical, intent(in) :: backwards
+    integer(i4), intent(inout) :: points(:)
+    integer(i4) :: point
+    integer :: i, j
+    real(wp) :: direction
+
+    direction = merge(-1.0_wp, 1.0_wp, backwards)
+    do i = 2, size(points)
+      point = points(i)
+      do j = i - 1, 1, -1
+        if (direction*x(points(j)) <= direction*x(point)) exit
+        points(j + 1) = points(j)
+      end do
+      points(j + 1) = point
+    end do
+  end subroutine sort_along
+
+  !> The members of all clusters of the points `x` (n, dim), which are in the order of `rows`: those of cluster c stand from `start(c)` to `start(c+1) - 1`, ascending, each with
+  !> the bits of the lanes whose family it is in. Two points are neighbours if they are no further
+  !> apart than the sum of their `half_reach` [m].
+  subroutine collect_members(x, half_reach, rows, start, member, bits)
+    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp), intent(in), contiguous :: half_reach(:)
+    type(rows_type), intent(in) :: rows
+    integer(i8), allocatable, intent(out) :: start(:)
+    integer(i4), allocatable, intent(out) :: member(:)
+    integer(i1), allocatable, intent(out) :: bits(:)
+    integer(i4) :: no_member(0)
+    integer(i1) :: no_bits(0)
+    real(wp) :: most
+    integer :: c, found
+
+    most = maxval(half_reach)
+    allocate (start((size(x, 1) + lanes - 1)/lanes + 1))
+    start(1) = 1_i8
+    ! searching twice, first to count, needs no room but that of the result
+    !$omp parallel do schedule(dynamic, 64) default(none) private(c, found, no_member, no_bits) &
+    !$omp shared(x, half_reach, rows, start, most)
+    do c = 1, size(start) - 1
+      call visit(x, half_reach, most, rows, c, found, no_member, no_bits)
+      start(c + 1) = found
+    end do
+    do c = 1, size(start) - 1
+      start(c + 1) = start(c) + start(c + 1)
+    end do
+    allocate (member(start(size(start)) - 1), bits(start(size(start)) - 1))
+    !$omp parallel do schedule(dynamic, 64) default(none) private(c, found) &
+    !$omp shared(x, half_reach, rows, start, member, bits, most)
+    do c = 1, size(start) - 1
+      call visit(x, half_reach, most, rows, c, found, member(start(c):start(c + 1) - 1), &
+        & bits(start(c):start(c + 1) - 1))
+    end do
+  end subroutine collect_members
+
+  !> Look through the cells around cluster `c`: the number of its members, and as many of them as
+  !> there is room for.
+  pure subroutine visit(x, half_reach, most, rows, c, found, member, bits)
+    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp), intent(in), contiguous :: half_reach(:)
+    real(wp), intent(in) :: most               !! largest half reach [m]
+    type(rows_type), intent(in) :: rows
+    integer, intent(in) :: c
+    integer, intent(out) :: found
+    integer(i4), intent(inout) :: member(:)
+    integer(i1), intent(inout) :: bits(:)
+    integer, parameter :: piece = 64
+    real(wp) :: code(piece), near
+    integer :: low(3), high(3), first, last, d, j, i, iy, iz, row, from, to
+
+    first = lanes*(c - 1) + 1
+    last = min(first + lanes - 1, size(x, 1))
+    near = maxval(half_reach(first:last)) + most
+    low = 0
+    high = 0
+    do d = 1, size(x, 2)
+      low(d) = cell_along(rows, d, minval(x(first:last, d)) - near)
+      high(d) = cell_along(rows, d, maxval(x(first:last, d)) + near)
+    end do
+    found = 0
+    do iz = low(3), high(3)
+      do iy = low(2), high(2)
+        row = iy + rows%count(2)*iz
+        from = 1 + rows%count(1)*row + low(1)
+        to = 1 + rows%count(1)*row + high(1)
+        if (is_backwards(row)) then
+          from = rows%count(1)*(row + 1) - high(1)
+          to = rows%count(1)*(row + 1) - low(1)
+        end if
+        do j = rows%first(from), rows%first(to + 1) - 1, piece
+          call compare(x, half_reach, first, last, j, min(j + piece, rows%first(to + 1)) - 1, code)
+          do i = 1, min(piece, rows%first(to + 1) - j)
+            if (code(i) <= 0.0_wp) cycle
+            found = found + 1
+            if (found > size(member)) cycle
+            member(found) = int(j + i - 1, i4)
+            ! the sign is the last bit
+            bits(found) = int(merge(code(i) - 256, code(i), code(i) > 127), i1)
+          end do
+        end do
+      end do
+    end do
+  end subroutine visit
+
+  !> The bits of the cluster's lanes `first:last` for each of the points `from:to`, as numbers.
+  pure subroutine compare(x, half_reach, first, last, from, to, code)
+    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp), intent(in), contiguous :: half_reach(:)
+    integer, intent(in) :: first, last, from, to
+    real(wp), intent(inout) :: code(:)
+    real(wp) :: d2, bit
+    integer :: k, j
+
+    code(:to - from + 1) = 0.0_wp
+    bit = 1.0_wp
+    do k = first, last
+      ! a constant number of dimensions, so that the loops over points are plain ones
+      select case (size(x, 2))
+      case (3)
+        !$omp simd private(d2)
+        do j = from, to
+          d2 = (x(j, 1) - x(k, 1))**2 + (x(j, 2) - x(k, 2))**2 + (x(j, 3) - x(k, 3))**2
+          code(j - from + 1) = code(j - from + 1) &
+            & + merge(bit, 0.0_wp, d2 <= (half_reach(k) + half_reach(j))**2)
+        end do
+      case (2)
+        !$omp simd private(d2)
+        do j = from, to
+          d2 = (x(j, 1) - x(k, 1))**2 + (x(j, 2) - x(k, 2))**2
+          code(j - from + 1) = code(j - from + 1) &
+            & + merge(bit, 0.0_wp, d2 <= (half_reach(k) + half_reach(j))**2)
+        end do
+      case default
+        !$omp simd private(d2)
+        do j = from, to
+          d2 = (x(j, 1) - x(k, 1))**2
+          code(j - from + 1) = code(j - from + 1) &
+            & + merge(bit, 0.0_wp, d2 <= (half_reach(k) + half_reach(j))**2)
+        end do
+      end select
+      ! a point is no member of its own family
+      if (k >= from .and. k <= to) code(k - from + 1) = code(k - from + 1) - bit
+      bit = 2*bit
+    end do
+  end subroutine compare
+
+  !> The cell of a coordinate along direction `d`, from 0; those outside are taken to the nearest.
+  pure integer function cell_along(rows, d, x) result(cell)
+    type(rows_type), intent(in) :: rows
+    integer, intent(in) :: d
+    real(wp), intent(in) :: x
+    cell = int(max(0.0_wp, min(real(rows%count(d) - 1, wp), (x - rows%lower(d))/rows%size(d))))
+  end function cell_along
+
+end module pd_family_clusters

@@ -1,0 +1,54 @@
+!> The stretch without a root, for the strains that bodies mostly have.
+!>
+!> With e = (2 xi.eta + eta.eta)/|xi|^2, the deformed length is |xi| sqrt(1 + e), the stretch
+!> s = sqrt(1 + e) - 1 and |xi|/|xi+eta| = r = 1/sqrt(1 + e). The force needs s r = 1 - r, which
+!> is e h(e) with a polynomial h in a range around 0: no root, no division, and no cancellation.
+!>
+!> h is 1/2 - 3/8 e + e^2 times the Chebyshev interpolation of the rest.
+module pd_force_polynomial
+  use pd_base_kinds, only: wp, sp
+  use pd_force_model, only: model_type
+  implicit none (type, external)
+  private
+  public :: fast_limit, fast_ranges, narrow, wide, single
+  public :: h0, h1, h2, h3, h4, h5, h6, h7
+  public :: w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11
+  public :: k0, k1, k2, k3, k4, k5
+
+  !> Ranges of e: the first is tried first; what is strained more gets more terms.
+  integer, parameter :: narrow = 1, wide = 2, single = 3
+  real(wp), parameter :: fast_ranges(3) = [0.02_wp, 0.1_wp, 0.1_wp]
+
+  !> |e| <= 0.02, relative error 3e-16.
+  real(wp), parameter :: h0 = 0.5_wp, h1 = -0.375_wp, h2 = 0.31250000000037114_wp, &
+    & h3 = -0.27343750000352559_wp, h4 = 0.24609373329889834_wp, h5 = -0.22558592163388049_wp, &
+    & h6 = 0.20958398402647260_wp, h7 = -0.19648637700069084_wp
+  !> |e| <= 0.1, relative error 6e-16.
+  real(wp), parameter :: w0 = 0.5_wp, w1 = -0.375_wp, w2 = 0.312500000000031_wp, &
+    & w3 = -0.27343750000002986_wp, w4 = 0.24609374984509869_wp, w5 = -0.22558593735061483_wp, &
+    & w6 = 0.20947278004973865_wp, w7 = -0.19638073462498234_wp, w8 = 0.18543599211183687_wp, &
+    & w9 = -0.1761636952783165_wp, w10 = 0.17212206067600017_wp, w11 = -0.1649739926009514_wp
+  !> |e| <= 0.1 in single precision, relative error 6e-8.
+  real(sp), parameter :: k0 = 0.5_sp, k1 = -0.375_sp, k2 = 0.3124973582_sp, &
+    & k3 = -0.273435023_sp, k4 = 0.2482048324_sp, k5 = -0.2275652827_sp
+
+contains
+
+  !> Bonds with |e| below this are served by the fast formulas of a range; 0: none.
+  pure real(wp) function fast_limit(model, range) result(limit)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: range
+    ! what single precision may miss of e: some roundings of eta/|xi| and of its square, both at
+    ! most 2 or so where the length hardly changes
+    real(wp), parameter :: roundings = 50*epsilon(1.0_sp)
+
+    limit = fast_ranges(range)
+    if (model%breaking) then
+      ! with the tensile limit s, |e| reaches (1 + s)^2 - 1; in compression 1 - (1 - s)^2 is less
+      limit = min(limit, model%least_critical*(2 - model%least_critical)*(1 - 1.0e-9_wp))
+      if (range == single) limit = max(0.0_wp, limit - roundings)
+    end if
+    if (model%thermal .or. (model%dilatation .and. .not. model%projected)) limit = 0.0_wp
+  end function fast_limit
+
+end module pd_force_polynomial
