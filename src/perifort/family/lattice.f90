@@ -66,7 +66,8 @@ module pd_family_lattice
     integer(i8), allocatable :: block(:)       !! first slot of each block
     type(slabs_type) :: slabs                  !! which blocks can be worked on at once
     integer(i4), allocatable :: weights(:)     !! which weights each block has; 0: made on the fly
-    integer(i1), allocatable :: large(:)       !! 1: the block is strained beyond the fast formula
+    integer(i1), allocatable :: served(:)      !! range of the fast formulas that served each block
+                                               !! in the last dilatation pass, 0: none
     type(weights_type), allocatable :: table(:)
     type(singles_type) :: singles              !! if mixed
   contains
@@ -352,7 +353,7 @@ contains
     integer(i8) :: k, n
     integer :: pass
 
-    if (allocated(family%block)) deallocate (family%block, family%weights, family%large)
+    if (allocated(family%block)) deallocate (family%block, family%weights, family%served)
     do pass = 1, 2
       n = 0_i8
       do k = 1, family%n_slots - family%block_length + 1, family%block_length
@@ -360,10 +361,10 @@ contains
         n = n + 1
         if (pass == 2) family%block(n) = k
       end do
-      if (pass == 1) allocate (family%block(n), family%weights(n), family%large(n))
+      if (pass == 1) allocate (family%block(n), family%weights(n), family%served(n))
     end do
     family%weights = 0_i4
-    family%large = 0_i1
+    family%served = 0_i1
     call find_slabs(family%grids, family%dim, family%block_length, family%block, family%slabs)
   end subroutine find_blocks
 

@@ -55,7 +55,8 @@ contains
     allocate (lost(size(slots)), source=0.0_wp)
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
-    !$omp parallel default(none) shared(body, family, model, u, slots, damage, lost, number, first) &
+    !$omp parallel default(none) &
+    !$omp shared(body, family, model, u, slots, damage, lost, number, first) &
     !$omp private(bonds, g, m, k, i, breaks)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 4)

@@ -74,14 +74,15 @@ contains
     end do
   end subroutine general_force
 
-  !> Strain energy density of one block, by the general formulas.
-  subroutine general_energy(model, weights, first, u, energy)
+  !> Sums of the bonds of the block at slot `first`, for its energy: (q_k + q_j) Gb s^2 |xi| vc V,
+  !> with q_k twice where materials differ, and Gd s Lambda vc V.
+  subroutine general_energy(model, weights, first, u, stretches, theta)
     type(model_type), intent(in) :: model
     type(weights_type), intent(in) :: weights
     integer(i8), intent(in) :: first
     real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: energy(:)
-    real(wp), dimension(lanes) :: s, lambda, r, theta, stretches
+    real(wp), intent(out) :: stretches(lanes), theta(lanes)
+    real(wp), dimension(lanes) :: s, lambda, r
     real(wp) :: along(lanes, 3)
     integer(i8) :: j
     integer :: m, l
@@ -101,11 +102,6 @@ contains
         end do
       end if
       stretches = stretches + weights%stretch(:, m)*s**2
-    end do
-    do l = 1, lanes
-      associate (mat => model%materials(model%material(first + l - 1)))
-        energy(first + l - 1) = stretches(l)/4 + mat%a*(mat%t*theta(l))**2
-      end associate
     end do
   end subroutine general_energy
 

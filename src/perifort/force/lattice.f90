@@ -16,12 +16,11 @@ module pd_force_lattice
   use pd_base_kinds, only: wp, sp, i1, i8
   use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends, lanes, &
     & word_bits
-  use pd_force_fast, only: fast_dilatation_1, fast_dilatation_2, fast_dilatation_3, &
-    & fast_force_1, fast_force_2, fast_force_3, mixed_dilatation_2, mixed_dilatation_3, &
-    & mixed_force_2, mixed_force_3
+  use pd_force_fast, only: fast_dilatation, fast_force, fast_energy, mixed_dilatation_2, &
+    & mixed_dilatation_3, mixed_force_2, mixed_force_3
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_model, only: model_type
-  use pd_force_polynomial, only: fast_limit, narrow, single
+  use pd_force_polynomial, only: fast_limit, narrow, wide, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
   use pd_force_weights, only: weights_now, half_of
   implicit none (type, external)
@@ -30,7 +29,8 @@ module pd_force_lattice
 
   !> Room of one thread.
   type :: scratch_type
-    real(wp), allocatable :: left(:, :)         !! weights of bonds that the fast loop left out
+    real(wp), allocatable :: left(:, :, :)      !! weights of bonds that the fast loops left out
+                                                !! (lane, offset, range)
     real(sp), allocatable :: single_left(:, :)  !! those of the loops in mixed precision
     type(weights_type) :: half                  !! half of a block's weights, in double precision
   end type scratch_type
@@ -38,7 +38,7 @@ module pd_force_lattice
 contains
 
   !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps
-  !> in `family%large` which blocks the fast formula doesn't serve.
+  !> in `family%served` which fast formulas serve each block.
   subroutine lattice_dilatation(family, model, u, p, strained)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
@@ -47,12 +47,12 @@ contains
     integer(i1), intent(inout), contiguous :: strained(:)
     type(scratch_type) :: scratch
     type(weights_type) :: own
-    real(wp) :: limit
+    real(wp) :: limit(2)
     logical :: both
     integer :: b, s, k, colour
 
     both = both_ends(family%dim)
-    limit = fast_limit(model, merge(single, narrow, family%mixed))
+    limit = fast_limits(family, model)
     !$omp parallel default(none) shared(family, model, u, p, strained, both, limit) &
     !$omp private(scratch, own, b, s, k, colour)
     call allocate_scratch(family, scratch)
@@ -100,12 +100,12 @@ contains
     integer(i1), intent(inout), contiguous :: strained(:)
     type(scratch_type) :: scratch
     type(weights_type) :: own
-    real(wp) :: limit
+    real(wp) :: limit(2)
     logical :: both
     integer :: b, c, s, k, colour
 
     both = both_ends(family%dim)
-    limit = fast_limit(model, merge(single, narrow, family%mixed))
+    limit = fast_limits(family, model)
     !$omp parallel default(none) shared(family, model, u, p, force, strained, both, limit) &
     !$omp private(scratch, own, b, c, s, k, colour)
     call allocate_scratch(family, scratch)
@@ -167,12 +167,29 @@ contains
     !$omp end parallel
   end subroutine lattice_energy
 
+  !> The strains up to which the fast formulas serve: those that are tried first and, where these
+  !> are left, the second; 0: none.
+  pure function fast_limits(family, model) result(limit)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp) :: limit(2)
+
+    limit = 0.0_wp
+    if (family%mixed) then
+      limit(1) = fast_limit(model, single)
+      return
+    end if
+    limit(1) = fast_limit(model, narrow)
+    ! where bonds break at strains so small that the first serve them all, there is no second
+    if (fast_limit(model, wide) > limit(1)) limit(2) = fast_limit(model, wide)
+  end function fast_limits
+
   !> Room of one thread for its blocks.
   pure subroutine allocate_scratch(family, scratch)
     type(lattice_family_type), intent(in) :: family
     type(scratch_type), intent(out) :: scratch
 
-    allocate (scratch%left(lanes, family%most_bonds))
+    allocate (scratch%left(lanes, family%most_bonds, 2))
     if (family%mixed) allocate (scratch%single_left(family%block_length, family%most_bonds))
   end subroutine allocate_scratch
 
@@ -235,7 +252,7 @@ contains
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     logical, intent(in) :: both
-    real(wp), intent(in) :: limit
+    real(wp), intent(in) :: limit(:)
     integer, intent(in) :: b
     type(weights_type), intent(in) :: weights
     type(scratch_type), intent(inout) :: scratch
@@ -243,31 +260,32 @@ contains
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first, last
-    integer :: n, l
+    integer :: n, l, served
     logical :: missed
 
     first = family%block(b)
     last = first + family%block_length - 1
     n = weights%n
     if (both) n = weights%n_forward
-    missed = limit <= 0.0_wp
+    served = narrow
+    missed = limit(1) <= 0.0_wp
     if (family%mixed) then
-      call mixed_dilatation(family, n, limit, weights, first, p, scratch%single_left, missed)
+      call mixed_dilatation(family, n, limit(1), weights, first, p, scratch%single_left, missed)
     else if (.not. missed) then
-      ! constant dimensions, so that each has code of its own
-      select case (family%dim)
-      case (3)
-        call fast_dilatation_3(n, weights%dilatation, weights%shift, weights%geometry, first, &
-          & family%n_slots, u, u, limit, p, scratch%left, missed)
-      case (2)
-        call fast_dilatation_2(n, weights%dilatation, weights%shift, weights%geometry, first, &
-          & family%n_slots, u, u, limit, p, scratch%left, missed)
-      case default
-        call fast_dilatation_1(n, weights%dilatation, weights%shift, weights%geometry, first, &
-          & family%n_slots, u, u, limit, p, scratch%left, missed)
-      end select
+      call fast_dilatation(family%dim, narrow, n, weights%dilatation, weights%shift, &
+        & weights%geometry, first, u, limit(1), p, scratch%left(:, :, 1), missed)
+      if (missed .and. limit(2) > 0.0_wp) then
+        served = wide
+        if (both) then
+          call fast_dilatation(family%dim, wide, n, scratch%left(:, :, 1), weights%shift, &
+            & weights%geometry, first, u, limit(2), p, scratch%left(:, :, 2), missed)
+        else
+          call fast_dilatation(family%dim, wide, n, weights%dilatation, weights%shift, &
+            & weights%geometry, first, u, limit(2), p, scratch%left(:, :, 2), missed)
+        end if
+      end if
     end if
-    family%large(b) = merge(1_i1, 0_i1, missed)
+    family%served(b) = int(merge(0, served, missed), i1)
     if (missed) then
       if (.not. both) p(first:last) = 0.0_wp
       if (family%mixed) then
@@ -278,8 +296,9 @@ contains
           call general_dilatation(model, both, n, scratch%half, scratch%half%dilatation, &
             & first + l, u, p, strained)
         end do
-      else if (both .and. limit > 0.0_wp) then
-        call general_dilatation(model, both, n, weights, scratch%left, first, u, p, strained)
+      else if (both .and. limit(1) > 0.0_wp) then
+        call general_dilatation(model, both, n, weights, scratch%left(:, :, served), first, u, p, &
+          & strained)
       else
         call general_dilatation(model, both, n, weights, weights%dilatation, first, u, p, strained)
       end if
@@ -323,7 +342,7 @@ contains
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     logical, intent(in) :: both
-    real(wp), intent(in) :: limit
+    real(wp), intent(in) :: limit(:)
     integer, intent(in) :: b
     type(weights_type), intent(in) :: weights
     type(scratch_type), intent(inout) :: scratch
@@ -331,30 +350,38 @@ contains
     real(wp), intent(in), contiguous :: u(:, :), p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first
-    integer :: n, l
+    integer :: n, l, served
     logical :: fast, missed
 
     first = family%block(b)
     n = weights%n
     if (both) n = weights%n_forward
-    fast = limit > 0.0_wp
-    if (model%dilatation) fast = family%large(b) == 0_i1
+    fast = limit(1) > 0.0_wp
+    served = narrow
+    if (model%dilatation) then
+      fast = family%served(b) > 0_i1
+      served = int(family%served(b))
+    end if
     missed = .not. fast
     if (fast .and. family%mixed) then
-      call mixed_force(family, model%dilatation, n, limit, weights, first, force, &
+      call mixed_force(family, model%dilatation, n, limit(1), weights, first, force, &
         & scratch%single_left, missed)
     else if (fast) then
-      select case (family%dim)
-      case (3)
-        call fast_force_3(model%dilatation, n, weights%dilatation, weights%stretch, weights%shift, &
-          & weights%geometry, first, family%n_slots, u, u, p, limit, force, scratch%left, missed)
-      case (2)
-        call fast_force_2(model%dilatation, n, weights%dilatation, weights%stretch, weights%shift, &
-          & weights%geometry, first, family%n_slots, u, u, p, limit, force, scratch%left, missed)
-      case default
-        call fast_force_1(model%dilatation, n, weights%dilatation, weights%stretch, weights%shift, &
-          & weights%geometry, first, family%n_slots, u, u, p, limit, force, scratch%left, missed)
-      end select
+      call fast_force(family%dim, served, model%dilatation, n, weights%dilatation, &
+        & weights%stretch, weights%shift, weights%geometry, first, u, p, limit(1), force, &
+        & scratch%left(:, :, 1), missed)
+      if (missed .and. limit(2) > 0.0_wp) then
+        served = wide
+        if (both) then
+          call fast_force(family%dim, wide, .false., n, weights%dilatation, scratch%left(:, :, 1), &
+            & weights%shift, weights%geometry, first, u, p, limit(2), force, &
+            & scratch%left(:, :, 2), missed)
+        else
+          call fast_force(family%dim, wide, .false., n, weights%dilatation, weights%stretch, &
+            & weights%shift, weights%geometry, first, u, p, limit(2), force, &
+            & scratch%left(:, :, 2), missed)
+        end if
+      end if
     end if
     if (.not. missed) return
     if (.not. both) force(first:first + family%block_length - 1, :) = 0.0_wp
@@ -366,7 +393,8 @@ contains
           & force, strained)
       end do
     else if (both .and. fast) then
-      call general_force(model, both, n, weights, scratch%left, first, u, p, force, strained)
+      call general_force(model, both, n, weights, scratch%left(:, :, served), first, u, p, force, &
+        & strained)
     else
       call general_force(model, both, n, weights, weights%stretch, first, u, p, force, strained)
     end if
@@ -410,13 +438,37 @@ contains
     integer :: l
 
     if (.not. family%mixed) then
-      call general_energy(model, weights, family%block(b), u, energy)
+      call energy_of_lanes(model, weights, family%block(b), u, energy)
       return
     end if
     do l = 0, family%block_length - lanes, lanes
       call half_of(family, weights, l, half)
-      call general_energy(model, half, family%block(b) + l, u, energy)
+      call energy_of_lanes(model, half, family%block(b) + l, u, energy)
     end do
   end subroutine energy_of_block
+
+  !> Strain energy density of `lanes` slots from `first` on.
+  subroutine energy_of_lanes(model, weights, first, u, energy)
+    type(model_type), intent(in) :: model
+    type(weights_type), intent(in) :: weights
+    integer(i8), intent(in) :: first
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    real(wp) :: stretches(lanes), theta(lanes)
+    integer :: l
+
+    if (size(model%materials) > 1 .or. model%thermal .or. &
+      & (model%dilatation .and. .not. model%projected)) then
+      call general_energy(model, weights, first, u, stretches, theta)
+    else
+      call fast_energy(model%dim, model%dilatation, weights%n, weights%dilatation, &
+        & weights%stretch, weights%shift, weights%geometry, first, u, stretches, theta)
+    end if
+    do l = 1, lanes
+      associate (m => model%materials(model%material(first + l - 1)))
+        energy(first + l - 1) = stretches(l)/4 + m%a*(m%t*theta(l))**2
+      end associate
+    end do
+  end subroutine energy_of_lanes
 
 end module pd_force_lattice

@@ -188,8 +188,9 @@ contains
 
     work%tabled = model%surface .or. size(model%materials) > 1 .or. .not. family%one_spacing &
       & .or. family%rule%kind == volume_exact
-    allocate (work%stretch(lanes, family%most_members), work%dilatation(lanes, family%most_members), &
-      & work%geometry(lanes, family%most_members))
+    associate (n => family%most_members)
+      allocate (work%stretch(lanes, n), work%dilatation(lanes, n), work%geometry(lanes, n))
+    end associate
     work%q = 2*model%materials(1)%q
     work%per_spacing = 1/maxval(family%spacing)
     work%edge = family%rule%delta + maxval(family%spacing)/2
