@@ -2,8 +2,9 @@
 !>
 !>     perifort-test [--short] [--except=SUITE,SUITE] [SUITE [TEST]]
 !>
-!> `--short` leaves out the tests whose name begins with `long`, `--except` whole suites. The last line
-!> is always `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such test.
+!> `--short` leaves out the tests whose name begins with `long`, `--except` whole suites. The last
+!> line is always `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such
+!> test or suite.
 program main
   use, intrinsic :: iso_fortran_env, only: output_unit, int64, real64
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
