@@ -1,4 +1,5 @@
 !> Does the search for data races work here? With an argument this program has one, without it none.
+!> Each thread has its part of the racing loop, so that it is found on a single processor too.
 program race_probe
   implicit none (type, external)
   integer :: i, total, number(1000)
@@ -7,13 +8,13 @@ program race_probe
   race = command_argument_count() > 0
   total = 0
   !$omp parallel default(none) shared(number, race, total)
-  !$omp do schedule(dynamic)
+  !$omp do schedule(static)
   do i = 1, size(number)
     number(i) = i
     if (race) total = total + i
   end do
   !$omp end do
-  !$omp do schedule(static) reduction(+:total)
+  !$omp do schedule(dynamic) reduction(+:total)
   do i = 1, size(number)
     total = total + number(size(number) + 1 - i)
   end do

@@ -36,6 +36,7 @@ module force_subjects
     integer :: dim = 1
     real(wp) :: poissons_ratio = 0.2_wp
     logical :: bond_based = .false.
+    logical :: dilatant = .false.            !! 1D: energy of dilatation beside that of stretches
     logical :: plane_strain = .false.
     logical :: projected = .true.
     logical :: surface = .false.
@@ -134,6 +135,7 @@ contains
         materials(i) = new_material(i*youngs_modulus, subject%poissons_ratio/i, 7850.0_wp, &
           & subject%dim, &
           & subject%plane_strain, depth(2), depth(1), delta, subject%bond_based)
+        if (subject%dilatant) call give_dilatation(delta, materials(i))
         materials(i)%expansion = 1.2e-5_wp*i
         if (subject%breaking) materials(i)%critical_stretch = 0.01_wp*i
         if (subject%breaking) materials(i)%break_in_compression = .true.
@@ -177,6 +179,14 @@ contains
     end associate
   end subroutine build
 
+  !> Classical constants leave no energy of dilatation in 1D; the force knows it (doc/theory.md, 2).
+  pure subroutine give_dilatation(delta, material)
+    real(wp), intent(in) :: delta
+    type(material_type), intent(inout) :: material
+    material%a = 0.3_wp*material%youngs_modulus
+    material%p = 2*material%a*material%d*delta
+  end subroutine give_dilatation
+
   !> Thickness in 2D, area in 1D.
   pure real(wp) function depth(dim)
     integer, intent(in) :: dim
@@ -185,8 +195,8 @@ contains
     if (dim == 1) depth = 3.0e-4_wp
   end function depth
 
-  !> The subjects: every dimension with every term alone and with all of them. `number` counts on
-  !> until `there` is false.
+  !> The subjects: every dimension with every term alone and with all of them, and a bar with energy
+  !> of dilatation. `number` counts on until `there` is false.
   subroutine subject_number(kind, number, subject, there)
     character(*), intent(in) :: kind
     integer, intent(in) :: number
@@ -194,9 +204,15 @@ contains
     logical, intent(out) :: there
     integer, parameter :: variants = 14
 
-    there = number <= 3*variants
+    there = number <= 3*variants + 1
     if (.not. there) return
     subject%kind = kind
+    if (number > 3*variants) then
+      subject%dim = 1
+      subject%dilatant = .true.
+      call build(subject)
+      return
+    end if
     subject%dim = 1 + (number - 1)/variants
     select case (mod(number - 1, variants) + 1)
     case (1); subject%bond_based = .true.

@@ -1,9 +1,10 @@
 !> Runs the tests: all of them, one suite, or one test.
 !>
-!>     perifort-test [--short] [SUITE [TEST]]
+!>     perifort-test [--short] [--except=SUITE,SUITE] [SUITE [TEST]]
 !>
-!> `--short` leaves out the tests whose name begins with `long`. The last line is always
-!> `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such test.
+!> `--short` leaves out the tests whose name begins with `long`, `--except` whole suites. The last
+!> line is always `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such
+!> test or suite.
 program main
   use, intrinsic :: iso_fortran_env, only: output_unit, int64, real64
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
@@ -74,8 +75,8 @@ program main
   type(testsuite_type) :: suites(100)
   integer :: known = 0, passed = 0, failed = 0, skipped = 0
   integer :: i
-  logical :: short
-  character(:), allocatable :: suite_name, test_name
+  logical :: short, left_out(100) = .false.
+  character(:), allocatable :: suite_name, test_name, except
 
   call register('base_clock', collect_base_clock)
   call register('base_checksum', collect_base_checksum)
@@ -139,21 +140,16 @@ program main
   call register('study_study', collect_study_study)
 
   call read_arguments()
+  call leave_out(except)
   if (len(suite_name) > 0) then
-    i = select_suite(suites(:known), suite_name)
-    if (i == 0) then
-      write (output_unit, '(3a)') 'no suite is called "', suite_name, '"; there are:'
-      write (output_unit, '(2x, a)') (suites(i)%name, i=1, known)
-      stop 2, quiet=.true.
-    end if
-    call run_suite(suites(i))
+    call run_suite(suites(suite_number(suite_name)))
     if (passed + failed + skipped == 0) then
       write (output_unit, '(a)') 'no test of this suite was chosen'
       stop 2, quiet=.true.
     end if
   else
     do i = 1, known
-      call run_suite(suites(i))
+      if (.not. left_out(i)) call run_suite(suites(i))
     end do
   end if
 
@@ -177,6 +173,7 @@ contains
     short = .false.
     suite_name = ''
     test_name = ''
+    except = ''
     do at = 1, command_argument_count()
       call get_command_argument(at, length=length)
       if (allocated(word)) deallocate (word)
@@ -184,6 +181,8 @@ contains
       call get_command_argument(at, word)
       if (word == '--short') then
         short = .true.
+      else if (index(word, '--except=') == 1) then
+        except = word(len('--except=') + 1:)
       else if (len(suite_name) == 0) then
         suite_name = word
       else
@@ -191,6 +190,30 @@ contains
       end if
     end do
   end subroutine read_arguments
+
+  !> Of a name that there is; another one ends the program.
+  integer function suite_number(name) result(number)
+    character(*), intent(in) :: name
+
+    number = select_suite(suites(:known), name)
+    if (number > 0) return
+    write (output_unit, '(3a)') 'no suite is called "', name, '"; there are:'
+    write (output_unit, '(2x, a)') (suites(i)%name, i=1, known)
+    stop 2, quiet=.true.
+  end function suite_number
+
+  !> Names with commas between them.
+  subroutine leave_out(names)
+    character(*), intent(in) :: names
+    integer :: first, length
+
+    first = 1
+    do while (first <= len(names))
+      length = index(names(first:)//',', ',') - 1
+      left_out(suite_number(names(first:first + length - 1))) = .true.
+      first = first + length + 1
+    end do
+  end subroutine leave_out
 
   !> One test at a time and never in parallel: tests set thread numbers, and HDF5 is not reentrant.
   subroutine run_suite(suite)

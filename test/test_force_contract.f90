@@ -84,7 +84,7 @@ contains
         end do
         if (allocated(error)) return
       end do
-      call expect_true(error, number > 40, 'too few subjects')
+      call expect_true(error, number > 43, 'too few subjects')
     end do
   end subroutine test_reference
 

@@ -282,6 +282,7 @@ contains
     call expect_same_results(error, 'whole', 'pieces', 6)
   end subroutine test_crack
 
+  !> The whole on two threads, pieces on one: the steps of all rules have loops of their own.
   subroutine test_integrators(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: names(4) = [character(16) :: 'velocity_verlet', 'adams_bashforth', &
@@ -296,7 +297,7 @@ contains
     do i = 1, size(names)
       if (allocated(error)) return
       scene%time%integrator = names(i)
-      call run(scene, 'whole', fault)
+      call run(scene, 'whole', fault, threads=2)
       call accept(error, fault)
       call expect_broken(error, 'whole')
       if (allocated(error)) return

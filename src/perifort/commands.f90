@@ -1,13 +1,12 @@
 !> The commands of the program: each a few lines that call what does the work.
 module pd_commands
   use, intrinsic :: iso_fortran_env, only: output_unit
-  use hdf5, only: h5get_libversion_f
   use pd_base_error, only: error_type, fail, status_usage
-  use pd_base_text, only: to_text
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
   use pd_driver, only: check_scene, run_options_type, run_scene
+  use pd_output_hdf5, only: hdf5_version
   use pd_scene_read, only: read_scene
   use pd_scene_reference, only: write_reference
   use pd_scene_template, only: write_template
@@ -18,7 +17,7 @@ module pd_commands
   use pd_study_study, only: run_study
   implicit none (type, external)
   private
-  public :: execute, hdf5_version
+  public :: execute
 
 contains
 
@@ -83,15 +82,5 @@ contains
     write (output_unit, '(2a)') 'flags     ', compiler_flags()
     write (output_unit, '(2a)') 'HDF5      ', hdf5_version()
   end subroutine write_version
-
-  !> The version of the HDF5 library in use, as `1.10.8`.
-  function hdf5_version() result(text)
-    character(:), allocatable :: text
-    integer :: major, minor, release, status
-
-    call h5get_libversion_f(major, minor, release, status)
-    text = 'unknown'
-    if (status == 0) text = to_text(major)//'.'//to_text(minor)//'.'//to_text(release)
-  end function hdf5_version
 
 end module pd_commands

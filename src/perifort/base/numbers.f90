@@ -3,29 +3,13 @@ module pd_base_numbers
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: pi, total, inner, block_length, noise, ascending, median
+  public :: pi, inner, block_length, noise, ascending, median
 
   real(wp), parameter :: pi = acos(-1.0_wp)
   !> Terms in one partial sum: the blocks are fixed, so the sum's rounding is too.
   integer, parameter :: block_length = 4096
 
 contains
-
-  !> Sum of `values` in blocks of fixed length, added in order.
-  function total(values) result(sum_of_all)
-    real(wp), intent(in), contiguous :: values(:)
-    real(wp) :: sum_of_all
-    real(wp), allocatable :: part(:)
-    integer :: block, blocks
-
-    blocks = (size(values) + block_length - 1)/block_length
-    allocate (part(blocks))
-    !$omp parallel do schedule(static) default(none) shared(blocks, part, values) private(block)
-    do block = 1, blocks
-      part(block) = sum(values((block - 1)*block_length + 1:min(block*block_length, size(values))))
-    end do
-    sum_of_all = sum(part)
-  end function total
 
   !> Sum of `a*b` in blocks of fixed length, added in order.
   function inner(a, b) result(sum_of_all)

@@ -35,7 +35,6 @@ module pd_output_layout
     procedure :: trim_time_series
     procedure :: field_bytes
     procedure :: output_bytes
-    procedure :: planned_bytes
     procedure :: fixed_bytes
   end type layout_type
 
@@ -254,13 +253,6 @@ contains
       output_bytes = output_bytes + self%points*field_bytes(self, i)
     end do
   end function output_bytes
-
-  !> Bytes that the file will have when all that was planned is written, within some kilobytes.
-  pure integer(i8) function planned_bytes(self)
-    class(layout_type), intent(in) :: self
-
-    planned_bytes = fixed_bytes(self) + self%capacity*output_bytes(self)
-  end function planned_bytes
 
   !> Bytes written before the first output, within some kilobytes.
   pure integer(i8) function fixed_bytes(self)

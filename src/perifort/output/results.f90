@@ -68,8 +68,6 @@ module pd_output_results
     procedure :: sync
     procedure :: kept => rows_and_times
     procedure :: goes_on
-    procedure :: planned_bytes
-    procedure :: output_count
   end type results_type
 
 contains
@@ -510,21 +508,5 @@ contains
     end if
     if (complete .and. .not. allocated(error)) call mark_complete(self%directory, self%stem)
   end subroutine close_results
-
-  !> Bytes that all planned outputs and rows take, within some kilobytes.
-  pure integer(i8) function planned_bytes(self)
-    class(results_type), intent(in) :: self
-
-    planned_bytes = 0
-    if (self%use_vtkhdf) planned_bytes = self%vtkhdf%planned_bytes()
-    if (self%use_vtu) planned_bytes = planned_bytes &
-      & + max(1, self%planned_outputs)*self%vtu%output_bytes()
-  end function planned_bytes
-
-  !> Complete outputs so far.
-  pure integer function output_count(self)
-    class(results_type), intent(in) :: self
-    output_count = self%outputs
-  end function output_count
 
 end module pd_output_results

@@ -53,7 +53,6 @@ module pd_output_vtkhdf
     procedure :: finish
     procedure :: leave
     procedure :: abandon
-    procedure :: planned_bytes
     procedure :: output_bytes
     procedure :: layout_bytes
   end type vtkhdf_file
@@ -502,12 +501,6 @@ contains
     class(vtkhdf_file), intent(in) :: self
     output_bytes = self%layout%output_bytes()
   end function output_bytes
-
-  !> Bytes that the file will have when all that was planned is written, within some kilobytes.
-  pure integer(i8) function planned_bytes(self)
-    class(vtkhdf_file), intent(in) :: self
-    planned_bytes = self%layout%planned_bytes()
-  end function planned_bytes
 
   !> Bytes that are written before the first output.
   pure integer(i8) function layout_bytes(self)
