@@ -24,18 +24,18 @@ contains
   !> Add theta, the sums of Gd s Lambda vc V, of the `n` first offsets' bonds of the block at slot
   !> `first` (2D, 1D: set it) in double precision. `missed`: some bonds are strained beyond `limit`;
   !> in 3D those were left out, and `left` has their weights, in 2D and 1D what was set is wrong.
-  subroutine fast_dilatation(dim, range, n, weight, shift, geometry, first, u, limit, theta, left, &
-    & missed)
+  !> Extents are explicit, here and below, since a call for few bonds would spend its time on
+  !> describing arrays.
+  subroutine fast_dilatation(dim, range, n, m, weight, shift, geometry, first, u, limit, theta, &
+    & left, missed)
     integer, intent(in) :: dim, range, n
-    real(wp), intent(in), contiguous :: weight(:, :), geometry(:, :), u(:, :)
-    integer(i8), intent(in), contiguous :: shift(:)
-    integer(i8), intent(in) :: first
+    integer, intent(in) :: m  !! number of slots
+    real(wp), intent(in) :: weight(lanes, n), geometry(4, n), u(m, dim)
+    integer(i8), intent(in) :: shift(n), first
     real(wp), intent(in) :: limit
-    real(wp), intent(inout), contiguous :: theta(:), left(:, :)
+    real(wp), intent(inout) :: theta(m), left(lanes, n)
     logical, intent(out) :: missed
-    integer :: m
 
-    m = size(u, 1)
     select case (10*range + dim)
     case (10*narrow + 3)
       call fast_dilatation_3(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
@@ -54,19 +54,16 @@ contains
 
   !> The same for forces. With a `dilatation` the pass before has looked at the strain, `missed` is
   !> false and `left` untouched.
-  subroutine fast_force(dim, range, dilatation, n, weight, stretch, shift, geometry, first, u, p, &
-    & limit, force, left, missed)
-    integer, intent(in) :: dim, range, n
+  subroutine fast_force(dim, range, dilatation, n, m, weight, stretch, shift, geometry, first, u, &
+    & p, limit, force, left, missed)
+    integer, intent(in) :: dim, range, n, m
     logical, intent(in) :: dilatation
-    real(wp), intent(in), contiguous :: weight(:, :), stretch(:, :), geometry(:, :), u(:, :), p(:)
-    integer(i8), intent(in), contiguous :: shift(:)
-    integer(i8), intent(in) :: first
+    real(wp), intent(in) :: weight(lanes, *), stretch(lanes, n), geometry(4, n), u(m, dim), p(*)
+    integer(i8), intent(in) :: shift(n), first
     real(wp), intent(in) :: limit
-    real(wp), intent(inout), contiguous :: force(:, :), left(:, :)
+    real(wp), intent(inout) :: force(m, dim), left(lanes, n)
     logical, intent(out) :: missed
-    integer :: m
 
-    m = size(u, 1)
     select case (10*range + dim)
     case (10*narrow + 3)
       call fast_force_3(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
@@ -91,24 +88,23 @@ contains
 
   !> Sums of the bonds of the block at slot `first`, for its energy: (q_k + q_j) Gb s^2 |xi| vc V
   !> and, with a `dilatation`, Gd s Lambda vc V. For any strain, without temperature, projected.
-  subroutine fast_energy(dim, dilatation, n, weight, stretch, shift, geometry, first, u, &
+  subroutine fast_energy(dim, dilatation, n, m, weight, stretch, shift, geometry, first, u, &
     & stretches, theta)
-    integer, intent(in) :: dim, n
+    integer, intent(in) :: dim, n, m
     logical, intent(in) :: dilatation
-    real(wp), intent(in), contiguous :: weight(:, :), stretch(:, :), geometry(:, :), u(:, :)
-    integer(i8), intent(in), contiguous :: shift(:)
-    integer(i8), intent(in) :: first
+    real(wp), intent(in) :: weight(lanes, *), stretch(lanes, n), geometry(4, n), u(m, dim)
+    integer(i8), intent(in) :: shift(n), first
     real(wp), intent(out) :: stretches(lanes), theta(lanes)
 
     select case (dim)
     case (3)
-      call fast_energy_3(dilatation, n, weight, stretch, shift, geometry, first, size(u, 1), u, &
+      call fast_energy_3(dilatation, n, weight, stretch, shift, geometry, first, m, u, &
         & stretches, theta)
     case (2)
-      call fast_energy_2(dilatation, n, weight, stretch, shift, geometry, first, size(u, 1), u, &
+      call fast_energy_2(dilatation, n, weight, stretch, shift, geometry, first, m, u, &
         & stretches, theta)
     case default
-      call fast_energy_1(dilatation, n, weight, stretch, shift, geometry, first, size(u, 1), u, &
+      call fast_energy_1(dilatation, n, weight, stretch, shift, geometry, first, m, u, &
         & stretches, theta)
     end select
   end subroutine fast_energy

@@ -272,18 +272,20 @@ contains
     if (family%mixed) then
       call mixed_dilatation(family, n, limit(1), weights, first, p, scratch%single_left, missed)
     else if (.not. missed) then
-      call fast_dilatation(family%dim, narrow, n, weights%dilatation, weights%shift, &
-        & weights%geometry, first, u, limit(1), p, scratch%left(:, :, 1), missed)
-      if (missed .and. limit(2) > 0.0_wp) then
-        served = wide
-        if (both) then
-          call fast_dilatation(family%dim, wide, n, scratch%left(:, :, 1), weights%shift, &
-            & weights%geometry, first, u, limit(2), p, scratch%left(:, :, 2), missed)
-        else
-          call fast_dilatation(family%dim, wide, n, weights%dilatation, weights%shift, &
-            & weights%geometry, first, u, limit(2), p, scratch%left(:, :, 2), missed)
+      associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
+        call fast_dilatation(dim, narrow, n, m, w%dilatation, w%shift, w%geometry, first, u, &
+          & limit(1), p, left(:, :, 1), missed)
+        if (missed .and. limit(2) > 0.0_wp) then
+          served = wide
+          if (both) then
+            call fast_dilatation(dim, wide, n, m, left(:, :, 1), w%shift, w%geometry, first, u, &
+              & limit(2), p, left(:, :, 2), missed)
+          else
+            call fast_dilatation(dim, wide, n, m, w%dilatation, w%shift, w%geometry, first, u, &
+              & limit(2), p, left(:, :, 2), missed)
+          end if
         end if
-      end if
+      end associate
     end if
     family%served(b) = int(merge(0, served, missed), i1)
     if (missed) then
@@ -367,21 +369,20 @@ contains
       call mixed_force(family, model%dilatation, n, limit(1), weights, first, force, &
         & scratch%single_left, missed)
     else if (fast) then
-      call fast_force(family%dim, served, model%dilatation, n, weights%dilatation, &
-        & weights%stretch, weights%shift, weights%geometry, first, u, p, limit(1), force, &
-        & scratch%left(:, :, 1), missed)
-      if (missed .and. limit(2) > 0.0_wp) then
-        served = wide
-        if (both) then
-          call fast_force(family%dim, wide, .false., n, weights%dilatation, scratch%left(:, :, 1), &
-            & weights%shift, weights%geometry, first, u, p, limit(2), force, &
-            & scratch%left(:, :, 2), missed)
-        else
-          call fast_force(family%dim, wide, .false., n, weights%dilatation, weights%stretch, &
-            & weights%shift, weights%geometry, first, u, p, limit(2), force, &
-            & scratch%left(:, :, 2), missed)
+      associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
+        call fast_force(dim, served, model%dilatation, n, m, w%dilatation, w%stretch, w%shift, &
+          & w%geometry, first, u, p, limit(1), force, left(:, :, 1), missed)
+        if (missed .and. limit(2) > 0.0_wp) then
+          served = wide
+          if (both) then
+            call fast_force(dim, wide, .false., n, m, w%dilatation, left(:, :, 1), w%shift, &
+              & w%geometry, first, u, p, limit(2), force, left(:, :, 2), missed)
+          else
+            call fast_force(dim, wide, .false., n, m, w%dilatation, w%stretch, w%shift, &
+              & w%geometry, first, u, p, limit(2), force, left(:, :, 2), missed)
+          end if
         end if
-      end if
+      end associate
     end if
     if (.not. missed) return
     if (.not. both) force(first:first + family%block_length - 1, :) = 0.0_wp
@@ -461,8 +462,9 @@ contains
       & (model%dilatation .and. .not. model%projected)) then
       call general_energy(model, weights, first, u, stretches, theta)
     else
-      call fast_energy(model%dim, model%dilatation, weights%n, weights%dilatation, &
-        & weights%stretch, weights%shift, weights%geometry, first, u, stretches, theta)
+      call fast_energy(model%dim, model%dilatation, weights%n, size(u, 1), &
+        & weights%dilatation, weights%stretch, weights%shift, weights%geometry, first, u, &
+        & stretches, theta)
     end if
     do l = 1, lanes
       associate (m => model%materials(model%material(first + l - 1)))

@@ -8,38 +8,16 @@ module pd_force_list
   use pd_family_list, only: list_family_type, at_volume, at_moved, at_p
   use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_exact
-  use pd_force_general, only: crushed, mark_slot
+  use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: list_dilatation_2, list_dilatation_3, tabled_dilatation_2, &
     & tabled_dilatation_3, list_state_2, list_state_3, tabled_state_2, tabled_state_3, &
     & list_bond_2, list_bond_3, tabled_bond_2, tabled_bond_3
+  use pd_force_list_general, only: work_type, general_theta, general_force, general_energy
   use pd_force_model, only: model_type
   use pd_force_polynomial, only: fast_limit, narrow
   implicit none (type, external)
   private
   public :: list_dilatation, list_force, list_energy
-
-  !> What one cluster is worked with: one for each thread.
-  type :: work_type
-    integer :: cluster = 0
-    integer :: first = 1                       !! its first slot
-    integer :: n = 0                           !! its members
-    logical :: tabled = .false.                !! its weights are in the tables
-    real(wp) :: own(lanes, at_p) = 0.0_wp      !! what `at` has of its own slots
-    real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb vc V_j/|xi|, 0 where there is no
-                                               !! intact bond (lane, member)
-    real(wp), allocatable :: dilatation(:, :)  !! Gd vc V_j
-    real(wp), allocatable :: geometry(:, :)    !! 1/|xi|^2
-    real(wp) :: edge = 0.0_wp                  !! where vc reaches zero [m]
-    real(wp) :: per_spacing = 0.0_wp           !! slope of vc [1/m]
-    real(wp) :: q = 0.0_wp                     !! q_k + q_j
-  end type work_type
-
-  !> State of a cluster's bonds to one member by the general formulas.
-  type :: bonds_state_type
-    real(wp) :: stretch(lanes)    !! mechanical
-    real(wp) :: lambda(lanes)
-    real(wp) :: along(lanes, 3)   !! |xi|/|y| times the deformed bond [m]
-  end type bonds_state_type
 
 contains
 
@@ -52,31 +30,29 @@ contains
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     type(work_type) :: work
-    type(bonds_state_type) :: bonds
     real(wp) :: limit, theta(lanes)
-    integer :: c, i, k, l
+    integer :: c, k, l
     logical :: missed
 
     limit = fast_limit(model, narrow)
     call gather_state(family, u)
     !$omp parallel default(none) shared(family, model, p, strained, limit) &
-    !$omp private(work, bonds, theta, c, i, k, l, missed)
+    !$omp private(work, theta, c, k, l, missed)
     call begin_work(family, model, work)
     !$omp do schedule(dynamic, 32)
     do c = 1, size(family%large)
-      call take_up(family, model, c, work)
+      call take_up(family, c, work)
+      if (work%tabled) call fill_tables(family, model, work, own=.false.)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       missed = limit <= 0.0_wp
       if (.not. missed) call fast_theta(family, work, limit, theta, missed)
       family%large(c) = merge(1_i1, 0_i1, missed)
       if (missed) then
-        if (.not. work%tabled) call fill_tables(family, model, work)
-        theta = 0.0_wp
-        do i = 1, work%n
-          call deform(family, model, work, i, bonds)
-          theta = theta + work%dilatation(:, i)*bonds%stretch*bonds%lambda
-          if (model%breaking) call mark(model, work, i, bonds%stretch, strained)
-        end do
+        if (.not. work%tabled) call fill_tables(family, model, work, own=.false.)
+        associate (e => family%start(c))
+          call general_theta(model, work, family%member(e:e + work%n - 1), family%at, theta)
+        end associate
+        if (model%breaking) call mark(model, work, strained)
       end if
       do l = 1, lanes
         k = work%first + l - 1
@@ -98,39 +74,29 @@ contains
     real(wp), intent(inout), contiguous :: force(:, :)
     integer(i1), intent(inout), contiguous :: strained(:)
     type(work_type) :: work
-    type(bonds_state_type) :: bonds
-    real(wp) :: limit, f(lanes, 3), magnitude(lanes)
-    integer :: c, i, d, j
+    real(wp) :: limit, f(lanes, 3)
+    integer :: c, d
     logical :: missed
 
     limit = fast_limit(model, narrow)
     call gather_state(family, u, p)
     !$omp parallel default(none) shared(family, model, force, strained, limit) &
-    !$omp private(work, bonds, f, magnitude, c, i, d, j, missed)
+    !$omp private(work, f, c, d, missed)
     call begin_work(family, model, work)
     !$omp do schedule(dynamic, 32)
     do c = 1, size(family%large)
-      call take_up(family, model, c, work)
+      call take_up(family, c, work)
+      if (work%tabled) call fill_tables(family, model, work, own=.false.)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       missed = limit <= 0.0_wp
       if (model%dilatation) missed = family%large(c) == 1_i1
       if (.not. missed) call fast_pull(family, model%dilatation, work, limit, f, missed)
       if (missed) then
-        if (.not. work%tabled) call fill_tables(family, model, work)
-        f = 0.0_wp
-        do i = 1, work%n
-          call deform(family, model, work, i, bonds)
-          magnitude = work%stretch(:, i)*bonds%stretch
-          if (model%dilatation) then
-            j = family%member(family%start(c) + i - 1)
-            magnitude = magnitude + (work%own(:, at_p) + family%at(at_p, j)) &
-              & *work%dilatation(:, i)*work%geometry(:, i)*bonds%lambda
-          end if
-          do d = 1, model%dim
-            f(:, d) = f(:, d) + magnitude*bonds%along(:, d)
-          end do
-          if (model%breaking) call mark(model, work, i, bonds%stretch, strained)
-        end do
+        if (.not. work%tabled) call fill_tables(family, model, work, own=.false.)
+        associate (e => family%start(c))
+          call general_force(model, work, family%member(e:e + work%n - 1), family%at, f)
+        end associate
+        if (model%breaking) call mark(model, work, strained)
       end if
       do d = 1, model%dim
         force(work%first:work%first + lanes - 1, d) = f(:, d)
@@ -146,28 +112,21 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
     type(work_type) :: work
-    type(bonds_state_type) :: bonds
-    real(wp) :: theta(lanes), stretches(lanes), share(lanes)
-    integer :: c, i, k, l
+    real(wp) :: theta(lanes), stretches(lanes)
+    integer :: c, k, l
 
     call gather_state(family, u)
     !$omp parallel default(none) shared(family, model, energy) &
-    !$omp private(work, bonds, theta, stretches, share, c, i, k, l)
+    !$omp private(work, theta, stretches, c, k, l)
     call begin_work(family, model, work)
     !$omp do schedule(dynamic, 32)
     do c = 1, size(family%large)
-      call take_up(family, model, c, work)
-      if (.not. work%tabled) call fill_tables(family, model, work)
-      theta = 0.0_wp
-      stretches = 0.0_wp
-      do i = 1, work%n
-        call deform(family, model, work, i, bonds)
-        theta = theta + work%dilatation(:, i)*bonds%stretch*bonds%lambda
-        ! the tables hold q_k + q_j, the energy takes q_k/2 of the slot's own material
-        share = 0.25_wp
-        if (size(model%materials) > 1) call own_share(family, model, work, i, share)
-        stretches = stretches + share*work%stretch(:, i)*bonds%stretch**2/work%geometry(:, i)
-      end do
+      call take_up(family, c, work)
+      call fill_tables(family, model, work, own=.true.)
+      associate (e => family%start(c))
+        call general_energy(model, work, family%member(e:e + work%n - 1), family%at, stretches, &
+          & theta)
+      end associate
       do l = 1, lanes
         k = work%first + l - 1
         associate (m => model%materials(model%material(k)))
@@ -199,9 +158,8 @@ contains
   end subroutine begin_work
 
   !> Turn to cluster `c`.
-  pure subroutine take_up(family, model, c, work)
+  pure subroutine take_up(family, c, work)
     type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
     integer, intent(in) :: c
     type(work_type), intent(inout) :: work
     integer :: d, l
@@ -214,7 +172,6 @@ contains
         work%own(l, d) = family%at(d, work%first + l - 1)
       end do
     end do
-    if (work%tabled) call fill_tables(family, model, work)
   end subroutine take_up
 
   !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
@@ -305,17 +262,21 @@ contains
 
   ! ---------------------------------------------------------------- tables
 
-  !> Weights of a cluster's bonds, for any rule, material and surface factor.
-  pure subroutine fill_tables(family, model, work)
+  !> Weights of a cluster's bonds, for any rule, material and surface factor. `own`: with 2 q_k in
+  !> place of q_k + q_j, as the energy needs them.
+  pure subroutine fill_tables(family, model, work, own)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(work_type), intent(inout) :: work
-    real(wp), dimension(lanes) :: length, spacing, q, weight
+    logical, intent(in) :: own
+    real(wp), dimension(lanes) :: length, spacing, q, q_own, weight
     real(wp) :: xi(lanes, 3)
     integer(i8) :: e, b
     integer :: i, j, d, l, last
 
     last = work%first + lanes - 1
+    q = work%q
+    if (size(model%materials) > 1) q_own = model%materials(model%material(work%first:last))%q
     b = 0_i8
     if (allocated(family%fraction)) b = family%first_bond(work%cluster)
     do i = 1, work%n
@@ -344,9 +305,9 @@ contains
         if (.not. family%one_spacing) spacing = (family%spacing(work%first:last) + spacing)/2
         weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
       end select
-      q = work%q
-      if (size(model%materials) > 1) q = model%materials(model%material(work%first:last))%q &
-        & + model%materials(model%material(j))%q
+      if (size(model%materials) > 1) then
+        q = q_own + merge(q_own, spread(model%materials(model%material(j))%q, 1, lanes), own)
+      end if
       work%dilatation(:, i) = weight
       work%stretch(:, i) = q*weight/length
       if (model%surface) then
@@ -378,76 +339,23 @@ contains
       & + (n(:, 2)*s(:, 1)*s(:, 3))**2 + (n(:, 3)*s(:, 1)*s(:, 2))**2)
   end function factor
 
-  !> q_k/2 of the lanes' own materials over (q_k + q_j), halved.
-  pure subroutine own_share(family, model, work, i, share)
-    type(list_family_type), intent(in) :: family
+  ! ---------------------------------------------------------------- breaking
+
+  !> Mark the lanes with an intact bond at its limit, a hair's breadth early and by the smallest
+  !> limit of all: what breaks is decided elsewhere.
+  pure subroutine mark(model, work, strained)
     type(model_type), intent(in) :: model
     type(work_type), intent(in) :: work
-    integer, intent(in) :: i
-    real(wp), intent(out) :: share(lanes)
-    integer :: l, j
-
-    j = family%member(family%start(work%cluster) + i - 1)
-    do l = 1, lanes
-      associate (q => model%materials(model%material(work%first + l - 1))%q)
-        share(l) = q/(2*(q + model%materials(model%material(j))%q))
-      end associate
-    end do
-  end subroutine own_share
-
-  ! ---------------------------------------------------------------- general formulas
-
-  !> State of a cluster's bonds to its `i`-th member.
-  pure subroutine deform(family, model, work, i, bonds)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(work_type), intent(in) :: work
-    integer, intent(in) :: i
-    type(bonds_state_type), intent(out) :: bonds
-    real(wp), dimension(lanes) :: x, e, y, xi, eta, r
-    integer :: j, d
-
-    j = family%member(family%start(work%cluster) + i - 1)
-    x = 0.0_wp
-    e = 0.0_wp
-    y = 0.0_wp
-    do d = 1, model%dim
-      xi = family%at(d, j) - work%own(:, d)
-      eta = family%at(at_moved + d, j) - work%own(:, at_moved + d)
-      x = x + xi*eta
-      e = e + eta**2
-      bonds%along(:, d) = xi + eta
-      y = y + bonds%along(:, d)**2
-    end do
-    x = work%geometry(:, i)*x
-    y = work%geometry(:, i)*y
-    bonds%stretch = (2*x + work%geometry(:, i)*e)/(1 + sqrt(y))
-    r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
-    bonds%lambda = (1 + x)*r
-    if (.not. model%projected) bonds%lambda = 1.0_wp
-    do d = 1, model%dim
-      bonds%along(:, d) = r*bonds%along(:, d)
-    end do
-    if (model%thermal) bonds%stretch = bonds%stretch &
-      & - (model%expansion(work%first:work%first + lanes - 1) + model%expansion(j))/2
-  end subroutine deform
-
-  !> Mark the lanes whose intact bond to the `i`-th member is at its limit, a hair's breadth early
-  !> and by the smallest limit of all: what breaks is decided elsewhere.
-  pure subroutine mark(model, work, i, s, strained)
-    type(model_type), intent(in) :: model
-    type(work_type), intent(in) :: work
-    integer, intent(in) :: i
-    real(wp), intent(in) :: s(lanes)
     integer(i1), intent(inout), contiguous :: strained(:)
     real(wp) :: limit
+    integer(i8) :: k
     integer :: l
 
     limit = model%least_critical*(1 - 1.0e-9_wp)
-    if (all(abs(s) <= limit)) return
     do l = 1, lanes
-      if (work%stretch(l, i) <= 0.0_wp .or. abs(s(l)) <= limit) cycle
-      call mark_slot(model, int(work%first + l - 1, i8), s(l), strained)
+      k = work%first + l - 1
+      if (work%tension(l) > limit) call mark_slot(model, k, work%tension(l), strained)
+      if (work%compression(l) > limit) call mark_slot(model, k, -work%compression(l), strained)
     end do
   end subroutine mark
 
