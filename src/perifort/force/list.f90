@@ -151,8 +151,9 @@ contains
       allocate (work%stretch(lanes, n), work%dilatation(lanes, n), work%geometry(lanes, n))
     end associate
     work%q = 2*model%materials(1)%q
-    work%per_spacing = 1/maxval(family%spacing)
-    work%edge = family%rule%delta + maxval(family%spacing)/2
+    ! without tables all points have the spacing of the first
+    work%per_spacing = 1/family%spacing(1)
+    work%edge = family%rule%delta + family%spacing(1)/2
     ! so far away that vc is 1 everywhere
     if (family%rule%kind == volume_none) work%edge = 3*work%edge
   end subroutine begin_work
