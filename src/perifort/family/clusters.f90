@@ -81,8 +81,9 @@ contains
     end do
   end subroutine sort_along
 
-  !> The members of all clusters of the points `x` (n, dim), which are in the order of `rows`: those of cluster c stand from `start(c)` to `start(c+1) - 1`, ascending, each with
-  !> the bits of the lanes whose family it is in. Two points are neighbours if they are no further
+  !> The members of all clusters of the points `x` (n, dim), which are in the order of `rows`: those
+  !> of cluster c stand from `start(c)` to `start(c+1) - 1`, ascending, each with the bits of the
+  !> lanes whose family it is in. Two points are neighbours if they are no further
   !> apart than the sum of their `half_reach` [m].
   subroutine collect_members(x, half_reach, rows, start, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)

@@ -365,7 +365,8 @@ contains
     end do
     family%weights = 0_i4
     family%served = 0_i1
-    call find_slabs(family%grids, family%dim, family%block_length, family%block, family%slabs)
+    call find_slabs(family%grids, family%dim, both_ends(family%dim, family%mixed), &
+      & family%block_length, family%block, family%slabs)
   end subroutine find_blocks
 
   pure integer function alike(family, k)

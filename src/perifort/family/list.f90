@@ -1,7 +1,7 @@
 !> List families for any cloud of points. Points are sorted so that eight that follow each other lie
-!> close together: a cluster, whose families have most of their members in common. What is stored is
-!> each cluster's members, and for each of them a bit for every lane whose family it is in. The loops
-!> take the eight bonds to one member at a time.
+!> close together: a cluster, whose families have most of their members in common. What is stored
+!> are each cluster's members, with a bit for every lane whose family it is in. The loops take the
+!> eight bonds to one member at a time.
 !>
 !> Nothing else is stored: xi, |xi| and v_c come from the points.
 module pd_family_list

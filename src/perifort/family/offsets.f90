@@ -108,10 +108,12 @@ contains
       & *sum(int(grid%stride, i8))), grid%alignment)
   end function first_cell
 
-  !> Whether loops in `dim` dimensions take forward offsets alone and add to both ends of a bond.
-  pure logical function both_ends(dim)
+  !> Whether loops in `dim` dimensions take forward offsets alone and add to both ends of a bond. In
+  !> 1D the next offset would have to load again what was just added.
+  pure logical function both_ends(dim, mixed)
     integer, intent(in) :: dim
-    both_ends = dim > 2
+    logical, intent(in) :: mixed  !! bonds in single precision
+    both_ends = dim > 2 .or. (dim == 2 .and. .not. mixed)
   end function both_ends
 
   !> The next multiple of the length of a block.

@@ -7,7 +7,7 @@
 !> threads.
 module pd_family_slabs
   use pd_base_kinds, only: i8
-  use pd_family_offsets, only: offsets_type, first_cell, both_ends
+  use pd_family_offsets, only: offsets_type, first_cell
   implicit none (type, external)
   private
   public :: slabs_type, find_slabs
@@ -25,17 +25,19 @@ module pd_family_slabs
 contains
 
   !> Cut the blocks of all grids into slabs, and sort `block`, the first slot of each, that way. All
-  !> blocks are `block_length` slots long. No bond joins two grids.
-  pure subroutine find_slabs(grids, dim, block_length, block, slabs)
+  !> blocks are `block_length` slots long. No bond joins two grids. Where loops do not add to `both`
+  !> ends of a bond, there is nothing to keep apart.
+  pure subroutine find_slabs(grids, dim, both, block_length, block, slabs)
     type(offsets_type), intent(in) :: grids(:)
     integer, intent(in) :: dim, block_length
+    logical, intent(in) :: both
     integer(i8), intent(inout) :: block(:)
     type(slabs_type), intent(out) :: slabs
     integer, allocatable :: slab(:), of_grid(:), order(:), layer(:, :)
     integer :: b, g, n, reach(dim)
 
-    if (.not. both_ends(dim)) then
-      ! nothing to keep apart: all are of the first colour
+    if (.not. both) then
+      ! all are of the first colour
       n = max(1, min(2*most_pairs, size(block)/least_blocks))
       slabs%first = [(1 + int(int(size(block), i8)*b/n), b=0, n)]
       slabs%colour = [1, n + 1, n + 1]

@@ -22,8 +22,8 @@ module pd_force_fast
 contains
 
   !> Add theta, the sums of Gd s Lambda vc V, of the `n` first offsets' bonds of the block at slot
-  !> `first` (2D, 1D: set it) in double precision. `missed`: some bonds are strained beyond `limit`;
-  !> in 3D those were left out, and `left` has their weights, in 2D and 1D what was set is wrong.
+  !> `first` (1D: set it) in double precision. `missed`: some bonds are strained beyond `limit`; in
+  !> 3D and 2D those were left out, and `left` has their weights, in 1D what was set is wrong.
   !> Extents are explicit, here and below, since a call for few bonds would spend its time on
   !> describing arrays.
   subroutine fast_dilatation(dim, range, n, m, weight, shift, geometry, first, u, limit, theta, &
@@ -119,7 +119,7 @@ contains
   subroutine fast_dilatation_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
     integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp
-    logical, parameter :: both = .false.
+    logical, parameter :: both = .true.
     include 'fast_dilatation.inc'
   end subroutine fast_dilatation_2
 
@@ -140,7 +140,7 @@ contains
   subroutine fast_force_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
     & low, p, limit, force, left, missed)
     integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp
-    logical, parameter :: both = .false.
+    logical, parameter :: both = .true.
     include 'fast_force.inc'
   end subroutine fast_force_2
 
@@ -161,7 +161,7 @@ contains
   subroutine wide_dilatation_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
     integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp
-    logical, parameter :: both = .false.
+    logical, parameter :: both = .true.
     include 'fast_dilatation.inc'
   end subroutine wide_dilatation_2
 
@@ -182,7 +182,7 @@ contains
   subroutine wide_force_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
     & low, p, limit, force, left, missed)
     integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp
-    logical, parameter :: both = .false.
+    logical, parameter :: both = .true.
     include 'fast_force.inc'
   end subroutine wide_force_2
 

@@ -6,9 +6,9 @@
 !> Bonds that are strained beyond what the fast formulas serve (`pd_force_fast`) are left to the
 !> general formulas, each by its own strain, so that no bond is added twice or undone.
 !>
-!> In 3D each bond is computed once, from the end whose slot comes first, and added to both ends. In
-!> 2D and 1D that costs more than it saves: what was just added to a row cannot be loaded again at
-!> once, and there are few other rows to turn to.
+!> In 3D and 2D each bond is computed once, from the end whose slot comes first, and added to both
+!> ends. In 1D, and in 2D with bonds in single precision, that costs more than it saves: what was
+!> just added to a row cannot be loaded again at once, and there are few other rows to turn to.
 !>
 !> In mixed precision blocks are twice as long, and the fast loops compute a block's bonds in single
 !> precision; what they leave is computed in double, one half of a block after the other.
@@ -51,7 +51,7 @@ contains
     logical :: both
     integer :: b, s, k, colour
 
-    both = both_ends(family%dim)
+    both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model)
     !$omp parallel default(none) shared(family, model, u, p, strained, both, limit) &
     !$omp private(scratch, own, b, s, k, colour)
@@ -104,7 +104,7 @@ contains
     logical :: both
     integer :: b, c, s, k, colour
 
-    both = both_ends(family%dim)
+    both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model)
     !$omp parallel default(none) shared(family, model, u, p, force, strained, both, limit) &
     !$omp private(scratch, own, b, c, s, k, colour)
@@ -325,7 +325,7 @@ contains
     integer(i8) :: last
 
     associate (singles => family%singles)
-      if (both_ends(family%dim)) then
+      if (both_ends(family%dim, family%mixed)) then
         call mixed_dilatation_3(n, weights%single_dilatation, weights%shift, &
           & weights%single_geometry, first, family%n_slots, singles%high, singles%low, &
           & real(limit, sp), singles%sums(:, 1), left, missed)
@@ -415,7 +415,7 @@ contains
     logical, intent(out) :: missed
 
     associate (singles => family%singles)
-      if (both_ends(family%dim)) then
+      if (both_ends(family%dim, family%mixed)) then
         call mixed_force_3(dilatation, n, weights%single_dilatation, weights%single_stretch, &
           & weights%shift, weights%single_geometry, first, family%n_slots, singles%high, &
           & singles%low, singles%p, real(limit, sp), singles%sums, left, missed)

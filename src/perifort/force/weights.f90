@@ -107,7 +107,7 @@ contains
       singles%volume = 2.0_wp**exponent(maxval(family%grids%cell_volume))
       allocate (singles%high(n, family%dim), singles%low(n, family%dim))
       allocate (singles%p(merge(n, 0, model%dilatation)))
-      allocate (singles%sums(merge(n, 0, both_ends(family%dim)), family%dim))
+      allocate (singles%sums(merge(n, 0, both_ends(family%dim, family%mixed)), family%dim))
     end associate
   end subroutine allocate_singles
 

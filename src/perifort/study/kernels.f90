@@ -265,7 +265,7 @@ contains
       if (family%mixed) geometry = geometry + 2*d - 4
       flops = geometry + 1 + 4*d
       if (dilatation) flops = flops + 8 + geometry + 4
-      if (both_ends(d)) flops = (flops + merge(d + 1, d, dilatation))/2
+      if (both_ends(d, family%mixed)) flops = (flops + merge(d + 1, d, dilatation))/2
     class default
       flops = 0.0_wp
     end select
@@ -283,6 +283,7 @@ contains
     type(system_type), intent(in) :: system
     integer :: d, passes
     real(wp) :: points
+    logical :: both
 
     d = system%body%dim
     points = real(system%body%n_points, wp)
@@ -296,10 +297,11 @@ contains
       if (allocated(family%fraction)) bytes = bytes + passes*8*real(family%n_bonds, wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
-      if (both_ends(d)) bytes = bytes + points*8*(2*d + merge(3, 0, system%model%dilatation))
+      both = both_ends(d, family%mixed)
+      if (both) bytes = bytes + points*8*(2*d + merge(3, 0, system%model%dilatation))
       if (family%mixed) then
         bytes = bytes + points*(16*d + merge(8, 0, system%model%dilatation))
-        if (both_ends(d)) bytes = bytes + points*16*(d + merge(1, 0, system%model%dilatation))
+        if (both) bytes = bytes + points*16*(d + merge(1, 0, system%model%dilatation))
       end if
     class default
       continue
