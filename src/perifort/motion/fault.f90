@@ -16,11 +16,13 @@ module pd_motion_fault
 contains
 
   !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
-  !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step.
-  integer function faulty_slot(system, rate, dt) result(slot)
+  !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step. `squares`
+  !> gets the sum of the squares of all components, whose rounding depends on the number of threads.
+  integer function faulty_slot(system, rate, dt, squares) result(slot)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: rate(:, :)
     real(wp), intent(in) :: dt
+    real(wp), intent(out), optional :: squares
     real(wp) :: largest, sum_of_squares
     integer :: k, c
 
@@ -35,6 +37,7 @@ contains
         sum_of_squares = sum_of_squares + rate(k, c)**2
       end do
     end do
+    if (present(squares)) squares = sum_of_squares
     if (ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta) return
     slot = fastest_slot(rate)
   end function faulty_slot
