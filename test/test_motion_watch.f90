@@ -249,8 +249,8 @@ contains
       & .not. watch%kinetic_is_due(3001, 101.0_wp))
   end subroutine test_kept_alone
 
-  !> One velocity becomes infinite, or not a number, or carries its point two horizons in a step: with
-  !> every integrator the run ends in that step.
+  !> One velocity becomes no number, or carries its point two horizons in a step:
+  !> with every integrator the run ends in that step.
   subroutine test_at_once(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
@@ -278,8 +278,8 @@ contains
     end do
   end subroutine test_at_once
 
-  !> Steps above the limit, nobody looks: found within ten steps after the kinetic energy is beyond a
-  !> hundred times what there was, and what is shown at the end has no more than a tenth too much.
+  !> Steps above the limit, nobody looks: found within ten steps after the kinetic energy is beyond
+  !> a hundred times what there was, and what is shown at the end has no more than a tenth too much.
   subroutine test_growth(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up

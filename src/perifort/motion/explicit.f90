@@ -4,13 +4,12 @@
 !> Every integrator is the same loop: at t_n the forces are brought up to date (which imposes the
 !> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
 module pd_motion_explicit
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_fault, only: explain_fault, faulty_slot
+  use pd_motion_fault, only: explain_fault, faulty_slot, stays_within
   use pd_motion_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_watch, only: watch_type
   use pd_motion_system, only: system_type, energies_type, energies_of, evaluate, account, &
@@ -24,6 +23,7 @@ module pd_motion_explicit
     real(wp), allocatable :: u(:, :), v(:, :), a(:, :)
   end type start_type
 
+  integer, parameter :: points_at_once = 512  !! moved in one loop: a few kB of each array
   real(wp), parameter :: smallest_strain = 1.0e-12_wp  !! what is below is rounding
 
 contains
@@ -216,45 +216,54 @@ contains
     real(wp), intent(in) :: t, kick, dt
     real(wp), intent(out) :: squares
     logical, intent(out) :: sound
-    real(wp) :: scale, largest, sum_of_squares
-    logical :: one_material
-    integer :: k, c
+    real(wp) :: scale(points_at_once), fourths
+    integer :: block, first, last, c, k
 
     call add_loads(system, t, kick, .true., system%state%v)
-    one_material = size(system%model%materials) == 1
-    scale = kick/system%model%materials(1)%density
-    largest = 0.0_wp
-    sum_of_squares = 0.0_wp
-    !$omp parallel default(none) shared(system, kick, dt, one_material) private(k, c) &
-    !$omp firstprivate(scale) reduction(max:largest) reduction(+:sum_of_squares)
-    associate (u => system%state%u, v => system%state%v, f => system%state%force)
-      do c = 1, size(u, 2)
-        if (one_material) then
-          !$omp do simd schedule(static)
-          do k = 1, size(u, 1)
-            v(k, c) = v(k, c) + scale*f(k, c)
-            u(k, c) = u(k, c) + dt*v(k, c)
-            largest = max(largest, abs(v(k, c)))
-            sum_of_squares = sum_of_squares + v(k, c)**2
-          end do
-          !$omp end do simd nowait
-        else
-          !$omp do schedule(static)
-          do k = 1, size(u, 1)
-            scale = kick*inverse_density(system%model, k)
-            v(k, c) = v(k, c) + scale*f(k, c)
-            u(k, c) = u(k, c) + dt*v(k, c)
-            largest = max(largest, abs(v(k, c)))
-            sum_of_squares = sum_of_squares + v(k, c)**2
-          end do
-          !$omp end do nowait
-        end if
+    squares = 0.0_wp
+    fourths = 0.0_wp
+    !$omp parallel do schedule(static) default(none) shared(system, kick, dt) &
+    !$omp private(block, first, last, c, k, scale) reduction(+:squares, fourths)
+    do block = 1, (system%body%n_slots + points_at_once - 1)/points_at_once
+      first = (block - 1)*points_at_once + 1
+      last = min(block*points_at_once, system%body%n_slots)
+      if (size(system%model%materials) == 1) then
+        scale = kick/system%model%materials(1)%density
+      else
+        do k = first, last
+          scale(k - first + 1) = kick*inverse_density(system%model, k)
+        end do
+      end if
+      do c = 1, system%body%dim
+        call leap_block(last - first + 1, scale, dt, system%state%force(first:last, c), &
+          & system%state%v(first:last, c), system%state%u(first:last, c), squares, fourths)
       end do
-    end associate
-    !$omp end parallel
-    squares = sum_of_squares
-    sound = ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta
+    end do
+    sound = stays_within(system, system%state%v, dt, fourths)
   end subroutine leap
+
+  !> One component of one block: explicit shapes, so that the loop runs in vector registers. What
+  !> the watch needs is summed in passing.
+  pure subroutine leap_block(n, scale, dt, f, v, u, squares, fourths)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: scale(n), dt, f(n)
+    real(wp), intent(inout) :: v(n), u(n), squares, fourths
+    real(wp) :: seconds, powers, now
+    integer :: k
+
+    seconds = 0.0_wp
+    powers = 0.0_wp
+    do k = 1, n
+      now = v(k) + scale(k)*f(k)
+      v(k) = now
+      u(k) = u(k) + dt*now
+      now = now*now
+      seconds = seconds + now
+      powers = powers + now*now
+    end do
+    squares = squares + seconds
+    fourths = fourths + powers
+  end subroutine leap_block
 
   !> Accelerations at `t` from the forces, 0 for constrained components.
   subroutine accelerations(system, t, a)

@@ -1,6 +1,6 @@
-!> The loops over the arrays of a conjugate gradient solve: what is left of the force, the direction,
-!> and what the stiffness makes of it (doc/theory.md, 7). Everything is per volume, and inner
-!> products are weighted with the points' volumes, in which the stiffness is symmetric.
+!> The loops over the arrays of a conjugate gradient solve: what is left of the force, the
+!> direction, and what the stiffness makes of it (doc/theory.md, 7). Everything is per volume, and
+!> inner products are weighted with the points' volumes, in which the stiffness is symmetric.
 module pd_motion_krylov
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: block_length
@@ -23,8 +23,8 @@ module pd_motion_krylov
 
 contains
 
-  !> Room for a system's solves, where there is none yet; `mass` (n_slots, dim) is the preconditioner
-  !> [N/m4].
+  !> Room for a system's solves, where there is none yet; `mass` (n_slots, dim) is the
+  !> preconditioner [N/m4].
   subroutine make_room(system, mass, krylov)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: mass(:, :)

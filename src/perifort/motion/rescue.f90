@@ -21,8 +21,8 @@ module pd_motion_rescue
 
 contains
 
-  !> Keep the state of this instant, whose forces are known, in the place of the one before. If it is
-  !> ever wanted, it must not have more energy than `most` [J]: looking at that costs as much as
+  !> Keep the state of this instant, whose forces are known, in the place of the one before. If it
+  !> is ever wanted, it must not have more energy than `most` [J]: looking at that costs as much as
   !> several steps.
   subroutine keep_good(good, system, instant, most)
     type(good_state_type), intent(inout) :: good

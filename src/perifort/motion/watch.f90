@@ -70,8 +70,8 @@ contains
     look_is_due = self%looked < 0 .or. step - self%looked >= all_every
   end function look_is_due
 
-  !> Whether the kinetic energy must be looked at after `step` steps: from time to time, if it may be
-  !> too much, and before a state is kept. `bound` is what it does not exceed [J].
+  !> Whether the kinetic energy must be looked at after `step` steps: from time to time, if it may
+  !> be too much, and before a state is kept. `bound` is what it does not exceed [J].
   pure logical function kinetic_is_due(self, step, bound)
     class(watch_type), intent(in) :: self
     integer, intent(in) :: step
@@ -82,8 +82,8 @@ contains
   end function kinetic_is_due
 
   !> Whether the state after `step` steps is to be kept, because the one that is kept is old and the
-  !> energies agree: all of them, if they were just looked at, or the kinetic energy, which was then,
-  !> if nobody has looked at all of them for long. The caller keeps it.
+  !> energies agree: all of them, if they were just looked at, or the kinetic energy, which was
+  !> then, if nobody has looked at all of them for long. The caller keeps it.
   logical function keeps(self, step)
     class(watch_type), intent(inout) :: self
     integer, intent(in) :: step
