@@ -4,7 +4,8 @@
 !> wherever they can be.
 module test_output_restart
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_base_error, only: fault_type => error_type, status_input, status_interrupted
+  use pd_base_error, only: fault_type => error_type, status_input, status_interrupted, &
+    & status_no_answer
   use pd_base_kinds, only: wp, i1, i8
   use pd_driver, only: run_options_type, run_scene
   use pd_output_datasets, only: read_rows
@@ -12,7 +13,7 @@ module test_output_restart
   use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
   use pd_scene_types, only: scene_type, unset
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: box_scene, expect_true
+  use bodies, only: box_scene, expect_true, youngs_modulus
   implicit none (type, external)
   private
   public :: collect_output_restart
@@ -32,6 +33,8 @@ contains
       & new_unittest('a block in 3D', test_block), &
       & new_unittest('a list, bonds that break late', test_list), &
       & new_unittest('a relaxation with a growing crack', test_relaxation), &
+      & new_unittest('relaxations that go other ways', test_ways_to_rest), &
+      & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
       & new_unittest('results beyond the checkpoint are cut back', test_beyond), &
       & new_unittest('a finished run is prolonged', test_longer), &
       & new_unittest('a changed scene is refused', test_changed), &
@@ -375,9 +378,30 @@ contains
   !> iteration and every load step, with a load beside the imposed displacements.
   subroutine test_relaxation(error)
     type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: solvers(2) = [character(18) :: 'conjugate_gradient', &
+      & 'dynamic_relaxation']
     type(scene_type) :: scene
     type(fault_type), allocatable :: fault
     integer :: pieces, i
+
+    call slow_plate(scene)
+    do i = 1, size(solvers)
+      if (allocated(error)) return
+      scene%relaxation%solver = solvers(i)
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      call expect_broken(error, 'whole')
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
+      call expect_same_results(error, 'whole', 'pieces', 3)
+    end do
+  end subroutine test_relaxation
+
+  !> A small plate with a notch, drawn apart in load steps.
+  subroutine slow_plate(scene)
+    type(scene_type), intent(out) :: scene
+    integer :: i
 
     call plate(scene)
     scene%bodies(1)%upper(:2) = 6*spacing
@@ -393,13 +417,71 @@ contains
       scene%boundaries(i)%displacement(2) = merge(-1, 1, i == 1)*0.08_wp*spacing
       scene%boundaries(i)%velocity = unset
     end do
+  end subroutine slow_plate
+
+  !> A slender plate that bends by so much that the conjugate gradient leaves it to dynamic
+  !> relaxation; and one that nothing supports. Both cut after every iteration.
+  subroutine test_ways_to_rest(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, way
+
+    do way = 1, 2
+      if (allocated(error)) return
+      call slow_plate(scene)
+      deallocate (scene%cracks, scene%boundaries, scene%regions, scene%loads)
+      allocate (scene%cracks(0), scene%boundaries(2 - way), scene%regions(0), scene%loads(way))
+      scene%bodies(1)%upper(:2) = [12, 2]*spacing
+      scene%bodies(1)%points(:2) = [12, 2]
+      scene%materials(1)%critical_stretch = unset
+      scene%relaxation%load_steps = way
+      scene%loads(1)%side = 'x_max'
+      if (way == 1) then
+        scene%boundaries(1)%side = 'x_min'
+        scene%boundaries(1)%displacement(:2) = 0.0_wp
+        scene%loads(1)%force(2) = 0.125_wp*youngs_modulus*spacing*scene%header%thickness
+        scene%relaxation%tolerance = 2.0e-2_wp
+      else
+        scene%relaxation%tolerance = 1.0e-4_wp
+        scene%loads(2)%side = 'x_min'
+        scene%loads%pressure = -1.0e-3_wp*youngs_modulus
+      end if
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
+      call expect_same_results(error, 'whole', 'pieces', way + 1)
+      if (way == 1) call expect_same_file(error, here//'/whole/warnings.txt', &
+        & here//'/pieces/warnings.txt')
+    end do
+  end subroutine test_ways_to_rest
+
+  !> Checkpoints are written by time amid a load step, too: a relaxation whose iterations are used
+  !> up goes on from there when it is given more, to the end of one that had them from the start.
+  subroutine test_more_iterations(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call slow_plate(scene)
+    scene%relaxation%tolerance = 1.0e-6_wp
     call run(scene, 'whole', fault)
     call accept(error, fault)
-    call expect_broken(error, 'whole')
     if (allocated(error)) return
-    call run_in_pieces(scene, 'pieces', 1, pieces, error)
-    call expect_same_results(error, 'whole', 'pieces', 3)
-  end subroutine test_relaxation
+    scene%output%checkpoint_minutes = 1.0e-12_wp
+    scene%relaxation%maximum_iterations = 6
+    call run(scene, 'more', fault)
+    call expect_true(error, allocated(fault), 'six iterations were enough')
+    if (allocated(error)) return
+    call check(error, fault%status, status_no_answer)
+    scene%output%checkpoint_minutes = 0.0_wp
+    scene%relaxation%maximum_iterations = 100000
+    call run(scene, 'more', fault, restart=.true.)
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'more', 3)
+  end subroutine test_more_iterations
 
   !> The older checkpoint of a run that came to its end: everything after it is computed again, in
   !> files that are longer, and trimmed.

@@ -32,7 +32,7 @@ module pd_driver
   use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, region_mask
   use pd_motion_keep, only: checksum_of_start
   use pd_motion_plan, only: plan_type, make_plan, depth_of
-  use pd_motion_relaxation, only: run_relaxation, begin_iterations => begin_memory
+  use pd_motion_relaxation, only: run_relaxation, fill_memory
   use pd_motion_system, only: system_type, start_system, evaluate, account
   use pd_motion_time_step, only: evaluations, horizon_volume
   use pd_output_begin, only: run_options_type, open_recorder, keep_checkpoints, schedule_of, &
@@ -181,8 +181,8 @@ contains
     end associate
   end subroutine check_scene
 
-  !> Bytes of the last checkpoint of a run, which has all that it carries; the rows of a relaxation,
-  !> whose number isn't known before, are left out.
+  !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
+  !> largest, without rows, whose number isn't known before.
   integer(i8) function bytes_of_checkpoint(scene, set_up) result(bytes)
     type(scene_type), intent(in) :: scene
     type(set_up_type), intent(inout) :: set_up
@@ -197,7 +197,7 @@ contains
         & source=0.0_wp)
       call account(system, 0.0_wp)
       if (plan%relaxes) then
-        call begin_iterations(system)
+        call fill_memory(system, plan%relaxation)
       else
         call begin_steps(system, plan%integrator)
       end if

@@ -9,9 +9,9 @@ module pd_motion_conjugate_gradient
   use pd_base_text, only: to_text
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_conditions, only: impose
-  use pd_motion_krylov, only: krylov_type, sums_type, new_krylov, linearise, take_residual, &
-    & first_direction, next_direction, take_direction, apply_stiffness, go_along, volume_inner, &
-    & smallest_curvature
+  use pd_motion_krylov, only: make_room, linearise, take_residual, first_direction, &
+    & next_direction, take_direction, apply_stiffness, go_along, volume_inner, smallest_curvature
+  use pd_motion_newton, only: newton_type, krylov_type, sums_type
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_residual, only: relaxation_type, squared_force, fail_unconverged
   use pd_motion_rigid, only: rigid_type, remove_free_motions
@@ -43,24 +43,18 @@ module pd_motion_conjugate_gradient
   real(wp), parameter :: diverged = 1.0e6_wp
 
   !> How a solve ended.
+  integer, parameter :: under_way = 0      !! it hasn't
   integer, parameter :: at_rest = 1        !! converged
   integer, parameter :: go_on = 2          !! as far as the linear equations tell
   integer, parameter :: no_stiffness = 3   !! a direction meets none, or a negative one
   integer, parameter :: used_up = 4        !! no iterations left
 
-  !> Where a relaxation stands.
-  type :: progress_type
-    integer :: iterations = 0
-    real(wp) :: reference = 0.0_wp    !! square of what acts on the body, as far as it is known
-    real(wp) :: change = 0.0_wp       !! of displacement in the last iteration, over displacement
-    type(sums_type) :: sums           !! of the last look at the true forces
-  end type progress_type
-
 contains
 
   !> Bring `system`, at rest under earlier conditions, to rest at `instant%time`; bonds don't break.
-  !> `trend` is the change of displacement in the load step before, or of size 0. If `gave_way`,
-  !> no rest was found, and the displacements are the best on the way.
+  !> If its memory says that it is on the way there, it goes on from where it stands. `trend` is the
+  !> change of displacement in the load step before, or of size 0. If `gave_way`, no rest was found,
+  !> and the displacements are the best on the way.
   subroutine relax_by_conjugate_gradient(system, relaxation, rigid, trend, instant, observer, &
     & gave_way, error)
     type(system_type), intent(inout) :: system
@@ -71,183 +65,265 @@ contains
     class(observer_type), intent(inout) :: observer
     logical, intent(out) :: gave_way
     type(error_type), allocatable, intent(out) :: error
-    type(krylov_type) :: krylov
-    type(progress_type) :: progress
-    real(wp), allocatable :: best(:, :), loads(:, :)
-    real(wp) :: before, least
-    integer :: ended, ahead, slow
-    logical :: fresh, deformed, strict
+    type(newton_type), allocatable :: newton
+    integer :: ended
+    logical :: amid
 
     gave_way = .false.
     instant%settled = .false.
-    allocate (best, source=system%state%u)
-    call new_krylov(system, relaxation%mass, krylov)
-    allocate (loads, source=0.0_wp*best)
-    call add_loads(system, instant%time, 1.0_wp, .false., loads)
-    progress%reference = squared_force(system, loads)
-    if (.not. progress%reference < largest_reference) then
-      call fail(error, 'no rest: the loads of up to '//to_text(maxval(abs(loads)))//' N/m3 are '// &
-        & 'so large that energies overflow', status_no_answer)
-      return
+    amid = allocated(system%memory%newton)
+    if (amid) then
+      call move_alloc(system%memory%newton, newton)
+      call make_room(system, relaxation%mass, newton%krylov)
+    else
+      allocate (newton)
+      call make_room(system, relaxation%mass, newton%krylov)
+      call refer_to_loads(system, instant%time, newton, error)
+      if (allocated(error)) return
+      call begin(system, instant%time, trend, .false., newton)
+      newton%least = newton%sums%residual
     end if
-    deallocate (loads)
-    call begin(system, instant%time, trend, .false., krylov, progress)
-    fresh = .true.
-    least = progress%sums%residual
-    ahead = 0
-    slow = 0
-    strict = .false.
     do
-      before = progress%sums%residual
-      call solve(system, relaxation, rigid, krylov, progress, instant, observer, ended, error)
+      if (.not. amid) call begin_solve(system, rigid, newton)
+      amid = .false.
+      call solve(system, relaxation, newton, instant, observer, ended, error)
       if (allocated(error)) return
       if (ended == at_rest) return
       if (ended == used_up) then
-        call fail_unconverged(relaxation, instant%load_step, instant%residual, progress%change, &
-          & error)
+        call fail_unconverged(relaxation, instant%load_step, instant%residual, newton%change, error)
         return
       end if
-      ! what isn't finite fails these comparisons, too
-      deformed = .true.
-      if (progress%sums%residual < useful_solve**2*least) then
-        deformed = krylov%deformed .or. ended == no_stiffness .or. &
-          & progress%sums%residual > good_solve**2*before
-        ahead = 0
-        strict = .false.
-      else if (.not. (strict .or. (krylov%deformed .and. ended == no_stiffness)) .and. &
-        & ahead < most_ahead .and. progress%sums%residual <= farthest**2*least) then
-        ahead = ahead + 1
-      else if (ahead > 0 .or. .not. krylov%deformed) then
-        strict = .true.
-        ahead = 0
-        system%state%u = best
-        if (fresh) then
-          call begin(system, instant%time, trend, .true., krylov, progress)
-          cycle
-        end if
-        call look(system, instant%time, krylov, progress)
-      else
-        call shorten(system, instant%time, krylov, progress, gave_way)
-        if (progress%sums%residual > slow_solve**2*least) slow = slow + 1
-        gave_way = gave_way .or. slow == most_slow
-        if (gave_way) return
-        strict = .false.
-      end if
-      call linearise(system, deformed, krylov)
-      if (ahead > 0) cycle
-      best = system%state%u
-      least = progress%sums%residual
-      progress%reference = max(progress%reference, progress%sums%support)
-      fresh = .false.
+      call judge(system, instant%time, trend, ended, newton, gave_way)
+      if (gave_way) return
     end do
   end subroutine relax_by_conjugate_gradient
 
+  !> What residuals are parts of, as far as the loads at `t` say.
+  subroutine refer_to_loads(system, t, newton, error)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t
+    type(newton_type), intent(inout) :: newton
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: loads(:, :)
+
+    allocate (loads, source=0.0_wp*system%state%u)
+    call add_loads(system, t, 1.0_wp, .false., loads)
+    newton%reference = squared_force(system, loads)
+    if (.not. newton%reference < largest_reference) call fail(error, 'no rest: the loads of up '// &
+      & 'to '//to_text(maxval(abs(loads)))//' N/m3 are so large that energies overflow', &
+      & status_no_answer)
+  end subroutine refer_to_loads
+
   !> The start of a relaxation: what is imposed now comes in as the linear equations have it, so
   !> that no row of bonds is torn, and the trend of the last load step as far as it helps.
-  subroutine begin(system, t, trend, deformed, krylov, progress)
+  subroutine begin(system, t, trend, deformed, newton)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
     real(wp), intent(in) :: trend(:, :)
     logical, intent(in) :: deformed
-    type(krylov_type), intent(inout) :: krylov
-    type(progress_type), intent(inout) :: progress
+    type(newton_type), intent(inout) :: newton
     real(wp), allocatable :: imposed(:, :), rate(:, :)
     real(wp) :: curvature
 
-    call linearise(system, deformed, krylov)
-    call look(system, t, krylov, progress)
-    progress%reference = max(progress%reference, progress%sums%support)
-    if (progress%reference <= 0.0_wp) progress%reference = progress%sums%residual
-    allocate (imposed, source=system%state%u)
-    allocate (rate, source=system%state%v)
-    call impose(system%motions, t, imposed, rate)
-    call take_direction(system, imposed - system%state%u, krylov)
-    if (krylov%scale > 0.0_wp) then
+    associate (krylov => newton%krylov, sums => newton%sums)
+      call linearise(system, deformed, krylov)
+      call look(system, t, krylov, sums)
+      newton%reference = max(newton%reference, sums%support)
+      if (newton%reference <= 0.0_wp) newton%reference = sums%residual
+      allocate (imposed, source=system%state%u)
+      allocate (rate, source=system%state%v)
+      call impose(system%motions, t, imposed, rate)
+      call take_direction(system, imposed - system%state%u, krylov)
+      if (krylov%scale > 0.0_wp) then
+        call apply_stiffness(system, krylov)
+        call go_along(system, 1/krylov%scale, krylov, sums)
+        ! to the last digit
+        where (system%held == 1_i1) system%state%u = imposed
+        newton%reference = max(newton%reference, sums%support)
+      end if
+      if (size(trend) == 0) return
+      call take_direction(system, merge(trend, 0.0_wp, krylov%inverse > 0.0_wp), krylov)
+      if (.not. krylov%scale > 0.0_wp) return
       call apply_stiffness(system, krylov)
-      call go_along(system, 1/krylov%scale, krylov, progress%sums)
-      ! to the last digit
-      where (system%held == 1_i1) system%state%u = imposed
-      progress%reference = max(progress%reference, progress%sums%support)
-    end if
-    if (size(trend) == 0) return
-    call take_direction(system, merge(trend, 0.0_wp, krylov%inverse > 0.0_wp), krylov)
-    if (.not. krylov%scale > 0.0_wp) return
-    call apply_stiffness(system, krylov)
-    curvature = volume_inner(system, krylov%direction, krylov%product)
-    if (curvature > 0.0_wp) call go_along(system, &
-      & volume_inner(system, krylov%residual, krylov%direction)/curvature, krylov, progress%sums)
+      curvature = volume_inner(system, krylov%direction, krylov%product)
+      if (curvature > 0.0_wp) call go_along(system, &
+        & volume_inner(system, krylov%residual, krylov%direction)/curvature, krylov, sums)
+    end associate
   end subroutine begin
 
+  !> After a solve that has not come to rest: whether it has gained, goes uphill for a while, has to
+  !> be taken back or shortened, and where the next one is linearised. `gave_way`: nothing helps.
+  subroutine judge(system, t, trend, ended, newton, gave_way)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t
+    real(wp), intent(in) :: trend(:, :)
+    integer, intent(in) :: ended
+    type(newton_type), intent(inout) :: newton
+    logical, intent(out) :: gave_way
+    logical :: deformed
+
+    gave_way = .false.
+    deformed = .true.
+    associate (krylov => newton%krylov, residual => newton%sums%residual)
+      ! what isn't finite fails these comparisons, too
+      if (residual < useful_solve**2*newton%least) then
+        deformed = krylov%deformed .or. ended == no_stiffness .or. &
+          & residual > good_solve**2*newton%before
+        newton%ahead = 0
+        newton%strict = .false.
+      else if (.not. (newton%strict .or. (krylov%deformed .and. ended == no_stiffness)) .and. &
+        & newton%ahead < most_ahead .and. residual <= farthest**2*newton%least) then
+        if (newton%ahead == 0) newton%best = krylov%origin
+        newton%ahead = newton%ahead + 1
+        call linearise(system, deformed, krylov)
+        return
+      else if (newton%ahead > 0 .or. .not. krylov%deformed) then
+        newton%strict = .true.
+        system%state%u = krylov%origin
+        if (newton%ahead > 0) system%state%u = newton%best
+        newton%ahead = 0
+        if (newton%fresh) then
+          if (allocated(newton%best)) deallocate (newton%best)
+          call begin(system, t, trend, deformed, newton)
+          return
+        end if
+        call look(system, t, krylov, newton%sums)
+      else
+        call shorten(system, t, krylov, newton%sums, gave_way)
+        if (residual > slow_solve**2*newton%least) newton%slow = newton%slow + 1
+        gave_way = gave_way .or. newton%slow == most_slow
+        if (gave_way) return
+        newton%strict = .false.
+      end if
+      call linearise(system, deformed, krylov)
+      newton%least = residual
+      newton%reference = max(newton%reference, newton%sums%support)
+      newton%fresh = .false.
+    end associate
+    if (allocated(newton%best)) deallocate (newton%best)
+  end subroutine judge
+
+  !> Begin a solve at the present displacements, whose true forces are known.
+  subroutine begin_solve(system, rigid, newton)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    type(newton_type), intent(inout) :: newton
+
+    newton%before = newton%sums%residual
+    newton%linear = newton%sums
+    call free_of_rigid_motion(system, rigid, newton%krylov)
+    call first_direction(system, newton%krylov)
+    newton%hopeless = diverged**2*newton%linear%residual
+    newton%next_look = between_looks**2*newton%linear%residual
+  end subroutine begin_solve
+
   !> Conjugate gradient on the linear equations, which moves the system along and looks at the true
-  !> forces now and then. At its end the forces, the residual and the sums are true.
-  subroutine solve(system, relaxation, rigid, krylov, progress, instant, observer, ended, error)
+  !> forces now and then. At its end the forces, the residual and the sums are true. All that one
+  !> iteration leaves to the next is in `newton`, so that it can end and go on between any two.
+  subroutine solve(system, relaxation, newton, instant, observer, ended, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
-    type(krylov_type), intent(inout) :: krylov
-    type(progress_type), intent(inout) :: progress
+    type(newton_type), allocatable, intent(inout) :: newton
     type(instant_type), intent(inout) :: instant
     class(observer_type), intent(inout) :: observer
     integer, intent(out) :: ended
     type(error_type), allocatable, intent(out) :: error
-    type(sums_type) :: linear
-    real(wp), allocatable :: predicted(:, :)
-    real(wp) :: curvature, next_look, limit, largest, reference
 
-    limit = relaxation%tolerance**2
-    linear = progress%sums
-    call free_of_rigid_motion(system, rigid, krylov)
-    call first_direction(system, krylov)
-    largest = diverged**2*linear%residual
-    next_look = between_looks**2*linear%residual
     do
-      reference = max(progress%reference, linear%support)
-      if (linear%residual <= max(next_look, limit*reference)) then
-        predicted = krylov%residual
-        call look(system, instant%time, krylov, progress)
-        reference = max(progress%reference, progress%sums%support)
-        instant%residual = relative(progress%sums%residual, reference)
-        ended = at_rest
-        if (progress%sums%residual <= limit*reference .and. &
-          & linear%change <= limit*linear%displacement) return
-        ended = go_on
-        if (squared_force(system, predicted - krylov%residual) > told_apart**2*linear%residual) &
-          & return
-        ! the directions are conjugate with the linear residual
-        krylov%residual = predicted
-        next_look = between_looks**2*linear%residual
+      if (newton%linear%residual <= max(newton%next_look, relaxation%tolerance**2 &
+        & *max(newton%reference, newton%linear%support))) then
+        call compare(system, relaxation, instant, newton, ended)
+        if (ended /= under_way) return
       end if
       ended = used_up
-      if (progress%iterations == relaxation%maximum_iterations) exit
-      call apply_stiffness(system, krylov)
-      curvature = volume_inner(system, krylov%direction, krylov%product)
-      ended = no_stiffness
-      if (.not. curvature > smallest_curvature*krylov%norm) exit
-      call go_along(system, krylov%rho/curvature, krylov, linear)
-      ! loose points: the equations have no solution
-      if (.not. linear%residual <= largest) exit
-      progress%iterations = progress%iterations + 1
+      if (newton%iterations == relaxation%maximum_iterations) exit
+      call iterate(system, newton, ended)
+      if (ended /= under_way) exit
       instant%step = instant%step + 1
-      instant%residual = relative(linear%residual, max(progress%reference, linear%support))
-      progress%change = relative(linear%change, linear%displacement)
-      call observer%observe(system, instant, error)
+      instant%residual = relative(newton%linear%residual, &
+        & max(newton%reference, newton%linear%support))
+      call show(system, newton, instant, observer, error)
       if (allocated(error)) return
-      call next_direction(system, linear%rho, krylov)
     end do
-    call look(system, instant%time, krylov, progress)
-    instant%residual = relative(progress%sums%residual, &
-      & max(progress%reference, progress%sums%support))
+    call look(system, instant%time, newton%krylov, newton%sums)
+    instant%residual = relative(newton%sums%residual, max(newton%reference, newton%sums%support))
   end subroutine solve
 
-  !> The true forces at the present displacements, and the residual that the loads at `t` leave.
-  subroutine look(system, t, krylov, progress)
+  !> Compare what the linear equations leave with the true forces.
+  subroutine compare(system, relaxation, instant, newton, ended)
+    type(system_type), intent(inout) :: system
+    type(relaxation_type), intent(in) :: relaxation
+    type(instant_type), intent(inout) :: instant
+    type(newton_type), intent(inout) :: newton
+    integer, intent(out) :: ended
+    real(wp), allocatable :: predicted(:, :)
+    real(wp) :: limit, reference
+
+    limit = relaxation%tolerance**2
+    associate (krylov => newton%krylov, sums => newton%sums, linear => newton%linear)
+      predicted = krylov%residual
+      call look(system, instant%time, krylov, sums)
+      reference = max(newton%reference, sums%support)
+      instant%residual = relative(sums%residual, reference)
+      ended = at_rest
+      if (sums%residual <= limit*reference .and. linear%change <= limit*linear%displacement) return
+      ended = go_on
+      if (squared_force(system, predicted - krylov%residual) > told_apart**2*linear%residual) return
+      ended = under_way
+      ! the directions are conjugate with the linear residual
+      krylov%residual = predicted
+      newton%next_look = between_looks**2*linear%residual
+    end associate
+  end subroutine compare
+
+  !> One iteration on the linear equations, up to the direction of the next one.
+  subroutine iterate(system, newton, ended)
+    type(system_type), intent(inout) :: system
+    type(newton_type), intent(inout) :: newton
+    integer, intent(out) :: ended
+    real(wp) :: curvature
+
+    ended = no_stiffness
+    associate (krylov => newton%krylov, linear => newton%linear)
+      call apply_stiffness(system, krylov)
+      curvature = volume_inner(system, krylov%direction, krylov%product)
+      if (.not. curvature > smallest_curvature*krylov%norm) return
+      call go_along(system, krylov%rho/curvature, krylov, linear)
+      ! loose points: the equations have no solution
+      if (.not. linear%residual <= newton%hopeless) return
+      ended = under_way
+      newton%iterations = newton%iterations + 1
+      newton%change = relative(linear%change, linear%displacement)
+      call next_direction(system, linear%rho, krylov)
+    end associate
+  end subroutine iterate
+
+  !> Let the observer see an iteration. What goes on with it is in the system's memory then, where a
+  !> checkpoint finds it.
+  subroutine show(system, newton, instant, observer, error)
+    type(system_type), intent(inout) :: system
+    type(newton_type), allocatable, intent(inout) :: newton
+    type(instant_type), intent(in) :: instant
+    class(observer_type), intent(inout) :: observer
+    type(error_type), allocatable, intent(out) :: error
+
+    call move_alloc(newton, system%memory%newton)
+    system%memory%step = instant%step
+    system%memory%load_step = instant%load_step
+    call observer%observe(system, instant, error)
+    if (.not. allocated(error)) call move_alloc(system%memory%newton, newton)
+  end subroutine show
+
+  !> The true forces at the present displacements, the residual that the loads at `t` leave, and its
+  !> sums.
+  subroutine look(system, t, krylov, sums)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
     type(krylov_type), intent(inout) :: krylov
-    type(progress_type), intent(inout) :: progress
+    type(sums_type), intent(out) :: sums
 
     call renew_forces(system)
-    call take_residual(system, t, krylov, progress%sums)
+    call take_residual(system, t, krylov, sums)
   end subroutine look
 
   !> Forces at the present displacements, nothing imposed.
@@ -261,21 +337,21 @@ contains
   end subroutine renew_forces
 
   !> After a solve with the tangent that has not taken much of the residual: a shorter step.
-  subroutine shorten(system, t, krylov, progress, failed)
+  subroutine shorten(system, t, krylov, sums, failed)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
     type(krylov_type), intent(inout) :: krylov
-    type(progress_type), intent(inout) :: progress
+    type(sums_type), intent(inout) :: sums
     logical, intent(out) :: failed
     real(wp), allocatable :: step(:, :)
     real(wp) :: whole, base, part
     integer :: halving
 
-    whole = progress%sums%residual
+    whole = sums%residual
     step = merge(system%state%u - krylov%origin, 0.0_wp, system%held == 0_i1)
     system%state%u = system%state%u - step
-    call look(system, t, krylov, progress)
-    base = progress%sums%residual
+    call look(system, t, krylov, sums)
+    base = sums%residual
     failed = .false.
     part = 1.0_wp
     do halving = 0, most_halvings
@@ -284,8 +360,8 @@ contains
         cycle
       end if
       system%state%u = system%state%u + part*step
-      call look(system, t, krylov, progress)
-      if (progress%sums%residual < (1 - (1 - useful_solve)*part)**2*base) return
+      call look(system, t, krylov, sums)
+      if (sums%residual < (1 - (1 - useful_solve)*part)**2*base) return
       system%state%u = system%state%u - part*step
       part = part/2
     end do

@@ -4,13 +4,12 @@
 !> Every integrator is the same loop: at t_n the forces are brought up to date (which imposes the
 !> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
 module pd_motion_explicit
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_fault, only: explain_fault, faulty_slot
+  use pd_motion_fault, only: explain_fault, faulty_slot, stays_within
   use pd_motion_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_watch, only: watch_type
   use pd_motion_system, only: system_type, energies_type, energies_of, evaluate, account, &
@@ -19,13 +18,12 @@ module pd_motion_explicit
   private
   public :: run_explicit, begin_memory
 
-  integer, parameter :: kinetic_every = 20  !! steps from one look at the kinetic energy to the next
-
   !> The state at the beginning of a step, for integrators that look back at it.
   type :: start_type
     real(wp), allocatable :: u(:, :), v(:, :), a(:, :)
   end type start_type
 
+  integer, parameter :: points_at_once = 512  !! moved in one loop: a few kB of each array
   real(wp), parameter :: smallest_strain = 1.0e-12_wp  !! what is below is rounding
 
 contains
@@ -42,6 +40,7 @@ contains
     type(start_type) :: start
     type(instant_type) :: instant
     type(good_state_type) :: good
+    real(wp) :: squares
     logical :: sound
     integer :: n, seen
 
@@ -51,7 +50,9 @@ contains
     system%watch = watch_type()
     system%watch%rounding = maxval(system%model%materials%youngs_modulus)*smallest_strain**2 &
       & *sum(system%body%volume)
+    system%watch%heaviest = heaviest_point(system)
     call allocate_start(system, integrator, start)
+    squares = huge(squares)
     do n = max(0, seen), steps
       instant%step = n
       instant%time = n*dt
@@ -68,13 +69,13 @@ contains
         if (allocated(error)) return
       end if
       if (n == steps) exit
-      call look(system, instant, good)
+      call look(system, instant, squares, good)
       if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
-        call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, sound)
+        call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, squares, sound)
       else
         call advance(system, integrator, instant%time, dt, start)
-        sound = faulty_slot(system, system%state%v, dt) == 0
+        sound = faulty_slot(system, system%state%v, dt, squares) == 0
       end if
       if (sound .and. system%watch%sound) cycle
       call explain_fault(system, n + 1, dt, error)
@@ -84,23 +85,26 @@ contains
     system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_explicit
 
-  !> Look at the energies if nobody has for long, and keep a state in which they agree.
-  subroutine look(system, instant, good)
+  !> Look at the energies if nobody has for long, and keep a state in which they agree. `squares` is
+  !> the sum of the squares of all components of velocity, which bounds the kinetic energy.
+  subroutine look(system, instant, squares, good)
     type(system_type), intent(inout) :: system
     type(instant_type), intent(in) :: instant
+    real(wp), intent(in) :: squares
     type(good_state_type), intent(inout) :: good
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :)
 
-    if (mod(instant%step, kinetic_every) == 0) &
-      & call system%watch%look_at_kinetic(kinetic_energy(system))
     if (system%watch%look_is_due(instant%step)) then
       call velocities_now(system, instant%time, instant%kick, v)
       call energies_of(system, v, energies)
       call system%watch%look(instant%step, energies%kinetic, energies%strain, &
         & system%dissipated, system%external_work)
     end if
-    if (system%watch%keeps(instant%step)) call keep_good(good, system, instant)
+    if (system%watch%kinetic_is_due(instant%step, system%watch%heaviest/2*squares)) &
+      & call system%watch%look_at_kinetic(kinetic_energy(system))
+    if (system%watch%keeps(instant%step)) &
+      & call keep_good(good, system, instant, system%watch%most_of_good())
   end subroutine look
 
   !> Kinetic energy of the velocities as the integrator keeps them [J], for the watch only: its
@@ -131,6 +135,18 @@ contains
     end do
     kinetic = sum(part*system%model%materials%density)/2
   end function kinetic_energy
+
+  !> The greatest mass of a point [kg].
+  pure real(wp) function heaviest_point(system) result(mass)
+    type(system_type), intent(in) :: system
+    integer :: k
+
+    mass = 0.0_wp
+    do k = 1, system%body%n_slots
+      if (system%body%point(k) > 0) &
+        & mass = max(mass, system%body%volume(k)/inverse_density(system%model, k))
+    end do
+  end function heaviest_point
 
   !> Whether the integrator's velocities belong to the middle of the steps.
   pure logical function at_half_steps(integrator)
@@ -193,48 +209,61 @@ contains
 
   !> 7.8 and 7.9 in one pass: v = v + kick (f + b)/rho, u = u + dt v. `sound` is false if that is no
   !> motion any more: a velocity that isn't finite, or a point that crosses its horizon in the step.
-  subroutine leap(system, t, kick, dt, sound)
+  !> `squares` is the sum of the squares of all components of velocity, for the watch only: its
+  !> rounding depends on the number of threads.
+  subroutine leap(system, t, kick, dt, squares, sound)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t, kick, dt
+    real(wp), intent(out) :: squares
     logical, intent(out) :: sound
-    real(wp) :: scale, largest, sum_of_squares
-    logical :: one_material
-    integer :: k, c
+    real(wp) :: scale(points_at_once), fourths
+    integer :: block, first, last, c, k
 
     call add_loads(system, t, kick, .true., system%state%v)
-    one_material = size(system%model%materials) == 1
-    scale = kick/system%model%materials(1)%density
-    largest = 0.0_wp
-    sum_of_squares = 0.0_wp
-    !$omp parallel default(none) shared(system, kick, dt, one_material) private(k, c) &
-    !$omp firstprivate(scale) reduction(max:largest) reduction(+:sum_of_squares)
-    associate (u => system%state%u, v => system%state%v, f => system%state%force)
-      do c = 1, size(u, 2)
-        if (one_material) then
-          !$omp do simd schedule(static)
-          do k = 1, size(u, 1)
-            v(k, c) = v(k, c) + scale*f(k, c)
-            u(k, c) = u(k, c) + dt*v(k, c)
-            largest = max(largest, abs(v(k, c)))
-            sum_of_squares = sum_of_squares + v(k, c)**2
-          end do
-          !$omp end do simd nowait
-        else
-          !$omp do schedule(static)
-          do k = 1, size(u, 1)
-            scale = kick*inverse_density(system%model, k)
-            v(k, c) = v(k, c) + scale*f(k, c)
-            u(k, c) = u(k, c) + dt*v(k, c)
-            largest = max(largest, abs(v(k, c)))
-            sum_of_squares = sum_of_squares + v(k, c)**2
-          end do
-          !$omp end do nowait
-        end if
+    squares = 0.0_wp
+    fourths = 0.0_wp
+    !$omp parallel do schedule(static) default(none) shared(system, kick, dt) &
+    !$omp private(block, first, last, c, k, scale) reduction(+:squares, fourths)
+    do block = 1, (system%body%n_slots + points_at_once - 1)/points_at_once
+      first = (block - 1)*points_at_once + 1
+      last = min(block*points_at_once, system%body%n_slots)
+      if (size(system%model%materials) == 1) then
+        scale = kick/system%model%materials(1)%density
+      else
+        do k = first, last
+          scale(k - first + 1) = kick*inverse_density(system%model, k)
+        end do
+      end if
+      do c = 1, system%body%dim
+        call leap_block(last - first + 1, scale, dt, system%state%force(first:last, c), &
+          & system%state%v(first:last, c), system%state%u(first:last, c), squares, fourths)
       end do
-    end associate
-    !$omp end parallel
-    sound = ieee_is_finite(sum_of_squares) .and. largest*dt <= system%family%rule%delta
+    end do
+    sound = stays_within(system, system%state%v, dt, fourths)
   end subroutine leap
+
+  !> One component of one block: explicit shapes, so that the loop runs in vector registers. What
+  !> the watch needs is summed in passing.
+  pure subroutine leap_block(n, scale, dt, f, v, u, squares, fourths)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: scale(n), dt, f(n)
+    real(wp), intent(inout) :: v(n), u(n), squares, fourths
+    real(wp) :: seconds, powers, now
+    integer :: k
+
+    seconds = 0.0_wp
+    powers = 0.0_wp
+    do k = 1, n
+      now = v(k) + scale(k)*f(k)
+      v(k) = now
+      u(k) = u(k) + dt*now
+      now = now*now
+      seconds = seconds + now
+      powers = powers + now*now
+    end do
+    squares = squares + seconds
+    fourths = fourths + powers
+  end subroutine leap_block
 
   !> Accelerations at `t` from the forces, 0 for constrained components.
   subroutine accelerations(system, t, a)

@@ -1,14 +1,15 @@
-!> The arrays of a conjugate gradient solve and the loops over them: what is left of the force, the
+!> The loops over the arrays of a conjugate gradient solve: what is left of the force, the
 !> direction, and what the stiffness makes of it (doc/theory.md, 7). Everything is per volume, and
 !> inner products are weighted with the points' volumes, in which the stiffness is symmetric.
 module pd_motion_krylov
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: block_length
+  use pd_motion_newton, only: krylov_type, sums_type
   use pd_motion_system, only: system_type, add_loads
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
-  public :: krylov_type, sums_type, new_krylov, linearise, take_residual, first_direction
+  public :: make_room, linearise, take_residual, first_direction
   public :: next_direction, take_direction, apply_stiffness, go_along, volume_inner
   public :: smallest_curvature
 
@@ -20,43 +21,20 @@ module pd_motion_krylov
   !> Curvature over that of the preconditioner, below which a direction meets no stiffness at all.
   real(wp), parameter :: smallest_curvature = 1.0e-14_wp
 
-  !> One solve.
-  type :: krylov_type
-    real(wp), allocatable :: residual(:, :)   !! f + b on free components, else 0 [N/m3]
-    real(wp), allocatable :: direction(:, :)  !! scaled to `direction_size` [m]
-    real(wp), allocatable :: product(:, :)    !! stiffness times direction [N/m3]
-    real(wp), allocatable :: inverse(:, :)    !! the preconditioner: 1/mass, 0 where held [m4/N]
-    real(wp), allocatable :: origin(:, :)     !! the displacements where the solve began [m]
-    real(wp) :: scale = 1.0_wp                !! of the directions
-    real(wp) :: largest = 0.0_wp              !! component of the direction [m]
-    real(wp) :: rho = 0.0_wp                  !! residual . preconditioned residual
-    real(wp) :: norm = 0.0_wp                 !! curvature if the preconditioner were the stiffness
-    logical :: deformed = .false.             !! the tangent at `origin`, else at no displacement
-    real(wp), allocatable :: forces(:, :)     !! unprojected, there [N/m3]
-    real(wp), allocatable :: moved(:, :)      !! displacements of a difference [m]
-  end type krylov_type
-
-  !> What the loop along a direction sums up, squares over the free components.
-  type :: sums_type
-    real(wp) :: residual = 0.0_wp      !! (V F).(V F)
-    real(wp) :: support = 0.0_wp       !! the same over the constrained components
-    real(wp) :: change = 0.0_wp        !! of displacement by this step
-    real(wp) :: displacement = 0.0_wp
-    real(wp) :: rho = 0.0_wp           !! residual . preconditioned residual, weighted with volume
-  end type sums_type
-
 contains
 
-  !> Room for a system's solves; `mass` (n_slots, dim) is the preconditioner [N/m4].
-  subroutine new_krylov(system, mass, krylov)
+  !> Room for a system's solves, where there is none yet; `mass` (n_slots, dim) is the
+  !> preconditioner [N/m4].
+  subroutine make_room(system, mass, krylov)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: mass(:, :)
-    type(krylov_type), intent(out) :: krylov
+    type(krylov_type), intent(inout) :: krylov
 
-    allocate (krylov%residual, krylov%direction, krylov%product, krylov%inverse, krylov%origin, &
-      & source=0.0_wp*mass)
+    if (.not. allocated(krylov%residual)) allocate (krylov%residual, krylov%direction, &
+      & krylov%origin, source=0.0_wp*mass)
+    allocate (krylov%product, krylov%inverse, source=0.0_wp*mass)
     where (mass > 0.0_wp .and. system%held == 0_i1) krylov%inverse = 1/mass
-  end subroutine new_krylov
+  end subroutine make_room
 
   !> The residual from the system's forces and the loads at `t`, and its sums.
   subroutine take_residual(system, t, krylov, sums)
@@ -161,7 +139,7 @@ contains
     krylov%origin = system%state%u
     krylov%deformed = deformed
     if (.not. deformed) return
-    if (.not. allocated(krylov%forces)) allocate (krylov%forces, krylov%moved, mold=krylov%origin)
+    if (.not. allocated(krylov%forces)) allocate (krylov%forces, mold=krylov%origin)
     call unprojected_forces(system, krylov%origin, krylov%forces)
   end subroutine linearise
 
@@ -206,6 +184,7 @@ contains
       end do
       return
     end if
+    if (.not. allocated(krylov%moved)) allocate (krylov%moved, mold=krylov%origin)
     step = difference_size*system%family%rule%delta/krylov%largest
     do c = 1, size(krylov%product, 2)
       !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)

@@ -4,6 +4,7 @@
 module pd_motion_memory
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp
+  use pd_motion_newton, only: newton_type, keep_newton
   implicit none (type, external)
   private
   public :: memory_type, keep_memory, not_begun
@@ -18,7 +19,8 @@ module pd_motion_memory
     real(wp), allocatable :: a(:, :, :)    !! accelerations then (n_slots, dim, 2) [m/s2]
     ! relaxation
     integer :: load_step = 0               !! the load step under way, or the last one settled
-    integer :: iteration = 0               !! of the relaxation under way; 0: at rest
+    integer :: iteration = 0               !! of the dynamic relaxation under way; 0: none is
+    type(newton_type), allocatable :: newton  !! there while conjugate gradients are under way
     real(wp), allocatable :: rate(:, :)    !! displacement per iteration (n_slots, dim) [m]
     real(wp), allocatable :: trend(:, :)   !! of the last load step, of 0 rows if of no use [m]
     real(wp), allocatable :: start(:, :)   !! displacements where the load step began [m]
@@ -35,6 +37,7 @@ contains
   subroutine keep_memory(archive, memory)
     class(archive_type), intent(inout) :: archive
     type(memory_type), intent(inout) :: memory
+    logical :: conjugate
 
     call archive%keep('step', memory%step)
     call archive%keep('earlier steps', memory%filled)
@@ -50,6 +53,11 @@ contains
     call archive%keep('U.K.U', memory%stiffness)
     call archive%keep('U.U', memory%displacement)
     call archive%keep('dU.dU', memory%change)
+    conjugate = allocated(memory%newton)
+    call archive%keep('conjugate gradients', conjugate)
+    if (allocated(memory%newton) .and. .not. conjugate) deallocate (memory%newton)
+    if (conjugate .and. .not. allocated(memory%newton)) allocate (memory%newton)
+    if (conjugate) call keep_newton(archive, memory%newton)
   end subroutine keep_memory
 
 end module pd_motion_memory

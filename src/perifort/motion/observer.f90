@@ -18,7 +18,6 @@ module pd_motion_observer
     real(wp) :: residual = 0.0_wp     !! relaxation: relative residual force [-]
     logical :: last = .false.         !! the final state
     logical :: settled = .true.       !! relaxation: a load step has converged
-    logical :: resumable = .true.     !! a run can go on from the system as it is
     logical :: gave_way = .false.     !! the conjugate gradient left this to dynamic relaxation
     logical :: rescued = .false.      !! the last good state of a motion that has gone wrong since
   end type instant_type

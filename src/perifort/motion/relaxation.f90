@@ -16,7 +16,7 @@ module pd_motion_relaxation
   use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads
   implicit none (type, external)
   private
-  public :: relaxation_type, run_relaxation, begin_memory
+  public :: relaxation_type, run_relaxation, fill_memory
 
   real(wp), parameter :: largest_damping = 1.9_wp  !! c dt must stay below 2
 
@@ -43,7 +43,7 @@ contains
     type(good_state_type) :: good
     integer(i8) :: number
     integer :: i, first
-    logical :: dynamic, going_on
+    logical :: amid, dynamic
 
     instant%dt = 1.0_wp
     call find_free_motions(system, rigid)
@@ -52,29 +52,30 @@ contains
       if (allocated(error)) return
     end do
     if (system%memory%step == not_begun) then
-      call begin_memory(system)
+      system%memory = memory_type()
       call evaluate(system, 0.0_wp, breaking=.false.)
       call settle(system, instant, observer, error)
       if (allocated(error)) return
     end if
     instant%step = system%memory%step
     if (.not. allocated(system%memory%trend)) allocate (system%memory%trend(0, system%body%dim))
-    call keep_good(good, system, instant)
+    amid = system%memory%iteration > 0 .or. allocated(system%memory%newton)
     first = system%memory%load_step
-    if (system%memory%iteration == 0) first = first + 1
+    if (.not. amid) then
+      call keep_good(good, system, instant)
+      first = first + 1
+    end if
     do i = first, relaxation%load_steps
-      going_on = system%memory%iteration > 0
-      if (relaxation%conjugate_gradient .and. relaxation%load_steps > 1 .and. .not. going_on) &
+      if (relaxation%conjugate_gradient .and. relaxation%load_steps > 1 .and. .not. amid) &
         & system%memory%start = system%state%u
+      amid = .false.
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
       do
-        dynamic = going_on .or. .not. relaxation%conjugate_gradient
+        dynamic = system%memory%iteration > 0 .or. .not. relaxation%conjugate_gradient
         if (.not. dynamic) then
-          instant%resumable = .false.
           call relax_by_conjugate_gradient(system, relaxation, rigid, system%memory%trend, &
             & instant, observer, dynamic, error)
-          instant%resumable = .true.
           instant%gave_way = dynamic
         end if
         if (dynamic .and. .not. allocated(error)) &
@@ -84,7 +85,7 @@ contains
           if (error%status == status_no_answer) call show_good(good, system, observer, error)
           return
         end if
-        going_on = .false.
+        if (allocated(system%memory%rate)) deallocate (system%memory%rate)
         system%memory%trend = system%memory%trend(:0, :)
         ! the forces that did the work are those before the bonds break
         call account(system, instant%time, at_rest=.true.)
@@ -105,13 +106,23 @@ contains
     system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_relaxation
 
-  !> Room for what is carried from iteration to iteration.
-  subroutine begin_memory(system)
+  !> Fill a system's memory with all that a relaxation may ever carry, whose size is then known.
+  subroutine fill_memory(system, relaxation)
     type(system_type), intent(inout) :: system
+    type(relaxation_type), intent(in) :: relaxation
+
     system%memory = memory_type()
-    allocate (system%memory%rate, mold=system%state%u)
-    system%memory%rate = 0.0_wp
-  end subroutine begin_memory
+    if (.not. relaxation%conjugate_gradient) then
+      allocate (system%memory%rate, mold=system%state%u)
+      return
+    end if
+    allocate (system%memory%newton)
+    associate (memory => system%memory, krylov => system%memory%newton%krylov)
+      allocate (krylov%residual, krylov%direction, krylov%origin, krylov%forces, &
+        & memory%newton%best, mold=system%state%u)
+      if (relaxation%load_steps > 1) allocate (memory%trend, memory%start, mold=system%state%u)
+    end associate
+  end subroutine fill_memory
 
   !> The end of a load step, whose forces are known: let the observer see it.
   subroutine settle(system, instant, observer, error)
@@ -142,6 +153,7 @@ contains
     integer :: iteration, fault, m
 
     allocate (a, a_before, mold=system%state%u)
+    if (.not. allocated(system%memory%rate)) allocate (system%memory%rate, mold=system%state%u)
     instant%settled = .false.
     associate (memory => system%memory, rate => system%memory%rate)
       if (memory%iteration == 0) then

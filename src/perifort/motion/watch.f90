@@ -2,8 +2,10 @@
 !> start and has been supplied since (doc/theory.md, 9).
 !>
 !> Every few steps the integrator compares the kinetic energy, which alone must not exceed what was
-!> supplied. Strain and dissipated energy are added when somebody looks at all energies: the
-!> history, or the integrator if that has not been for long.
+!> supplied: what is unstable grows at the highest frequencies, where a good half of the energy is
+!> motion at any step. Strain and dissipated energy are added when somebody looks at all energies:
+!> the history, or the integrator if that has not been for long, since the strain energy costs as
+!> much as several steps.
 module pd_motion_watch
   use pd_base_kinds, only: wp
   implicit none (type, external)
@@ -16,15 +18,19 @@ module pd_motion_watch
   real(wp), parameter :: too_much = 100.0_wp
   !> More than the balance is off where many bonds break (doc/theory.md, 9).
   real(wp), parameter :: good = 1.1_wp
-  integer, parameter :: first_look = 50   !! steps; then at 100, 200, 400, 800, 1200, ...
-  integer, parameter :: longest = 400     !! steps from one look to the next
+  integer, parameter :: kinetic_every = 10  !! steps from one look at the kinetic energy to the next
+  integer, parameter :: all_every = 2000    !! steps without a look at all energies, at most
+  integer, parameter :: first_kept = 50     !! steps; then at 100, 200, 400, 800, 1200, ...
+  integer, parameter :: longest = 400       !! steps from one state that is kept to the next
 
   type :: watch_type
     private
     real(wp), public :: rounding = 0.0_wp  !! energy that is none [J]
+    real(wp), public :: heaviest = 0.0_wp  !! mass of a point [kg]
     real(wp) :: start = 0.0_wp             !! energy at the start, without what was supplied [J]
     real(wp) :: supply = -1.0_wp           !! greatest energy that there can have been [J]
     real(wp) :: energy = 0.0_wp            !! at the last look [J]
+    real(wp) :: kinetic = 0.0_wp           !! at the last look at it alone [J]
     logical :: doubtful = .false.          !! the last look found too much
     integer :: looked = -1                 !! step of the last look, -1: none yet
     integer :: kept = -1                   !! step of the last state that was kept
@@ -34,8 +40,11 @@ module pd_motion_watch
     procedure :: look_is_due
     procedure :: keeps
     procedure :: look_at_kinetic
+    procedure :: kinetic_is_due
+    procedure :: most_of_good
     procedure :: supplied
     procedure :: found
+    procedure, private :: is_old
     procedure, private :: most
   end type watch_type
 
@@ -58,23 +67,57 @@ contains
   pure logical function look_is_due(self, step)
     class(watch_type), intent(in) :: self
     integer, intent(in) :: step
-    look_is_due = self%looked < 0 .or. is_long(self%looked, step)
+    look_is_due = self%looked < 0 .or. step - self%looked >= all_every
   end function look_is_due
 
-  !> Whether the state after `step` steps is to be kept, because its energies were looked at and
-  !> agreed, and the one that is kept is old. The caller keeps it.
+  !> Whether the kinetic energy must be looked at after `step` steps: from time to time, if it may
+  !> be too much, and before a state is kept. `bound` is what it does not exceed [J].
+  pure logical function kinetic_is_due(self, step, bound)
+    class(watch_type), intent(in) :: self
+    integer, intent(in) :: step
+    real(wp), intent(in) :: bound
+    kinetic_is_due = mod(step, kinetic_every) == 0
+    if (kinetic_is_due) kinetic_is_due = .not. bound <= self%most() .or. &
+      & (self%looked < step .and. self%is_old(step))
+  end function kinetic_is_due
+
+  !> Whether the state after `step` steps is to be kept, because the one that is kept is old and the
+  !> energies agree: all of them, if they were just looked at, or the kinetic energy, which was
+  !> then, if nobody has looked at all of them for long. The caller keeps it.
   logical function keeps(self, step)
     class(watch_type), intent(inout) :: self
     integer, intent(in) :: step
-    keeps = self%sound .and. self%looked == step .and. self%energy <= good*self%supply
-    if (keeps .and. self%kept >= 0) keeps = is_long(self%kept, step)
+
+    keeps = self%sound .and. self%is_old(step)
+    if (.not. keeps) return
+    if (self%looked == step) then
+      keeps = self%energy <= self%most_of_good()
+    else
+      keeps = mod(step, kinetic_every) == 0 .and. self%kinetic <= self%most_of_good()
+    end if
     if (keeps) self%kept = step
   end function keeps
+
+  !> Whether the state that is kept is old after `step` steps, and so is the last look, unless it is
+  !> of this step.
+  pure logical function is_old(self, step)
+    class(watch_type), intent(in) :: self
+    integer, intent(in) :: step
+    is_old = self%kept < 0
+    if (.not. is_old) is_old = is_long(self%kept, step)
+    if (self%looked >= 0 .and. self%looked < step) is_old = is_old .and. is_long(self%looked, step)
+  end function is_old
+
+  !> The energy beyond which a state is not a good one [J].
+  pure real(wp) function most_of_good(self)
+    class(watch_type), intent(in) :: self
+    most_of_good = good*self%supply
+  end function most_of_good
 
   !> Whether it is long from one step to another: steps 50, 100, 200, 400, 800, 1200, ...
   pure logical function is_long(from, to)
     integer, intent(in) :: from, to
-    is_long = to - from >= min(longest, max(first_look, from))
+    is_long = to - from >= min(longest, max(first_kept, from))
   end function is_long
 
   !> Note the work of loads and imposed motion since the start [J], in every step. A load that has
@@ -93,6 +136,7 @@ contains
   pure subroutine look_at_kinetic(self, kinetic)
     class(watch_type), intent(inout) :: self
     real(wp), intent(in) :: kinetic
+    self%kinetic = kinetic
     if (self%supply < 0.0_wp .or. kinetic <= self%most()) return
     self%sound = .false.
     self%energy = kinetic

@@ -160,7 +160,7 @@ contains
     integer, intent(in) :: step
 
     is_due = .false.
-    ! not every instant allows it
+    ! the instants after a load step has settled have the number of its last iteration
     if (self%every > 0) is_due = step/self%every > self%last_step/self%every
     if (.not. is_due .and. self%minutes > 0.0_wp) &
       & is_due = wall_time() - self%last >= 60*self%minutes

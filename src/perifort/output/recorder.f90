@@ -204,7 +204,7 @@ contains
       end if
     end associate
     if (instant%gave_way) call note_giving_way(observer, instant)
-    may_stop = instant%resumable .and. .not. instant%last
+    may_stop = .not. instant%last
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
     row = row_due .or. stopping .or. instant%last
@@ -223,6 +223,9 @@ contains
     if (output) then
       call observer%timer%start('output')
       call write_output(observer, system, instant, v, error)
+      ! a run that goes on does not have the output that is written because it stops
+      if (output_due_now .or. instant%last) call warn_of_contact(observer, system, instant)
+      call observer%results%put_warnings(observer%warnings%text())
       call observer%timer%stop('output')
       if (allocated(error)) return
     end if
@@ -276,6 +279,8 @@ contains
       call velocities_now(system, instant%time, instant%kick, v)
       call write_output(recorder, system, instant, v, error)
       if (allocated(error)) return
+      call warn_of_contact(recorder, system, instant)
+      call recorder%results%put_warnings(recorder%warnings%text())
     end if
     recorder%rescued = state//' is the last output'
   end subroutine write_rescued
@@ -480,8 +485,6 @@ contains
     call recorder%results%end_output(error)
     recorder%outputs = recorder%outputs + 1
     recorder%output_step = instant%step
-    call warn_of_contact(recorder, system, instant)
-    call recorder%results%put_warnings(recorder%warnings%text())
 
   contains
 

@@ -1,0 +1,102 @@
+!> Where a relaxation by conjugate gradients stands between two of its iterations: all that passes
+!> from one to the next (doc/theory.md, 7). Everything else follows from the system and its loads.
+module pd_motion_newton
+  use pd_base_archive, only: archive_type
+  use pd_base_kinds, only: wp
+  implicit none (type, external)
+  private
+  public :: newton_type, krylov_type, sums_type, keep_newton
+
+  !> What the loop along a direction sums up, squares over the free components.
+  type :: sums_type
+    real(wp) :: residual = 0.0_wp      !! (V F).(V F)
+    real(wp) :: support = 0.0_wp       !! the same over the constrained components
+    real(wp) :: change = 0.0_wp        !! of displacement by this step
+    real(wp) :: displacement = 0.0_wp
+    real(wp) :: rho = 0.0_wp           !! residual . preconditioned residual, weighted with volume
+  end type sums_type
+
+  !> A solve of the linear equations.
+  type :: krylov_type
+    real(wp), allocatable :: residual(:, :)   !! f + b on free components, else 0 [N/m3]
+    real(wp), allocatable :: direction(:, :)  !! of the next iteration, small [m]
+    real(wp), allocatable :: origin(:, :)     !! the displacements where the solve began [m]
+    real(wp), allocatable :: forces(:, :)     !! unprojected, there, if `deformed` [N/m3]
+    real(wp) :: scale = 1.0_wp                !! of the directions
+    real(wp) :: largest = 0.0_wp              !! component of the direction [m]
+    real(wp) :: rho = 0.0_wp                  !! residual . preconditioned residual
+    real(wp) :: norm = 0.0_wp                 !! curvature if the preconditioner were the stiffness
+    logical :: deformed = .false.             !! the tangent at `origin`, else at no displacement
+    ! made anew wherever it goes on
+    real(wp), allocatable :: inverse(:, :)    !! the preconditioner: 1/mass, 0 where held [m4/N]
+    real(wp), allocatable :: product(:, :)    !! stiffness times direction [N/m3]
+    real(wp), allocatable :: moved(:, :)      !! displacements of a difference [m]
+  end type krylov_type
+
+  !> Newton's iterations and the solve under way.
+  type :: newton_type
+    type(krylov_type) :: krylov
+    integer :: iterations = 0         !! of all solves
+    real(wp) :: reference = 0.0_wp    !! square of what acts on the body, as far as it is known
+    real(wp) :: change = 0.0_wp       !! of displacement in the last iteration, over displacement
+    type(sums_type) :: sums           !! of the last look at the true forces
+    ! the solve
+    type(sums_type) :: linear         !! as its equations have it
+    real(wp) :: next_look = 0.0_wp    !! squared residual at which the true forces are evaluated
+    real(wp) :: hopeless = 0.0_wp     !! squared residual that no solvable equations reach
+    ! between solves
+    real(wp) :: before = 0.0_wp       !! squared residual where the solve began
+    real(wp) :: least = 0.0_wp        !! the smallest so far
+    integer :: ahead = 0              !! solves that went uphill since then
+    integer :: slow = 0               !! shortened steps that left much
+    logical :: fresh = .true.         !! nothing has been gained yet
+    logical :: strict = .false.       !! no solve may go uphill
+    real(wp), allocatable :: best(:, :)  !! displacements of `least`, if `ahead` of them [m]
+  end type newton_type
+
+contains
+
+  !> Keep all that an iteration leaves to the next one, or put it back.
+  subroutine keep_newton(archive, newton)
+    class(archive_type), intent(inout) :: archive
+    type(newton_type), intent(inout) :: newton
+
+    associate (krylov => newton%krylov)
+      call archive%keep('residual force', krylov%residual)
+      call archive%keep('direction', krylov%direction)
+      call archive%keep('origin', krylov%origin)
+      call archive%keep('forces at the origin', krylov%forces)
+      call archive%keep('scale', krylov%scale)
+      call archive%keep('largest', krylov%largest)
+      call archive%keep('rho', krylov%rho)
+      call archive%keep('norm', krylov%norm)
+      call archive%keep('deformed', krylov%deformed)
+    end associate
+    call archive%keep('iterations', newton%iterations)
+    call archive%keep('reference', newton%reference)
+    call archive%keep('change', newton%change)
+    call keep_sums(archive, newton%sums)
+    call keep_sums(archive, newton%linear)
+    call archive%keep('next look', newton%next_look)
+    call archive%keep('hopeless', newton%hopeless)
+    call archive%keep('before', newton%before)
+    call archive%keep('least', newton%least)
+    call archive%keep('ahead', newton%ahead)
+    call archive%keep('slow', newton%slow)
+    call archive%keep('fresh', newton%fresh)
+    call archive%keep('strict', newton%strict)
+    call archive%keep('best', newton%best)
+  end subroutine keep_newton
+
+  subroutine keep_sums(archive, sums)
+    class(archive_type), intent(inout) :: archive
+    type(sums_type), intent(inout) :: sums
+
+    call archive%keep('sum of residual', sums%residual)
+    call archive%keep('sum of support', sums%support)
+    call archive%keep('sum of change', sums%change)
+    call archive%keep('sum of displacement', sums%displacement)
+    call archive%keep('sum of rho', sums%rho)
+  end subroutine keep_sums
+
+end module pd_motion_newton
