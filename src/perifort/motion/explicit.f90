@@ -9,7 +9,7 @@ module pd_motion_explicit
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_fault, only: explain_fault, faulty_slot, stays_within
+  use pd_motion_fault, only: explain_fault, faulty_slot, points_at_once, stays_within
   use pd_motion_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_watch, only: watch_type
   use pd_motion_system, only: system_type, energies_type, energies_of, evaluate, account, &
@@ -23,7 +23,6 @@ module pd_motion_explicit
     real(wp), allocatable :: u(:, :), v(:, :), a(:, :)
   end type start_type
 
-  integer, parameter :: points_at_once = 512  !! moved in one loop: a few kB of each array
   real(wp), parameter :: smallest_strain = 1.0e-12_wp  !! what is below is rounding
 
 contains
@@ -40,7 +39,7 @@ contains
     type(start_type) :: start
     type(instant_type) :: instant
     type(good_state_type) :: good
-    real(wp) :: squares
+    real(wp) :: squares, bound
     logical :: sound
     integer :: n, seen
 
@@ -52,7 +51,7 @@ contains
       & *sum(system%body%volume)
     system%watch%heaviest = heaviest_point(system)
     call allocate_start(system, integrator, start)
-    squares = huge(squares)
+    bound = huge(bound)
     do n = max(0, seen), steps
       instant%step = n
       instant%time = n*dt
@@ -69,7 +68,7 @@ contains
         if (allocated(error)) return
       end if
       if (n == steps) exit
-      call look(system, instant, squares, good)
+      call look(system, instant, bound, good)
       if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, squares, sound)
@@ -77,6 +76,7 @@ contains
         call advance(system, integrator, instant%time, dt, start)
         sound = faulty_slot(system, system%state%v, dt, squares) == 0
       end if
+      bound = system%watch%heaviest/2*squares
       if (sound .and. system%watch%sound) cycle
       call explain_fault(system, n + 1, dt, error)
       call show_good(good, system, observer, error)
@@ -85,12 +85,12 @@ contains
     system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_explicit
 
-  !> Look at the energies if nobody has for long, and keep a state in which they agree. `squares` is
-  !> the sum of the squares of all components of velocity, which bounds the kinetic energy.
-  subroutine look(system, instant, squares, good)
+  !> Look at the energies if nobody has for long, and keep a state in which they agree. `bound` is
+  !> what the kinetic energy does not exceed [J].
+  subroutine look(system, instant, bound, good)
     type(system_type), intent(inout) :: system
     type(instant_type), intent(in) :: instant
-    real(wp), intent(in) :: squares
+    real(wp), intent(in) :: bound
     type(good_state_type), intent(inout) :: good
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :)
@@ -101,7 +101,7 @@ contains
       call system%watch%look(instant%step, energies%kinetic, energies%strain, &
         & system%dissipated, system%external_work)
     end if
-    if (system%watch%kinetic_is_due(instant%step, system%watch%heaviest/2*squares)) &
+    if (system%watch%kinetic_is_due(instant%step, bound)) &
       & call system%watch%look_at_kinetic(kinetic_energy(system))
     if (system%watch%keeps(instant%step)) &
       & call keep_good(good, system, instant, system%watch%most_of_good())
@@ -216,14 +216,15 @@ contains
     real(wp), intent(in) :: t, kick, dt
     real(wp), intent(out) :: squares
     logical, intent(out) :: sound
-    real(wp) :: scale(points_at_once), fourths
+    real(wp) :: scale(points_at_once), sum_of_block, largest_sum
     integer :: block, first, last, c, k
 
     call add_loads(system, t, kick, .true., system%state%v)
     squares = 0.0_wp
-    fourths = 0.0_wp
+    largest_sum = 0.0_wp
     !$omp parallel do schedule(static) default(none) shared(system, kick, dt) &
-    !$omp private(block, first, last, c, k, scale) reduction(+:squares, fourths)
+    !$omp private(block, first, last, c, k, scale, sum_of_block) reduction(+:squares) &
+    !$omp reduction(max:largest_sum)
     do block = 1, (system%body%n_slots + points_at_once - 1)/points_at_once
       first = (block - 1)*points_at_once + 1
       last = min(block*points_at_once, system%body%n_slots)
@@ -236,33 +237,31 @@ contains
       end if
       do c = 1, system%body%dim
         call leap_block(last - first + 1, scale, dt, system%state%force(first:last, c), &
-          & system%state%v(first:last, c), system%state%u(first:last, c), squares, fourths)
+          & system%state%v(first:last, c), system%state%u(first:last, c), sum_of_block)
+        squares = squares + sum_of_block
+        largest_sum = max(largest_sum, sum_of_block)
       end do
     end do
-    sound = stays_within(system, system%state%v, dt, fourths)
+    sound = stays_within(system, system%state%v, dt, squares, largest_sum)
   end subroutine leap
 
-  !> One component of one block: explicit shapes, so that the loop runs in vector registers. What
-  !> the watch needs is summed in passing.
-  pure subroutine leap_block(n, scale, dt, f, v, u, squares, fourths)
+  !> One component of one block: explicit shapes, so that the loop runs in vector registers.
+  !> `squares` is the sum of the squares of its velocities.
+  pure subroutine leap_block(n, scale, dt, f, v, u, squares)
     integer, intent(in) :: n
     real(wp), intent(in) :: scale(n), dt, f(n)
-    real(wp), intent(inout) :: v(n), u(n), squares, fourths
-    real(wp) :: seconds, powers, now
+    real(wp), intent(inout) :: v(n), u(n)
+    real(wp), intent(out) :: squares
+    real(wp) :: now
     integer :: k
 
-    seconds = 0.0_wp
-    powers = 0.0_wp
+    squares = 0.0_wp
     do k = 1, n
       now = v(k) + scale(k)*f(k)
       v(k) = now
       u(k) = u(k) + dt*now
-      now = now*now
-      seconds = seconds + now
-      powers = powers + now*now
+      squares = squares + now**2
     end do
-    squares = squares + seconds
-    fourths = fourths + powers
   end subroutine leap_block
 
   !> Accelerations at `t` from the forces, 0 for constrained components.

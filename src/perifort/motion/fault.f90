@@ -9,9 +9,12 @@ module pd_motion_fault
   use pd_motion_system, only: system_type, energies_type
   implicit none (type, external)
   private
-  public :: faulty_slot, stays_within, explain_fault, check_strain_energy, place, greatest_stretch
+  public :: faulty_slot, stays_within, points_at_once, explain_fault, check_strain_energy, place, &
+    & greatest_stretch
 
-  integer, parameter :: points_at_once = 512     !! in one loop: a few kB of an array
+  !> Points of a block whose rates are summed up by themselves: few enough to tell of the largest,
+  !> and a few kB of each array.
+  integer, parameter :: points_at_once = 512
   real(wp), parameter :: large_stretch = 0.1_wp  !! beyond it a bond is noticeably stiffer [-]
 
 contains
@@ -24,69 +27,60 @@ contains
     real(wp), intent(in), contiguous :: rate(:, :)
     real(wp), intent(in) :: dt
     real(wp), intent(out), optional :: squares
-    real(wp) :: seconds, fourths
+    real(wp) :: sum_of_all, sum_of_block, largest_sum
     integer :: block, first, last, c
 
-    seconds = 0.0_wp
-    fourths = 0.0_wp
-    !$omp parallel do schedule(static) default(none) shared(rate) private(block, first, last, c) &
-    !$omp reduction(+:seconds, fourths)
+    sum_of_all = 0.0_wp
+    largest_sum = 0.0_wp
+    !$omp parallel do schedule(static) default(none) shared(rate) &
+    !$omp private(block, first, last, c, sum_of_block) reduction(+:sum_of_all) &
+    !$omp reduction(max:largest_sum)
     do block = 1, (size(rate, 1) + points_at_once - 1)/points_at_once
       first = (block - 1)*points_at_once + 1
       last = min(block*points_at_once, size(rate, 1))
       do c = 1, size(rate, 2)
-        call add_powers(last - first + 1, rate(first:last, c), seconds, fourths)
+        sum_of_block = sum_of_squares(last - first + 1, rate(first:last, c))
+        sum_of_all = sum_of_all + sum_of_block
+        largest_sum = max(largest_sum, sum_of_block)
       end do
     end do
-    if (present(squares)) squares = seconds
+    if (present(squares)) squares = sum_of_all
     slot = 0
-    if (.not. stays_within(system, rate, dt, fourths)) slot = fastest_slot(rate)
+    if (.not. stays_within(system, rate, dt, sum_of_all, largest_sum)) slot = fastest_slot(rate)
   end function faulty_slot
 
-  !> Sums of second and fourth powers; an explicit shape, so that the loop runs in vector registers.
-  pure subroutine add_powers(n, values, seconds, fourths)
+  !> An explicit shape, so that the loop runs in vector registers.
+  pure real(wp) function sum_of_squares(n, values)
     integer, intent(in) :: n
     real(wp), intent(in) :: values(n)
-    real(wp), intent(inout) :: seconds, fourths
-    real(wp) :: second, fourth, square
-    integer :: k
+    sum_of_squares = sum(values**2)
+  end function sum_of_squares
 
-    second = 0.0_wp
-    fourth = 0.0_wp
-    do k = 1, n
-      square = values(k)**2
-      second = second + square
-      fourth = fourth + square*square
-    end do
-    seconds = seconds + second
-    fourths = fourths + fourth
-  end subroutine add_powers
-
-  !> Whether all rates are finite and carry no point across its horizon in one step `dt`. `fourths`
-  !> is the sum of their fourth powers, whose root none of them exceeds: a sum is formed in passing,
-  !> where the largest would cost as much as the rest of the pass. In a body of a million points
-  !> that all move alike it tells as long as they move by less than a thirtieth of the horizon.
-  logical function stays_within(system, rate, dt, fourths)
+  !> Whether all rates are finite and carry no point across its horizon in one step `dt`. `squares`
+  !> is the sum of their squares, `largest_sum` the largest one of a component of a block, whose
+  !> root none of them exceeds: sums are formed in passing, where the largest rate would cost as
+  !> much as the rest of the pass. They tell as long as a block whose points all move alike moves by
+  !> less than a twentieth of the horizon; else the largest rate is looked for.
+  logical function stays_within(system, rate, dt, squares, largest_sum)
     type(system_type), intent(in) :: system
     real(wp), intent(in), contiguous :: rate(:, :)
-    real(wp), intent(in) :: dt, fourths
-    real(wp) :: largest, sum_of_squares
+    real(wp), intent(in) :: dt, squares, largest_sum
+    real(wp) :: largest
     integer :: k, c
 
+    stays_within = ieee_is_finite(squares)
+    if (.not. stays_within) return
     associate (delta => system%family%rule%delta)
-      stays_within = fourths*dt**4 <= delta**4
-      if (stays_within) return
+      if (sqrt(largest_sum)*dt <= delta) return
       largest = 0.0_wp
-      sum_of_squares = 0.0_wp
       do c = 1, size(rate, 2)
         !$omp parallel do simd schedule(static) default(none) shared(rate, c) private(k) &
-        !$omp reduction(max:largest) reduction(+:sum_of_squares)
+        !$omp reduction(max:largest)
         do k = 1, size(rate, 1)
           largest = max(largest, abs(rate(k, c)))
-          sum_of_squares = sum_of_squares + rate(k, c)**2
         end do
       end do
-      stays_within = ieee_is_finite(sum_of_squares) .and. largest*dt <= delta
+      stays_within = largest*dt <= delta
     end associate
   end function stays_within
 
