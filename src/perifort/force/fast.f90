@@ -58,7 +58,8 @@ contains
     & p, limit, force, left, missed)
     integer, intent(in) :: dim, range, n, m
     logical, intent(in) :: dilatation
-    real(wp), intent(in) :: weight(lanes, *), stretch(lanes, n), geometry(4, n), u(m, dim), p(*)
+    real(wp), intent(in) :: weight(lanes, merge(n, 0, dilatation)), stretch(lanes, n)
+    real(wp), intent(in) :: geometry(4, n), u(m, dim), p(merge(m, 0, dilatation))
     integer(i8), intent(in) :: shift(n), first
     real(wp), intent(in) :: limit
     real(wp), intent(inout) :: force(m, dim), left(lanes, n)
@@ -92,7 +93,8 @@ contains
     & stretches, theta)
     integer, intent(in) :: dim, n, m
     logical, intent(in) :: dilatation
-    real(wp), intent(in) :: weight(lanes, *), stretch(lanes, n), geometry(4, n), u(m, dim)
+    real(wp), intent(in) :: weight(lanes, merge(n, 0, dilatation)), stretch(lanes, n)
+    real(wp), intent(in) :: geometry(4, n), u(m, dim)
     integer(i8), intent(in) :: shift(n), first
     real(wp), intent(out) :: stretches(lanes), theta(lanes)
 
