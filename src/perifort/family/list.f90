@@ -7,6 +7,7 @@
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_text, only: to_text
   use pd_body_body, only: body_type, arrange
   use pd_family_clusters, only: rows_type, order_in_rows, collect_members, lane_bit
   use pd_family_family, only: family_type, bonds_type
@@ -229,7 +230,8 @@ contains
   function describe(family) result(text)
     class(list_family_type), intent(in) :: family
     character(:), allocatable :: text
-    text = 'list: the neighbours of every eight points stored one by one'
+    text = 'list: the neighbours of every eight points, each with '//to_text( &
+      & real(family%n_bonds, wp)/max(1, size(family%member)), 2)//' bonds'
     if (allocated(family%reason)) text = text//' ('//family%reason//')'
     if (allocated(family%fraction)) text = text//', with their volume fractions'
   end function describe
