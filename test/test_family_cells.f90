@@ -2,7 +2,7 @@
 module test_family_cells
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_body_body, only: body_type, allocate_points
-  use pd_family_cells, only: cells_type, sort_into_cells, count_neighbours, brute_force_neighbours
+  use pd_family_cells, only: cells_type, sort_into_cells, brute_force_neighbours
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_rule_type, reach, volume_none, volume_linear, &
@@ -252,9 +252,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: n = 100
     type(body_type) :: body
-    type(cells_type) :: cells
-    integer(i4), allocatable :: number(:)
-    real(wp), allocatable :: half_reach(:)
+    type(list_family_type) :: family
     integer(i8) :: expected
     integer :: i, j, k
 
@@ -268,11 +266,11 @@ contains
       end do
     end do
     call lattice([n, n, n], 1.0e-3_wp, 0.0_wp, body)
-    allocate (half_reach(n**3), source=3.015e-3_wp/2)
-    allocate (number(n**3))
-    call sort_into_cells(body%x, 3.015e-3_wp, cells)
-    call count_neighbours(body%x, half_reach, cells, number)
-    call expect_true(error, sum(int(number, i8)) == expected, 'bonds of a million points')
+    call new_list_family(body, volume_rule_type(volume_linear, 3.015e-3_wp), family)
+    call expect_true(error, family%n_bonds == expected, 'bonds of a million points')
+    ! a member of a cluster has few bonds if the eight points are not close together: on cubes of two
+    ! points a side it has 4.3 inside the body, by counting
+    call expect_true(error, family%n_bonds > 4*size(family%member, kind=i8), 'clusters are compact')
     call expect_true(error, pairs_per_point(body, 3.015e-3_wp) <= (3*3.2_wp + 1)**3, &
       & 'pairs of a million points')
   end subroutine test_million

@@ -3,8 +3,8 @@ module pd_family_cells
   use pd_base_kinds, only: wp, i2, i4
   implicit none (type, external)
   private
-  public :: cells_type, sort_into_cells, count_neighbours, neighbours_of, &
-    & joins_labels, brute_force_neighbours, cell_of, cells_around
+  public :: cells_type, sort_into_cells, neighbours_of, joins_labels, brute_force_neighbours, &
+    & cell_of, cells_around
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
   type :: cells_type
@@ -107,23 +107,6 @@ contains
       end do
     end do
   end subroutine cells_around
-
-  !> Number of points within `reach(spacing_k, spacing_j)` of each point (itself not counted).
-  !> `half_reach(k)` [m]: two points are neighbours if they are no further apart than the sum.
-  subroutine count_neighbours(x, half_reach, cells, number)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: half_reach(:)
-    type(cells_type), intent(in) :: cells
-    integer(i4), intent(out) :: number(:)
-    integer(i4) :: none(0)
-    integer :: k
-
-    !$omp parallel do schedule(dynamic, 512) default(none) shared(x, half_reach, cells, number) &
-    !$omp private(k, none)
-    do k = 1, size(x, 1)
-      call visit(x, half_reach, cells, k, number(k), none)
-    end do
-  end subroutine count_neighbours
 
   !> The neighbours of one point in `found(:number)`, which grows as needed.
   pure subroutine neighbours_of(x, half_reach, cells, k, number, found)

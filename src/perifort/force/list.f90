@@ -9,9 +9,7 @@ module pd_force_list
   use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_exact
   use pd_force_general, only: mark_slot
-  use pd_force_list_fast, only: list_dilatation_2, list_dilatation_3, tabled_dilatation_2, &
-    & tabled_dilatation_3, list_state_2, list_state_3, tabled_state_2, tabled_state_3, &
-    & list_bond_2, list_bond_3, tabled_bond_2, tabled_bond_3
+  use pd_force_list_fast, only: choose_theta, choose_force
   use pd_force_list_general, only: work_type, general_theta, general_force, general_energy
   use pd_force_model, only: model_type
   use pd_force_polynomial, only: fast_limit, narrow
@@ -45,7 +43,11 @@ contains
       if (work%tabled) call fill_tables(family, model, work, own=.false.)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       missed = limit <= 0.0_wp
-      if (.not. missed) call fast_theta(family, work, limit, theta, missed)
+      associate (e => family%start(c), n => work%n)
+        if (.not. missed) call work%theta(n, family%member(e:e + n - 1), &
+          & family%intact(e:e + n - 1), family%at, work%own, work%dilatation, work%geometry, &
+          & work%edge, work%per_spacing, limit, theta, missed)
+      end associate
       family%large(c) = merge(1_i1, 0_i1, missed)
       if (missed) then
         if (.not. work%tabled) call fill_tables(family, model, work, own=.false.)
@@ -90,7 +92,11 @@ contains
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       missed = limit <= 0.0_wp
       if (model%dilatation) missed = family%large(c) == 1_i1
-      if (.not. missed) call fast_pull(family, model%dilatation, work, limit, f, missed)
+      associate (e => family%start(c), n => work%n)
+        if (.not. missed) call work%force(n, family%member(e:e + n - 1), &
+          & family%intact(e:e + n - 1), family%at, work%own, work%stretch, work%dilatation, &
+          & work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
+      end associate
       if (missed) then
         if (.not. work%tabled) call fill_tables(family, model, work, own=.false.)
         associate (e => family%start(c))
@@ -140,13 +146,15 @@ contains
   ! ---------------------------------------------------------------- one cluster
 
   !> Room for any cluster, and what is the same for all of them.
-  pure subroutine begin_work(family, model, work)
+  subroutine begin_work(family, model, work)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(work_type), intent(out) :: work
 
     work%tabled = model%surface .or. size(model%materials) > 1 .or. .not. family%one_spacing &
       & .or. family%rule%kind == volume_exact
+    call choose_theta(family%dim, work%tabled, work%theta)
+    call choose_force(family%dim, work%tabled, model%dilatation, work%force)
     associate (n => family%most_members)
       allocate (work%stretch(lanes, n), work%dilatation(lanes, n), work%geometry(lanes, n))
     end associate
@@ -192,74 +200,6 @@ contains
       if (size(p) > 0) family%at(at_p, k) = p(k)
     end do
   end subroutine gather_state
-
-  !> theta of a cluster by the fast formulas.
-  subroutine fast_theta(family, work, limit, theta, missed)
-    type(list_family_type), intent(in) :: family
-    type(work_type), intent(in) :: work
-    real(wp), intent(in) :: limit
-    real(wp), intent(out) :: theta(lanes)
-    logical, intent(out) :: missed
-
-    associate (e => family%start(work%cluster), n => work%n)
-      associate (member => family%member(e:e + n - 1), intact => family%intact(e:e + n - 1))
-        if (family%dim == 3 .and. work%tabled) then
-          call tabled_dilatation_3(n, member, intact, family%at, work%own, work%dilatation, &
-            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
-        else if (family%dim == 3) then
-          call list_dilatation_3(n, member, intact, family%at, work%own, work%dilatation, &
-            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
-        else if (work%tabled) then
-          call tabled_dilatation_2(n, member, intact, family%at, work%own, work%dilatation, &
-            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
-        else
-          call list_dilatation_2(n, member, intact, family%at, work%own, work%dilatation, &
-            & work%geometry, work%edge, work%per_spacing, limit, theta, missed)
-        end if
-      end associate
-    end associate
-  end subroutine fast_theta
-
-  !> Forces of a cluster by the fast formulas; `state`: there is a dilatation.
-  subroutine fast_pull(family, state, work, limit, f, missed)
-    type(list_family_type), intent(in) :: family
-    logical, intent(in) :: state
-    type(work_type), intent(in) :: work
-    real(wp), intent(in) :: limit
-    real(wp), intent(out) :: f(lanes, 3)
-    logical, intent(out) :: missed
-
-    associate (e => family%start(work%cluster), n => work%n)
-      associate (member => family%member(e:e + n - 1), intact => family%intact(e:e + n - 1))
-        select case (merge(4, 0, family%dim == 3) + merge(2, 0, state) + merge(1, 0, work%tabled))
-        case (7)
-          call tabled_state_3(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case (6)
-          call list_state_3(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case (5)
-          call tabled_bond_3(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case (4)
-          call list_bond_3(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case (3)
-          call tabled_state_2(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case (2)
-          call list_state_2(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case (1)
-          call tabled_bond_2(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        case default
-          call list_bond_2(n, member, intact, family%at, work%own, work%stretch, &
-            & work%dilatation, work%geometry, work%edge, work%per_spacing, work%q, limit, f, missed)
-        end select
-      end associate
-    end associate
-  end subroutine fast_pull
 
   ! ---------------------------------------------------------------- tables
 

@@ -6,6 +6,7 @@ module pd_force_list_general
   use pd_family_list, only: at_moved, at_p
   use pd_family_offsets, only: lanes
   use pd_force_general, only: crushed
+  use pd_force_list_fast, only: theta_loop, force_loop
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
@@ -17,6 +18,8 @@ module pd_force_list_general
     integer :: first = 1                       !! its first slot
     integer :: n = 0                           !! its members
     logical :: tabled = .false.                !! its weights are in the tables
+    procedure(theta_loop), pointer, nopass :: theta => null()  !! the fast loops for them
+    procedure(force_loop), pointer, nopass :: force => null()
     real(wp) :: own(lanes, at_p) = 0.0_wp      !! what `at` has of its own slots
     real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb vc V_j/|xi|, 0 where there is no
                                                !! intact bond (lane, member)
