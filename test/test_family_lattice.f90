@@ -444,7 +444,7 @@ contains
     integer(i4), allocatable :: slots(:)
     integer(i8) :: broken, broken_before
     real(wp) :: dissipated, dissipated_before
-    integer :: h, kind, c, w
+    integer :: h, kind, c, w, k
 
     do h = 1, size(horizons)
       do kind = 1, 2
@@ -453,7 +453,7 @@ contains
           if (allocated(u)) deallocate (u, damage, ordered)
           allocate (u(body%n_slots, 3), damage(body%n_slots), ordered(body%n_points, 4))
           call shake(body, some_gradient(0.02_wp), 0.08_wp*spacing, 9, u)
-          slots = body%slot
+          slots = pack([(k, k=1, body%n_slots)], body%point > 0)
           damage = 0.0_wp
           call break_bonds(body, subject%family, subject%model, u, slots, damage, broken, &
             & dissipated)
@@ -518,6 +518,7 @@ contains
     integer(i4), allocatable :: slots(:)
     integer(i8) :: broken
     real(wp) :: dissipated
+    integer :: k
 
     call porous([20, 20, 20], 5.015_wp, 0.4_wp, 'lattice', .true., subject)
     select type (family => subject%family)
@@ -530,7 +531,7 @@ contains
     associate (body => subject%body)
       allocate (u(body%n_slots, 3), damage(body%n_slots))
       call shake(body, some_gradient(0.02_wp), 0.08_wp*spacing, 9, u)
-      slots = body%slot
+      slots = pack([(k, k=1, body%n_slots)], body%point > 0)
       call damage_of(body, subject%family, damage)
       call break_bonds(body, subject%family, subject%model, u, slots, damage, broken, dissipated)
       call expect_true(error, 10*broken > subject%family%n_bonds/2, 'too few bonds broke')

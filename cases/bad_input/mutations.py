@@ -70,12 +70,16 @@ def small(text, largest):
                   lambda m: m[1] + str(min(int(m[2]), 100)), text, flags=re.M)
 
 
-def thinned(data, number):
-    """A table of an initial state with rows for fewer points, taken evenly; any other as it is."""
+def points_of(text):
+    """The number of points of a scene's first body that has counts; 64, that of the tables, without."""
+    counts = re.search(r"^\s*points\s*=\s*([\d, ]+)", text, re.M)
+    return math.prod(int(word) for word in re.findall(r"\d+", counts[1])) if counts else 64
+
+
+def thinned(data, part):
+    """A table of an initial state with each `part`-th of its rows; any other as it is."""
     head, *rows = data.splitlines(keepends=True)
-    if not head[:1].isalpha() or len(rows) <= number:
-        return data
-    return head + b"".join(rows[i * len(rows) // number] for i in range(number))
+    return head + b"".join(rows[::part]) if head[:1].isalpha() else data
 
 
 def bases(program, project, largest=400):
@@ -84,14 +88,15 @@ def bases(program, project, largest=400):
     found = {}
     paths = [*project.glob("cases/*/*.nml"), *project.glob("test/scenes/*.nml")]
     for path in sorted(paths):
-        text = small(path.read_text(encoding="utf-8"), largest)
+        whole = path.read_text(encoding="utf-8")
+        text = small(whole, largest)
         files = {SCENE: text.encode()}
-        counts = re.search(r"^\s*points\s*=\s*([\d, ]+)", text, re.M)
-        number = math.prod(int(word) for word in re.findall(r"\d+", counts[1])) if counts else 64
+        number = points_of(text)
         for name in re.findall(r"^\s*file\s*=\s*'([^']+)'", text, re.M):
             # Only initial states stand in tables with a header; one row for each point
             if (path.parent / name).is_file():
-                files[name] = thinned((path.parent / name).read_bytes(), number)
+                files[name] = thinned((path.parent / name).read_bytes(),
+                                      points_of(whole) // number)
             elif re.search(r"&body[^/]*file", text):
                 files[name] = table.encode()
             else:

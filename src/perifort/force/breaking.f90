@@ -34,9 +34,9 @@ contains
     end do
   end subroutine strained_slots
 
-  !> Break the bonds of `slots` that are beyond their limit at displacements `u`. On return `slots`
-  !> holds those that lost a bond, `broken` the number of bonds (each counted once) and `dissipated`
-  !> [J] the strain energy lost at fixed u; `damage` is brought up to date.
+  !> Break the bonds of `slots`, ascending, that are beyond their limit at displacements `u`. On
+  !> return `slots` holds those that lost a bond, `broken` the number of bonds (each counted once)
+  !> and `dissipated` [J] the strain energy lost at fixed u; `damage` is brought up to date.
   subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated)
     type(body_type), intent(in) :: body
     class(family_type), intent(inout) :: family
