@@ -443,6 +443,20 @@ contains
     scene%horizon%ratio = 1.0e9_wp
     call run(scene, 'bounds', fault)
     call expect_place('&horizon number 1', 'too large')
+    ! what the results have room for from the beginning must be no more than a disk holds
+    call flight('plate', scene)
+    scene%time%steps = huge(1)
+    scene%output%history_every = 100
+    call run(scene, 'bounds', fault)
+    call expect_place('&output number 1', '21474836 rows')
+    scene%output%history_every = 0
+    scene%output%every = 1
+    call run(scene, 'bounds', fault)
+    call expect_place('&output number 1', '2147483647 outputs')
+    scene%output%every = 0
+    scene%output%interval = 1.0e-30_wp
+    call run(scene, 'bounds', fault)
+    call expect_place('&output number 1', 'more than 1000000 outputs')
 
   contains
 

@@ -268,8 +268,8 @@ contains
     call lattice([n, n, n], 1.0e-3_wp, 0.0_wp, body)
     call new_list_family(body, volume_rule_type(volume_linear, 3.015e-3_wp), family)
     call expect_true(error, family%n_bonds == expected, 'bonds of a million points')
-    ! a member of a cluster has few bonds if the eight points are not close together: on cubes of two
-    ! points a side it has 4.3 inside the body, by counting
+    ! a member of a cluster has few bonds if the eight points are not close together: for cubes of
+    ! two points a side it has 4.3 inside the body, by counting
     call expect_true(error, family%n_bonds > 4*size(family%member, kind=i8), 'clusters are compact')
     call expect_true(error, pairs_per_point(body, 3.015e-3_wp) <= (3*3.2_wp + 1)**3, &
       & 'pairs of a million points')

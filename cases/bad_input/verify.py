@@ -35,8 +35,9 @@ MEMORY = 4 << 30     # bytes of address space
 SHOWN = 20           # failures that are described
 
 
-def limited():
-    """No process may take the whole machine."""
+def limit_memory():
+    """No process may take the whole machine. The limits of this one are those of all it starts: setting
+    them for each would make starting it several times as slow."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
@@ -45,8 +46,7 @@ def call(program, words, folder):
     """Status, seconds, whether it was asked to stop, and what was said."""
     begin = time.monotonic()
     process = subprocess.Popen([program, *words], cwd=folder, stdin=subprocess.DEVNULL,
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                               preexec_fn=limited)
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     asked = False
     try:
         out, err = process.communicate(timeout=PATIENCE if words[0] == "run" else LIMIT)
@@ -151,6 +151,7 @@ def main():
     parser.add_argument("--run-program", help="another build of the program for the runs")
     parser.add_argument("--folder", default="out/bad_input")
     options = parser.parse_args()
+    limit_memory()
     program = str(Path(options.program).resolve())
     if not Path(program).is_file():
         sys.exit("error: start this as ./pf verify bad_input: PERIFORT does not name the program")

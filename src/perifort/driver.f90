@@ -36,7 +36,7 @@ module pd_driver
   use pd_motion_system, only: system_type, start_system, evaluate, account
   use pd_motion_time_step, only: evaluations, horizon_volume
   use pd_output_begin, only: run_options_type, open_recorder, keep_checkpoints, schedule_of, &
-    & history_interval, output_directory, stem_of, command_of, text_of
+    & check_schedule, history_interval, output_directory, stem_of, command_of, text_of
   use pd_output_checkpoint, only: about_type, checkpoint_bytes, new_about
   use pd_output_doubts, only: warn_before
   use pd_output_earlier, only: mark_complete, refuse_existing
@@ -188,23 +188,24 @@ contains
     type(set_up_type), intent(inout) :: set_up
     type(about_type) :: about
     type(schedule_type) :: schedule
+    integer :: columns
 
     associate (system => set_up%system, plan => set_up%plan)
       schedule = schedule_of(scene, plan)
       about = new_about(scene_text(scene), 0_i8, plan%steps, plan%step)
-      allocate (about%kept%rows(size(history_columns(system, set_up%probes, plan%relaxes)), &
-        & planned_rows(schedule)), about%kept%times(planned_outputs(schedule, plan%step)), &
-        & source=0.0_wp)
+      columns = size(history_columns(system, set_up%probes, plan%relaxes))
+      allocate (about%kept%rows(columns, 0), about%kept%times(0))
       call account(system, 0.0_wp)
       if (plan%relaxes) then
         call fill_memory(system, plan%relaxation)
       else
         call begin_steps(system, plan%integrator)
       end if
-      bytes = checkpoint_bytes(about, system)
+      ! rows and times are counted and not made: a long run may have more than fit into the memory
+      bytes = checkpoint_bytes(about, system) + 8*(int(columns, i8)*planned_rows(schedule) &
+        & + planned_outputs(schedule, plan%step))
     end associate
   end function bytes_of_checkpoint
-
 
   !> Points, families, corrections, cracks, conditions and the plan of a scene.
   subroutine prepare(scene, set_up, error)
@@ -273,6 +274,8 @@ contains
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return
       call check_bounds(scene, system, set_up%plan, error)
+      if (allocated(error)) return
+      call check_schedule(scene, set_up%plan, error)
       if (allocated(error)) return
       call timer%stop('time step')
       call find_probes(scene, system%body, set_up%probes)

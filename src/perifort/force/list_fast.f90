@@ -21,10 +21,11 @@ module pd_force_list_fast
       integer, intent(in) :: n                    !! members
       integer(i4), intent(in) :: member(n)        !! their slots
       integer(i1), intent(in) :: intact(n)        !! bits of the lanes with an intact bond
+      ! allow(C071): the loops know the members, not how many slots there are.
       real(wp), intent(in) :: at(8, *)            !! what slots have, member by member
       real(wp), intent(in) :: own(lanes, 8)       !! the same of the lanes
-      real(wp), intent(in) :: weight(lanes, *)    !! Gd vc V_j, if tabled
-      real(wp), intent(in) :: geometry(lanes, *)  !! 1/|xi|^2, if tabled
+      real(wp), intent(in) :: weight(lanes, n)    !! Gd vc V_j, if tabled
+      real(wp), intent(in) :: geometry(lanes, n)  !! 1/|xi|^2, if tabled
       real(wp), intent(in) :: edge, per_spacing   !! where vc vanishes [m], its slope [1/m]
       real(wp), intent(in) :: limit               !! of |e|
       real(wp), intent(inout) :: theta(lanes)
@@ -39,9 +40,10 @@ module pd_force_list_fast
       integer, intent(in) :: n
       integer(i4), intent(in) :: member(n)
       integer(i1), intent(in) :: intact(n)
+      ! allow(C071): as above.
       real(wp), intent(in) :: at(8, *), own(lanes, 8)
-      real(wp), intent(in) :: stretch(lanes, *)   !! (q_k + q_j) Gb vc V_j/|xi|, if tabled
-      real(wp), intent(in) :: weight(lanes, *), geometry(lanes, *)
+      real(wp), intent(in) :: stretch(lanes, n)   !! (q_k + q_j) Gb vc V_j/|xi|, if tabled
+      real(wp), intent(in) :: weight(lanes, n), geometry(lanes, n)
       real(wp), intent(in) :: edge, per_spacing, q, limit
       real(wp), intent(inout) :: force(lanes, 3)
       logical, intent(out) :: missed

@@ -4,7 +4,9 @@ module pd_output_begin
   use pd_base_clock, only: output_is_terminal
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_text, only: to_text
   use pd_base_version, only: program_version
+  use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type, is_set
   use pd_scene_write, only: scene_text
   use pd_body_body, only: body_type, in_point_order
@@ -18,8 +20,8 @@ module pd_output_begin
   use pd_output_types, only: kept_type
   implicit none (type, external)
   private
-  public :: run_options_type, open_recorder, keep_checkpoints, schedule_of, history_interval, &
-    & output_directory, stem_of, command_of, text_of
+  public :: run_options_type, open_recorder, keep_checkpoints, schedule_of, check_schedule, &
+    & history_interval, output_directory, stem_of, command_of, text_of
 
   !> How to run, from the command line.
   type :: run_options_type
@@ -89,6 +91,35 @@ contains
     if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
     schedule%history_every = history_interval(scene, plan)
   end function schedule_of
+
+  !> An error if a run would write more outputs, or rows of its history, than anybody can look at:
+  !> the results have room for all of them from the beginning.
+  subroutine check_schedule(scene, plan, error)
+    type(scene_type), intent(in) :: scene
+    type(plan_type), intent(in) :: plan
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: most_outputs = 1000000, most_rows = 10000000
+    type(schedule_type) :: schedule
+    real(wp) :: duration
+
+    schedule = schedule_of(scene, plan)
+    if (schedule%interval > 0.0_wp) then
+      duration = schedule%steps*plan%step
+      if (min(duration/schedule%interval, real(schedule%steps, wp)) > most_outputs) &
+        & call scene_fault(error, scene, 'output', 1, 'interval', &
+        & 'the run would write more than '//to_text(most_outputs)//' outputs', &
+        & 'allowed: interval = '//to_text(duration/most_outputs, 3))
+    else if (schedule%steps/schedule%every > most_outputs) then
+      call scene_fault(error, scene, 'output', 1, 'every', 'the run would write '// &
+        & to_text(schedule%steps/schedule%every)//' outputs', 'at most '//to_text(most_outputs)// &
+        & ' are allowed: every = '//to_text(schedule%steps/most_outputs + 1))
+    end if
+    if (allocated(error) .or. schedule%relaxation) return
+    if (schedule%steps/schedule%history_every > most_rows) call scene_fault(error, scene, &
+      & 'output', 1, 'history_every', 'the history would have '// &
+      & to_text(schedule%steps/schedule%history_every)//' rows', 'at most '//to_text(most_rows)// &
+      & ' are allowed: history_every = '//to_text(schedule%steps/most_rows + 1))
+  end subroutine check_schedule
 
   !> Steps (iterations in relaxation) between rows of the history.
   pure integer function history_interval(scene, plan) result(every)
