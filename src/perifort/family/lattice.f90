@@ -14,6 +14,7 @@ module pd_family_lattice
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_error, only: error_type, fail
   use pd_base_lookup, only: lookup_type, mix
+  use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
   use pd_body_body, only: body_type, arrange
   use pd_family_cells, only: cells_type, sort_into_cells, joins_labels
@@ -243,7 +244,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer(i4), allocatable :: point(:)
     real(wp), allocatable :: lower(:, :)
-    integer(i8) :: n_slots, at
+    integer(i8) :: n_slots, need, at
     integer :: c, k, n, g
     integer, allocatable :: number(:)
 
@@ -251,6 +252,14 @@ contains
     if (n_slots > most_slots) then
       call fail(error, 'the lattice needs '//to_text(n_slots)//' slots, more than '// &
         & to_text(most_slots))
+      return
+    end if
+    ! no scene does without positions, volumes, displacements, velocities and forces
+    need = 8*(4*body%dim + 1)*n_slots
+    if (need > available_memory()) then
+      call fail(error, 'the box of the lattice, with the horizon around it, has '// &
+        & to_text(n_slots)//' slots, which need more than '//with_unit(real(need, wp), 'B', 3)// &
+        & ' of memory; only '//with_unit(real(available_memory(), wp), 'B', 3)//' are available')
       return
     end if
     allocate (number(size(body%grids)), lower(body%dim, size(body%grids)))
