@@ -260,7 +260,8 @@ def history_pictures(results, folder):
         save(figure, folder / f"{title}.png")
 
 
-RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "energy_drift", "pareto")
+RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "energy_drift", "pareto",
+                  "value", "true_error")
 
 
 class Study:

@@ -1,10 +1,13 @@
 !> Commands, options, and what is said about wrong ones.
 module test_command_line
   use pd_base_error, only: pd_error => error_type, status_usage
+  use pd_base_shell, only: quoted
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, command_names, parse_command_line, &
     & restart_command
-  use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
+  use pd_scene_file, only: read_text_file
+  use pd_scene_template, only: template_names, template_text
+  use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
   implicit none (type, external)
   private
   public :: collect_command_line
@@ -20,6 +23,8 @@ contains
       & new_unittest('options may stand before the file and take =', test_order), &
       & new_unittest('defaults', test_defaults), &
       & new_unittest('going on with a run', test_restart), &
+      & new_unittest('commands as a shell needs them', test_quoted), &
+      & new_unittest('the texts in doc/printed are up to date', test_printed), &
       & new_unittest('bench with all its options', test_bench), &
       & new_unittest('limits with its options', test_limits), &
       & new_unittest('names after -- may begin with a dash', test_dashes), &
@@ -106,7 +111,15 @@ contains
     call parse_command_line([character(w) :: 'run', '--restart', 'a.nml'], line, fault)
     call check(error, line%argument//' '//line%checkpoint, 'a.nml ')
     if (allocated(error)) return
+    call parse_command_line([character(w) :: 'run', '--', '-it''s.nml'], line, fault, &
+      & "'../my pf'")
+    call check(error, restart_command(line), "'../my pf' run ./'-it'\''s.nml' --restart")
+    if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--restart', 'b', 'c'], 'takes one argument')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'study', 'a', '--restart'], 'is no option of')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'choose', 'a', '--max-minutes', '1'], 'is no option of')
     if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--restart', '--overwrite'], &
       & 'give one of them')
@@ -220,6 +233,62 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_help
+
+  !> By the rules of the POSIX shell: nothing is special in single quotes but the quote itself.
+  subroutine test_quoted(error)
+    type(error_type), allocatable, intent(out) :: error
+
+    call check(error, quoted('out/a-b_1.nml'), 'out/a-b_1.nml')
+    if (allocated(error)) return
+    call check(error, quoted('a b'), "'a b'")
+    if (allocated(error)) return
+    call check(error, quoted("it's"), "'it'\''s'")
+    if (allocated(error)) return
+    call check(error, quoted('$(x);`y`\*~#'), "'$(x);`y`\*~#'")
+    if (allocated(error)) return
+    call check(error, quoted(''), "''")
+  end subroutine test_quoted
+
+  !> `./pf` prints these files where nothing is built.
+  subroutine test_printed(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(pd_error), allocatable :: fault
+    character(:), allocatable :: text
+    integer :: i
+
+    call read_text_file('doc/printed/help.txt', text, fault)
+    if (allocated(fault)) then
+      call skip_test(error, 'not run in the project''s folder')
+      return
+    end if
+    call compare('help.txt', help_text(''))
+    do i = 1, size(command_names) - 1
+      call compare('help-'//trim(command_names(i))//'.txt', help_text(trim(command_names(i))))
+    end do
+    do i = 1, size(template_names)
+      call template_text(trim(template_names(i)), text, fault)
+      call compare('template-'//trim(template_names(i))//'.nml', text)
+      if (allocated(error)) return
+      call check(error, index(help_text('template'), trim(template_names(i))) > 0, &
+        & 'the help of template does not name '//trim(template_names(i)))
+    end do
+
+  contains
+
+    subroutine compare(name, expected)
+      character(*), intent(in) :: name, expected
+      character(:), allocatable :: found
+      type(pd_error), allocatable :: missing
+      if (allocated(error)) return
+      call read_text_file('doc/printed/'//name, found, missing)
+      if (allocated(missing)) then
+        call test_failed(error, missing%message)
+      else
+        call check(error, found == expected .and. len(found) == len(expected), 'doc/printed/'// &
+          & name//' differs from what the program prints; write it anew with .ci/renew_texts')
+      end if
+    end subroutine compare
+  end subroutine test_printed
 
   subroutine test_help_excuses(error)
     type(error_type), allocatable, intent(out) :: error

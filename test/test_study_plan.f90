@@ -125,7 +125,7 @@ contains
     call expect(error, plan%trials(2)%scene%probes(1)%point(2), 0.4_wp, 0.0_wp, 'y')
     call plan_from_text(head//probe//"&study vary = 'probe%point' values = 0.1, 0.2, 0.3"//rest, &
       & 'a.nml', plan, found)
-    call expect_parts(error, found, '3 values make no whole number of vectors|expected 2')
+    call expect_parts(error, found, '3 values are not a whole number of vectors|expected 2')
   end subroutine test_vectors
 
   subroutine test_columns(error)

@@ -1,7 +1,7 @@
 !> Laws of error and time: exact where the numbers follow a law, careful where they do not.
 module test_study_predict
   use pd_base_kinds, only: wp
-  use pd_study_predict, only: error_at, fit_law, law_type, seconds_at
+  use pd_study_predict, only: error_at, fit_law, law_type, seconds_at, true_error_at
   use bodies, only: expect, expect_true
   use testdrive, only: error_type, new_unittest, unittest_type
   implicit none (type, external)
@@ -17,10 +17,11 @@ contains
     testsuite = [ &
       & new_unittest('a power law goes on', test_power), &
       & new_unittest('against the finest run', test_reference), &
+      & new_unittest('the true error behind errors against a finest run', test_true), &
       & new_unittest('an error that levels off is not promised away', test_level), &
       & new_unittest('a lucky coarse run is not trusted', test_luck), &
       & new_unittest('scatter asks for a margin', test_margin), &
-      & new_unittest('a single run foretells nothing', test_single)]
+      & new_unittest('a single run predicts nothing', test_single)]
   end subroutine collect_study_predict
 
   !> Orders are searched in steps of 0.02, which at 8 times finer is 4 % at most.
@@ -56,6 +57,36 @@ contains
     call expect(error, error_at(law, 0.008_wp)/(5*(0.008_wp - r)), 1.0_wp, 0.03_wp, 'beyond')
     call expect_true(error, error_at(law, 1.9_wp*r) > 1.0e300_wp, 'too near')
   end subroutine test_reference
+
+  !> Errors C (h^p - r^p) of order 2 stand for true errors C h^2, that of the reference included;
+  !> orders are searched in steps of 0.02, which changes C h^p by 0.5 ln(2) 0.02 about the runs and
+  !> by a few per cent at r. Without a reference, or from one run, nothing is known.
+  subroutine test_true(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: r = 0.005_wp
+    type(law_type) :: law
+    real(wp) :: found
+    logical :: known
+    integer :: i
+
+    call fit_law(h, 5*(h**2 - r**2), 1/h, r, law)
+    do i = 1, size(h)
+      call true_error_at(law, h(i), found, known)
+      call expect_true(error, known, 'known')
+      call expect(error, found/(5*h(i)**2), 1.0_wp, 0.02_wp, 'of a run')
+    end do
+    call true_error_at(law, r, found, known)
+    call expect(error, found/(5*r**2), 1.0_wp, 0.03_wp, 'of the finest run')
+    call fit_law(h, 5*h**2, 1/h, 0.0_wp, law)
+    call true_error_at(law, h(1), found, known)
+    call expect_true(error, .not. known, 'against an exact answer')
+    call fit_law(h(:1), h(:1), 1/h(:1), r, law)
+    call true_error_at(law, h(1), found, known)
+    call expect_true(error, .not. known, 'one run')
+    call fit_law(h, 1 + 0*h, 1/h, r, law)
+    call true_error_at(law, h(1), found, known)
+    call expect_true(error, law%order >= 0.5_wp .and. known, 'the least order with a reference')
+  end subroutine test_true
 
   !> 1e-3 + h^2: the last runs hardly improve, so that a tenth of them is not expected.
   subroutine test_level(error)

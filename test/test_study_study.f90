@@ -11,6 +11,7 @@ module test_study_study
   use pd_scene_table, only: column_of, read_table, table_type
   use pd_scene_types, only: scene_type
   use pd_study_choose, only: run_choose
+  use pd_study_lines, only: line_notes
   use pd_study_study, only: begin_study, run_all, run_study, session_type
   use pd_study_table, only: put_file
   use bodies, only: expect, expect_true
@@ -45,8 +46,12 @@ contains
       & new_unittest('a chain''s wave: the order in time', test_chain), &
       & new_unittest('a bar in tension', test_tension), &
       & new_unittest('against the finest run', test_finest), &
+      & new_unittest('the finest in every variable', test_finest_of_all), &
+      & new_unittest('true errors against the closed form', test_true_errors), &
+      & new_unittest('every scene is set up before the first run', test_checked_first), &
+      & new_unittest('why runs are not used', test_notes), &
       & new_unittest('against files of a run', test_files), &
-      & new_unittest('a run without an answer is told so', test_unstable), &
+      & new_unittest('a run without an answer is reported', test_unstable), &
       & new_unittest('closed forms that do not fit', test_misfits), &
       & new_unittest('a choice meets its error', test_choice), &
       & new_unittest('what cannot be met', test_missed)]
@@ -171,7 +176,7 @@ contains
     call expect_true(error, size(lines) == 7, 'a header and six runs')
     if (allocated(error)) return
     call expect_true(error, lines(1)%text == 'body%points,horizon.family,error,seconds,points,'// &
-      & 'bonds,steps,bytes,energy_drift,pareto', lines(1)%text)
+      & 'bonds,steps,bytes,energy_drift,pareto,value,true_error', lines(1)%text)
     call expect_true(error, index(lines(5)%text, '40,list,') == 1, lines(5)%text)
     associate (o => session%outcomes(4))
       ! 40 points and a layer of 3; chains of n points and 3 neighbours have 2 (3n - 6) bonds
@@ -347,6 +352,114 @@ contains
     end do
     call expect_true(error, exact%outcomes(3)%error < 0.2_wp*exact%outcomes(2)%error, 'finest')
   end subroutine test_finest
+
+  !> The run that is compared with has the finest value of every key that refines, wherever its values
+  !> stand; without such a run the study is refused.
+  subroutine test_finest_of_all(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(session_type) :: session
+    type(fault_type), allocatable :: fault
+    character(*), parameter :: study = "&study vary = 'body%points' values = 40, 20 measure = "// &
+      & "'centre' against = 'finest' /"//line//"&study vary = 'time%safety' "
+
+    call studied('finest_of_all', bar//study//'values = 0.8, 0.1, 0.4 /', session, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call expect_true(error, session%finest == 2, '40 points and 0.1')
+    call studied('finest_of_all', bar//study//'values = 0.8, 0.4 together = .true. /', session, &
+      & fault)
+    call expect_refused(error, fault, 'none has body%points = 40, time%safety = 0.4')
+    call studied('finest_of_all', bar//"&study vary = 'time%integrator' values = 'runge_kutta', "// &
+      & "'velocity_verlet' measure = 'centre' against = 'finest' /", session, fault)
+    call expect_refused(error, fault, 'no run is finer than the others')
+  end subroutine test_finest_of_all
+
+  subroutine expect_refused(error, fault, part)
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable, intent(in) :: fault
+    character(*), intent(in) :: part
+    if (allocated(error)) return
+    call expect_true(error, allocated(fault), 'accepted, though '//part)
+    if (allocated(fault)) call expect_true(error, index(fault%message, part) > 0, fault%message)
+  end subroutine expect_refused
+
+  !> Errors against the finest run, extrapolated to true errors, against those from the closed form: a bar
+  !> in tension, wrong by its ends' part alone, which is of first order. The fit assumes that the errors of
+  !> all runs have one shape; the interpolation between points and the search of the order by steps of
+  !> 0.02 leave a few per cent.
+  subroutine test_true_errors(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(session_type) :: session, exact
+    type(fault_type), allocatable :: fault
+    type(table_type) :: table
+    character(*), parameter :: pulled = '&scene dimension = 1 area = 2e-4 / &time method = '// &
+      & "'relaxation' / &relaxation tolerance = 1e-9 / &body lower = 0.5 upper = 1.5 points = 20 / "// &
+      & "&material youngs_modulus = 200e9 / &boundary side = 'x_min' displacement_x = 1e-6 / "// &
+      & "&load side = 'x_max' force_x = 100 /"//line
+    character(*), parameter :: study = "&study vary = 'body%points' values = 20, 40, 80, 160 "// &
+      & "measure = 'displacement_x' against = "
+    integer :: t, n
+
+    call studied('true', pulled//study//"'analytic' /", exact, fault)
+    if (.not. allocated(fault)) call studied('true', pulled//study//"'finest' /", session, fault)
+    if (.not. allocated(fault)) call read_table(here//'/true/study.csv', table, fault, allowed=['*'])
+    call accept(error, fault)
+    if (allocated(error)) return
+    n = size(session%outcomes)
+    do t = 1, n
+      associate (outcome => session%outcomes(t))
+        call expect_true(error, outcome%extrapolated, 'extrapolated')
+        call expect(error, outcome%true_error/exact%outcomes(t)%error, 1.0_wp, 0.1_wp, &
+          & 'true error of run '//to_text(t))
+        call expect(error, table%values(column_of(table, 'true_error'), t), outcome%true_error, &
+          & 1.0e-5_wp*outcome%true_error, 'in the table')
+        call expect(error, table%values(column_of(table, 'value'), t), exact%outcomes(t)%value, &
+          & 1.0e-10_wp, 'value in the table')
+      end associate
+      call expect_true(error, .not. exact%outcomes(t)%extrapolated, 'a closed form needs none')
+    end do
+    ! the errors against the finest run alone are too small by more than that where they are least
+    call expect_true(error, session%outcomes(n - 1)%error < 0.7_wp*exact%outcomes(n - 1)%error, &
+      & 'and it matters')
+  end subroutine test_true_errors
+
+  !> The last scene cannot be measured, since no point of its coarse lattice lies in the region: nothing
+  !> is run and nothing written.
+  subroutine test_checked_first(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(session_type) :: session
+    type(fault_type), allocatable :: fault
+
+    call studied('checked_first', bar//"&region name = 'narrow' shape = 'box' lower = 0.487 "// &
+      & "upper = 0.489 /"//line//"&study vary = 'body%points' values = 40, 20 measure = "// &
+      & "'displacement_x' region = 'narrow' against = 'analytic' /", session, fault)
+    call expect_refused(error, fault, 'body%points = 20: ')
+    if (allocated(error)) return
+    call expect_true(error, .not. any(session%outcomes%done), 'no run')
+    call expect_true(error, .not. file_exists(here//'/checked_first/study.csv'), 'no table')
+  end subroutine test_checked_first
+
+  !> Three runs: of a coarse one that is by chance better than a finer one, of one without an answer and
+  !> of the fit the reason stands in one line each.
+  subroutine test_notes(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(session_type) :: session
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+
+    call studied('notes', bar//"&study vary = 'time%safety' values = 2.0, 0.8, 0.4, 0.2 "// &
+      & "measure = 'centre' against = 'analytic' /", session, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    session%outcomes(2:4)%error = [1.0e-3_wp, 5.0e-3_wp, 2.0e-3_wp]
+    text = line_notes(session%plan, session%outcomes)
+    call expect_true(error, index(text, 'Fit over time%safety: order ') > 0, text)
+    call expect_true(error, index(text, line//'  time%safety = 2.0: not used: no answer'//line) > 0, &
+      & text)
+    call expect_true(error, index(text, line//'  time%safety = 0.8: error taken as 0.005 instead '// &
+      & 'of 0.001: a finer run has that error (time%safety = 0.4)'//line) > 0, text)
+    call expect_true(error, index(text, '  time%safety = 0.2') == 0, text)
+  end subroutine test_notes
 
   !> A run compared with its own results has no error, whether from the table or the results file,
   !> as history or as field.

@@ -2,6 +2,7 @@
 module pd_command_line
   use pd_base_error, only: error_type, fail, status_usage
   use pd_base_kinds, only: wp
+  use pd_base_shell, only: program_command, quoted
   use pd_base_text, only: join, nearest_name, newline, to_text
   use pd_scene_values, only: parse_real
   use pd_study_options, only: bench_options_type, check_options
@@ -22,10 +23,11 @@ module pd_command_line
 
   !> A command line, understood and checked.
   type :: command_line_type
+    character(:), allocatable :: program           !! how the user starts the program, quoted
     character(:), allocatable :: command           !! one of `command_names`, '' with bare `--help`
     character(:), allocatable :: argument          !! scene file, template or group; '' if not given
     character(:), allocatable :: output_directory  !! `--output`; '' = the default
-    integer :: threads = 0                         !! `--threads`; 0 = as the machine has it
+    integer :: threads = 0                         !! `--threads`; 0 = not given
     logical :: overwrite = .false.                 !! `--overwrite`
     logical :: restart = .false.                   !! `--restart`
     character(:), allocatable :: checkpoint        !! its value; '' = the newest of the run
@@ -68,20 +70,23 @@ contains
       call get_command_argument(i, arguments(i))
       typed = typed//' '//quoted(trim(arguments(i)))
     end do
-    call parse_command_line(arguments, line, error)
+    call parse_command_line(arguments, line, error, program_command())
     line%text = typed
   end subroutine read_words
 
   !> Understand `arguments` (trailing blanks do not count). Commands and options are checked here,
-  !> files and names are not.
-  subroutine parse_command_line(arguments, line, error)
-    character(*), intent(in) :: arguments(:)
-    type(command_line_type), intent(out) :: line
-    type(error_type), allocatable, intent(out) :: error
+  !> files and names are not. Errors have the status of a wrong command line.
+  subroutine parse_command_line(arguments, line, error, program)
+    character(*), intent(in) :: arguments(:)            !! without the program's name
+    type(command_line_type), intent(out) :: line        !! what they mean
+    type(error_type), allocatable, intent(out) :: error !! what is wrong, and how to get help
+    character(*), intent(in), optional :: program       !! how the user starts the program
     character(:), allocatable :: word, name, value
     logical :: only_names, has_value, seen(size(option_names))
     integer :: i, at, equals, option
 
+    line%program = 'perifort'
+    if (present(program)) line%program = program
     line%command = ''
     line%argument = ''
     line%output_directory = ''
@@ -204,8 +209,10 @@ contains
       line%help = .true.
       line%command = ''
       if (len(line%argument) > 0) call set_command(line, line%argument, error)
+    case ('template', 'reference')
+      continue  ! an argument or none; their names are checked where they are looked up
     case default
-      continue
+      error stop 'internal error: check_whole does not know a command of command_names'
     end select
   end subroutine check_whole
 
@@ -291,7 +298,7 @@ contains
     case ('--help')
       line%help = .true.
     case default
-      call usage(error, line, "option '"//name//"' has no meaning")
+      error stop 'internal error: set_option does not know an option of option_names'
     end select
   end subroutine set_option
 
@@ -336,12 +343,8 @@ contains
 
   pure logical function takes_value(name)
     character(*), intent(in) :: name
-    select case (name)
-    case ('--overwrite', '--restart', '--quiet', '--surface', '--help')
-      takes_value = .false.
-    case default
-      takes_value = .true.
-    end select
+    takes_value = all(name /= [character(word_length) :: '--overwrite', '--restart', '--quiet', &
+      & '--surface', '--help'])
   end function takes_value
 
   !> Whether several words may follow. Where a file comes next, one must do.
@@ -366,8 +369,12 @@ contains
     case ('--points', '--dimension', '--model', '--family', '--breaking', '--precision', &
       & '--surface', '--csv')
       belongs = command == 'bench'
-    case default
+    case ('--restart', '--max-minutes')
+      belongs = command == 'run'
+    case ('--output', '--overwrite', '--quiet')
       belongs = any(command == [character(6) :: 'run', 'study', 'choose'])
+    case default
+      error stop 'internal error: belongs does not know an option of option_names'
     end select
   end function belongs
 
@@ -377,9 +384,9 @@ contains
     type(command_line_type), intent(in) :: line
     character(*), intent(in) :: message
     character(:), allocatable :: hint
-    hint = 'perifort --help'
+    hint = line%program//' --help'
     if (len(line%command) > 0 .and. line%command /= 'help') &
-      & hint = 'perifort '//line%command//' --help'
+      & hint = line%program//' '//line%command//' --help'
     call fail(error, message//newline//'  see: '//hint, status_usage)
   end subroutine usage
 
@@ -390,25 +397,20 @@ contains
     if (len(text) > 0) text = "; did you mean '"//text//"'?"
   end function suggestion
 
-  !> The command that goes on with a run: the same but for `--overwrite` and `--restart`.
+  !> The command that continues a run, as it has to be typed: the same as before but for
+  !> `--overwrite` and `--restart`.
   pure function restart_command(line) result(text)
-    type(command_line_type), intent(in) :: line
+    type(command_line_type), intent(in) :: line   !! of the command `run`
     character(:), allocatable :: text
 
-    text = 'perifort run '//quoted(line%argument)
+    text = line%program//' run '
+    if (index(line%argument, '-') == 1) text = text//'./'  ! a file's name, not an option
+    text = text//quoted(line%argument)
     if (len(line%output_directory) > 0) text = text//' --output '//quoted(line%output_directory)
     if (line%threads > 0) text = text//' --threads '//to_text(line%threads)
     if (line%max_minutes > 0.0_wp) text = text//' --max-minutes '//to_text(line%max_minutes)
     if (line%quiet) text = text//' --quiet'
     text = text//' --restart'
   end function restart_command
-
-  !> A word as a shell would need it.
-  pure function quoted(word) result(text)
-    character(*), intent(in) :: word
-    character(:), allocatable :: text
-    text = word
-    if (len(word) == 0 .or. scan(word, ' "$&|;<>()*?') > 0) text = "'"//word//"'"
-  end function quoted
 
 end module pd_command_line

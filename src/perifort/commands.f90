@@ -1,7 +1,7 @@
 !> The commands of the program: each a few lines that call what does the work.
 module pd_commands
   use, intrinsic :: iso_fortran_env, only: output_unit
-  use pd_base_error, only: error_type, fail, status_usage
+  use pd_base_error, only: error_type
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
@@ -59,8 +59,10 @@ contains
         call run_scene(scene, options, error)
       case ('check')
         call check_scene(scene, options, error)
-      case default
+      case ('limits')
         call run_limits(scene, options, line%seconds, error)
+      case default
+        error stop 'internal error: execute does not know a command that reads a scene'
       end select
     case ('template')
       call write_template(output_unit, line%argument, error)
@@ -71,7 +73,7 @@ contains
     case ('version')
       call write_version()
     case default
-      call fail(error, "unknown command '"//line%command//"'", status_usage)
+      error stop 'internal error: execute does not know a command of command_names'
     end select
   end subroutine execute
 

@@ -1,9 +1,9 @@
-!> `perifort choose`: the cheapest settings that meet an error, foretold from the runs of a study
-!> and then run.
+!> `perifort choose`: the fastest settings that meet an error, predicted from the runs of a study and
+!> then run.
 !>
 !> One variable may take values between and beyond its listed ones: the number of points, or else
 !> the time step, its safety or the tolerance. The runs that differ in it alone make a line with its
-!> own law of error and time; all others keep to their values. The cheapest of all lines is chosen.
+!> own fit of error and time; all others keep to their values. The fastest of all lines is chosen.
 module pd_study_choose
   use pd_base_clock, only: duration_text
   use pd_base_error, only: error_type, fail
@@ -12,15 +12,15 @@ module pd_study_choose
   use pd_driver, only: run_options_type
   use pd_scene_types, only: path_length
   use pd_scene_values, only: exact_text
-  use pd_study_front, only: is_step, step_variable
+  use pd_study_lines, only: continuous_variable, law_of, line_notes, on_line, usable_runs
   use pd_study_plan, only: common_divisor, plan_type, scene_of, size_up, trial_type, &
     & variable_type
-  use pd_study_predict, only: error_at, fit_law, law_type, seconds_at
+  use pd_study_predict, only: error_at, law_type, seconds_at
   use pd_study_study, only: add_trial, begin_study, run_all, run_one, say, session_type
   use pd_study_table, only: settings_text, table_text
   implicit none (type, external)
   private
-  public :: run_choose, choice_type, find_choice, continuous_variable
+  public :: run_choose
 
   integer, parameter :: most_tries = 3
   real(wp), parameter :: farthest = 16.0_wp   !! steps finer than the finest run's by no more
@@ -51,18 +51,20 @@ contains
     call begin_study(path, options, session, error)
     if (.not. allocated(error)) call run_all(session, error)
     if (allocated(error)) return
-    call say(session, newline//table_text(session%plan, session%outcomes, session%unit))
+    call say(session, newline//table_text(session%plan, session%outcomes, &
+      & session%measure))
+    call say(session, line_notes(session%plan, session%outcomes))
     met = .false.
     do try = 1, most_tries
       call choose_affordable(session, target, limit, choice)
       if (.not. choice%found) exit
       call verify_choice(session, choice, target, limit, met, error)
       if (allocated(error) .or. met .or. .not. choice%meets) exit
-      if (try < most_tries) call say(session, 'Missed. Once more, with what this run has taught:')
+      if (try < most_tries) call say(session, 'Target missed. Next try, with this run in the fit:')
     end do
     if (allocated(error) .or. met) return
     if (.not. choice%found) then
-      call fail(error, 'no settings can be chosen: no run has an answer')
+      call fail(error, 'no settings can be chosen: no run has an answer or can be built')
     else if (.not. choice%meets) then
       call fail(error, 'the error of '//to_text(target)//' cannot be met with these values'// &
         & trim(within(limit))//'; the best settings are shown above')
@@ -114,7 +116,7 @@ contains
 
     associate (plan => session%plan, outcomes => session%outcomes)
       free = continuous_variable(plan)
-      open = outcomes%done .and. outcomes%judged .and. .not. outcomes%truth
+      open = usable_runs(outcomes)
       do t = 1, size(open)
         if (.not. open(t)) cycle
         if (free == 0) then
@@ -123,88 +125,12 @@ contains
           cycle
         end if
         chosen = open .and. on_line(plan, free, t)
-        call law_of(session, free, chosen, law)
+        call law_of(plan, outcomes, free, chosen, law)
         call search_line(plan, free, law, t, target, limit, reach, choice)
         open = open .and. .not. chosen
       end do
     end associate
   end subroutine find_choice
-
-  !> The variable that may take values of its own: one that refines a body, else the time step, its
-  !> safety or the tolerance; 0 if none. What goes in step with it must be positive numbers.
-  pure integer function continuous_variable(plan) result(free)
-    type(plan_type), intent(in) :: plan
-
-    do free = 1, size(plan%variables)
-      if (plan%variables(free)%refines .and. follows(free)) return
-    end do
-    do free = 1, size(plan%variables)
-      if (is_step(plan, free) .and. follows(free)) return
-    end do
-    free = 0
-
-  contains
-
-    pure logical function follows(with)
-      integer, intent(in) :: with
-      integer :: v
-      follows = .true.
-      do v = 1, size(plan%variables)
-        if (plan%variables(v)%axis /= plan%variables(with)%axis) cycle
-        follows = follows .and. plan%variables(v)%numeric
-        if (follows) follows = all(plan%variables(v)%numbers > 0.0_wp)
-      end do
-    end function follows
-  end function continuous_variable
-
-  !> The runs that differ from run `t` on the axis of the variable `free` alone.
-  pure function on_line(plan, free, t) result(on)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: free, t
-    logical :: on(size(plan%trials))
-    integer :: i
-
-    do i = 1, size(on)
-      on(i) = .not. any(plan%trials(i)%words /= plan%trials(t)%words .and. &
-        & plan%variables%axis /= plan%variables(free)%axis)
-    end do
-  end function on_line
-
-  !> The law of the chosen runs; of runs at the same step the last counts.
-  subroutine law_of(session, free, chosen, law)
-    type(session_type), intent(in) :: session
-    integer, intent(in) :: free
-    logical, intent(in) :: chosen(:)
-    type(law_type), intent(out) :: law
-    real(wp) :: h(size(chosen)), reference
-    logical :: used(size(chosen))
-    integer :: t
-
-    used = chosen
-    do t = 1, size(chosen)
-      h(t) = step_of(session%plan, free, session%plan%trials(t))
-      where (used(:t - 1) .and. abs(h(:t - 1) - h(t)) <= 1.0e-9_wp*h(t)) &
-        & used(:t - 1) = .not. chosen(t)
-    end do
-    reference = 0.0_wp
-    if (session%finest > 0) reference = h(session%finest)
-    ! a reference that is no finer in this variable says nothing about where the error ends
-    if (any(used .and. h <= reference*(1 + 1.0e-9_wp))) reference = 0.0_wp
-    call fit_law(pack(h, used), pack(session%outcomes%error, used), &
-      & pack(session%outcomes%seconds, used), reference, law)
-  end subroutine law_of
-
-  !> The step of the variable `free` in a run.
-  real(wp) function step_of(plan, free, trial) result(step)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: free
-    type(trial_type), intent(in) :: trial
-    real(wp) :: value
-    integer :: status
-    read (trial%words(free), *, iostat=status) value
-    step = 0.0_wp
-    if (status == 0) step = step_variable(plan, free, value)
-  end function step_of
 
   !> All settings on the line of run `t`, coarse to fine.
   subroutine search_line(plan, free, law, t, target, limit, reach, choice)
@@ -356,7 +282,7 @@ contains
     choice%seconds = seconds
   end subroutine consider
 
-  !> Run the chosen settings and say how far off the prediction was.
+  !> Run the chosen settings and compare them with the prediction.
   subroutine verify_choice(session, choice, target, limit, met, error)
     type(session_type), intent(inout) :: session
     type(choice_type), intent(in) :: choice
@@ -374,11 +300,11 @@ contains
     call add_trial(session, trial)
     t = size(session%plan%trials)
     if (choice%meets) then
-      call say(session, 'The cheapest settings expected to meet an error of '//to_text(target)// &
+      call say(session, 'The fastest settings with a predicted error of at most '//to_text(target)// &
         & within(limit)//':')
     else
-      call say(session, 'No settings are expected to meet an error of '//to_text(target)// &
-        & within(limit)//'. The best:')
+      call say(session, 'No settings have a predicted error of at most '//to_text(target)// &
+        & within(limit)//'. The best of them:')
     end if
     call say(session, '  chosen           '//settings_text(session%plan, t))
     call say(session, '  predicted        error '//to_text(choice%error, 4)//', '// &
@@ -392,8 +318,8 @@ contains
       end if
       call say(session, '  measured         error '//to_text(outcome%error, 4)//', '// &
         & duration_text(outcome%seconds))
-      call say(session, '  off by           error '//ratio(outcome%error, choice%error)// &
-        & ' of the prediction, time '//ratio(outcome%seconds, choice%seconds)//' of it')
+      call say(session, '  over predicted   error '//ratio(outcome%error, choice%error)// &
+        & ', time '//ratio(outcome%seconds, choice%seconds))
       met = outcome%error <= target
       if (limit > 0.0_wp) met = met .and. outcome%seconds <= limit
       call say(session, '  target           '//trim(merge('met   ', 'missed', met)))

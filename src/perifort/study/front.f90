@@ -7,8 +7,8 @@ module pd_study_front
   private
   public :: mark_front, on_front, order_type, observed_orders, step_variable, is_step
 
-  !> Observed order of convergence between two runs that differ in one variable (and in what goes in
-  !> step with it).
+  !> Observed order of convergence between two runs that differ in one variable (and in those that
+  !> vary together with it).
   type :: order_type
     integer :: variable = 0
     integer :: from = 0, to = 0       !! numbers of the runs, the second with the finer value

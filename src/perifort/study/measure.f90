@@ -15,7 +15,7 @@ module pd_study_measure
   implicit none (type, external)
   private
   public :: measure_type, record_type, resolve_measure, of_probe, of_column, of_field, &
-    & difference, measure_unit
+    & difference, measure_unit, quantity_unit, value_of
 
   integer, parameter :: of_probe = 1, of_column = 2, of_field = 3
 
@@ -38,6 +38,7 @@ module pd_study_measure
     real(wp), allocatable :: values(:, :, :)
     real(wp) :: spacing = 0.0_wp               !! [m]
     logical :: timeless = .false.              !! a state of which no time is known
+    integer :: place = 1                       !! whose value is reported; 0: the mean square of all
   end type record_type
 
   character(*), parameter :: directions = 'xyz'
@@ -90,7 +91,7 @@ contains
         & hint(scene, name), source)
     else if (measure%kind /= of_field .and. region /= '') then
       call rule_fault(error, 'study', 1, 'region', "'region' goes with a field, but '"//name// &
-        & "' is none", 'expected no region', source)
+        & "' is not a field", 'expected no region', source)
     end if
   end subroutine resolve_measure
 
@@ -174,10 +175,33 @@ contains
       error = sqrt(largest)
     case ('rms')
       error = sqrt(squares/max(weights, tiny(1.0_wp)))
-    case default
+    case ('relative')
       error = sqrt(squares/max(answer, tiny(1.0_wp)))
+    case default
+      error stop 'internal error: unknown norm of a study'
     end select
   end function difference
+
+  !> What a run measured, as one number: the value in the last row; of a vector its length; of many
+  !> places the root of the mean square, weighted as in the norm. Of a single place its value with its
+  !> sign. 0 without rows.
+  pure real(wp) function value_of(record) result(value)
+    type(record_type), intent(in) :: record
+    integer :: p
+
+    value = 0.0_wp
+    if (record%rows == 0) return
+    associate (last => record%values(:, :, record%rows))
+      if (record%place == 0) then
+        value = sqrt(sum([(record%weight(p)*sum(last(:, p)**2), p=1, size(last, 2))]) &
+          & /sum(record%weight))
+      else if (size(last, 1) == 1) then
+        value = last(1, record%place)
+      else
+        value = norm2(last(:, record%place))
+      end if
+    end associate
+  end function value_of
 
   !> The unit of an error, '' if it has none or is not known.
   pure function measure_unit(measure) result(unit)
@@ -185,7 +209,15 @@ contains
     character(:), allocatable :: unit
 
     unit = ''
-    if (measure%norm == 'relative') return
+    if (measure%norm /= 'relative') unit = quantity_unit(measure)
+  end function measure_unit
+
+  !> The unit of what is measured, '' if it has none or is not known.
+  pure function quantity_unit(measure) result(unit)
+    type(measure_type), intent(in) :: measure
+    character(:), allocatable :: unit
+
+    unit = ''
     if (measure%kind == of_column) then
       if (index(measure%name, '_energy') > 0 .or. measure%name == 'external_work') unit = 'J'
       if (index(measure%name, '_reaction_') > 0) unit = 'N'
@@ -198,6 +230,6 @@ contains
     case ('energy_density'); unit = 'J/m3'
     case default; unit = ''
     end select
-  end function measure_unit
+  end function quantity_unit
 
 end module pd_study_measure

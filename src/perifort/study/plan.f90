@@ -25,8 +25,8 @@ module pd_study_plan
     & shown_word, common_divisor, result_columns
 
   !> The columns of the table behind the varied keys.
-  character(12), parameter :: result_columns(8) = [character(12) :: 'error', 'seconds', &
-    & 'points', 'bonds', 'steps', 'bytes', 'energy_drift', 'pareto']
+  character(12), parameter :: result_columns(10) = [character(12) :: 'error', 'seconds', &
+    & 'points', 'bonds', 'steps', 'bytes', 'energy_drift', 'pareto', 'value', 'true_error']
 
   integer, parameter :: most_runs = 10000
 
@@ -233,7 +233,7 @@ contains
       end if
       number = size(slots)/each
       if (number*each /= size(slots)) then
-        call rule_fault(error, 'study', i, 'values', to_text(size(slots))//' values make no '// &
+        call rule_fault(error, 'study', i, 'values', to_text(size(slots))//' values are not a '// &
           & 'whole number of vectors', 'expected '//to_text(each)//' for each', source)
         return
       end if
@@ -406,7 +406,7 @@ contains
     end do
   end function common_divisor
 
-  !> Points, spacing and a guess of the work of a run; an error if it does not fit into the memory.
+  !> Points, spacing and an estimate of the work of a run; an error if it does not fit into the memory.
   subroutine size_up(trial, error)
     type(trial_type), intent(inout) :: trial
     type(error_type), allocatable, intent(out) :: error

@@ -9,9 +9,9 @@ module pd_study_predict
   use pd_base_numbers, only: ascending
   implicit none (type, external)
   private
-  public :: law_type, fit_law, error_at, seconds_at
+  public :: law_type, fit_law, error_at, true_error_at, seconds_at, least_order
 
-  real(wp), parameter :: least_order = 0.15_wp   !! below it the error does not fall with the step
+  real(wp), parameter :: least_order = 0.15_wp   !! below it the error does not decrease with the step
   real(wp), parameter :: least_with_reference = 0.5_wp  !! the error falls to 0 there in any case
   real(wp), parameter :: most_order = 8.0_wp
   real(wp), parameter :: favour = 1.5_wp         !! weight of a run over that of the next coarser
@@ -26,7 +26,7 @@ module pd_study_predict
     real(wp) :: last_factor = 0.0_wp      !! log C beyond the finest run
     real(wp) :: last_order = 0.0_wp       !! p beyond the finest run
     logical :: extrapolates = .false.     !! the fit holds beyond the finest run
-    real(wp) :: margin = 1.1_wp           !! what the scatter of the runs about the fit asks for
+    real(wp) :: margin = 1.1_wp           !! factor of safety for the scatter of the runs about the fit
     real(wp) :: slope = 0.0_wp            !! q
     real(wp) :: log_cost = 0.0_wp         !! log c
   end type law_type
@@ -50,7 +50,7 @@ contains
     if (law%n < 2) return
     law%extrapolates = all(law%error > 0.0_wp) .and. all(law%h > reference)
     call line(log(law%h), log(law%seconds), law%log_cost, law%slope)
-    ! never cheaper when finer, whatever a restless clock says
+    ! never faster when finer, whatever the noise of the clock
     law%slope = max(0.0_wp, -law%slope)
     law%log_cost = log(law%seconds(law%n)) + law%slope*log(law%h(law%n))
     if (.not. law%extrapolates) return
@@ -58,7 +58,7 @@ contains
     law%margin = min(2.0_wp, max(1.1_wp, exp(2*sqrt(misfit))))
     law%last_order = law%order
     law%last_factor = law%log_factor
-    ! an error that has begun to level off goes on as the last runs do
+    ! an error that has begun to level off is extrapolated by the last runs
     if (law%n > 3) then
       call fit_order(law, law%n - 2, p, log_factor, misfit)
       if (p < law%order) then
@@ -69,14 +69,14 @@ contains
     law%extrapolates = law%last_order >= least_order
   end subroutine fit_law
 
-  !> The order that fits runs `first` .. best, with its factor, and the mean square of what is left
-  !> of the errors' logarithms.
+  !> The order that fits runs `first` .. best, with its factor, and the mean square of the
+  !> residuals of the errors' logarithms.
   pure subroutine fit_order(law, first, order, log_factor, misfit)
     type(law_type), intent(in) :: law
     integer, intent(in) :: first
     real(wp), intent(out) :: order, log_factor, misfit
     integer, parameter :: tries = 400
-    real(wp) :: rest(law%n - first + 1), weight(law%n - first + 1), p, factor, square
+    real(wp) :: scatter(law%n - first + 1), weight(law%n - first + 1), p, factor, square
     integer :: i
 
     misfit = huge(misfit)
@@ -86,9 +86,9 @@ contains
     do i = 1, tries
       p = most_order*i/tries
       if (law%reference > 0.0_wp .and. p < least_with_reference) cycle
-      rest = log(law%error(first:)) - log(law%h(first:)**p - law%reference**p)
-      factor = sum(weight*rest)
-      square = sum(weight*(rest - factor)**2)
+      scatter = log(law%error(first:)) - log(law%h(first:)**p - law%reference**p)
+      factor = sum(weight*scatter)
+      square = sum(weight*(scatter - factor)**2)
       if (square >= misfit) cycle
       misfit = square
       order = p
@@ -119,7 +119,7 @@ contains
   end subroutine line
 
   !> The error to be expected at a step. Between runs it is interpolated, where a run counts no
-  !> better than any finer one, or the fit's if that is worse: what a run does better, it owes to
+  !> better than any finer one, or the fit's if that is worse: a smaller error is taken for
   !> chance. Beyond the finest run it is the fit's, moved up to that run if the fit lies below it,
   !> but no nearer to the run that all are compared with than twice its step: there that run says
   !> more of itself. Huge where nothing is known, and at steps coarser than the coarsest run's,
@@ -153,6 +153,21 @@ contains
       error = exp(above + log_fit(law, law%last_factor, law%last_order, h))
     end if
   end function error_at
+
+  !> The error at a step against the exact answer where the errors are those against a run of step
+  !> r: C h^p by the fit of all runs. `known` is false where there is no such fit: fewer than two
+  !> runs, an error of 0, an order below `least_order`, or r = 0.
+  pure subroutine true_error_at(law, h, error, known)
+    type(law_type), intent(in) :: law
+    real(wp), intent(in) :: h              !! step, not below r
+    real(wp), intent(out) :: error         !! in the norm of the errors; 0 if not known
+    logical, intent(out) :: known
+
+    known = law%n >= 2 .and. law%reference > 0.0_wp .and. law%order >= least_order
+    if (known) known = all(law%error > 0.0_wp)
+    error = 0.0_wp
+    if (known) error = exp(law%log_factor + law%order*log(h))
+  end subroutine true_error_at
 
   !> log(C (h^p - r^p)).
   pure real(wp) function log_fit(law, log_factor, order, h)

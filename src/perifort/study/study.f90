@@ -7,20 +7,21 @@ module pd_study_study
   use pd_base_interrupt, only: watch_for_interrupt
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: ascending
-  use pd_base_text, only: to_text, with_unit
+  use pd_base_shell, only: program_command, quoted
+  use pd_base_text, only: newline, to_text
   use pd_driver, only: output_directory, run_options_type
   use pd_output_files, only: file_exists, in_directory, make_directory
   use pd_scene_file, only: resolve_path
   use pd_scene_rules, only: find_entry, find_section, rule_fault
-  use pd_scene_types, only: is_set, scene_type
   use pd_study_analytic, only: find_form
   use pd_study_closed_form, only: closed_form_type
   use pd_study_front, only: mark_front
-  use pd_study_measure, only: measure_type, measure_unit, of_column, record_type, resolve_measure
+  use pd_study_lines, only: finest_of, mark_true_errors
+  use pd_study_measure, only: measure_type, of_column, record_type, resolve_measure
   use pd_study_plan, only: plan_study, plan_type, trial_type
   use pd_study_reference, only: judge_by_form, judge_by_record, read_reference
   use pd_study_table, only: csv_text, head_text, put_file, row_text, settings_text, table_text
-  use pd_study_trial, only: outcome_type, run_trial
+  use pd_study_trial, only: check_trial, outcome_type, run_trial
   implicit none (type, external)
   private
   public :: session_type, run_study, begin_study, run_all, run_one, keep_tables, add_trial, say
@@ -35,11 +36,10 @@ module pd_study_study
     type(record_type) :: truth                  !! finest run or file
     integer :: finest = 0                       !! number of the run compared with, 0: none
     real(wp) :: around = 0.0_wp                 !! of its probe kept so far [m]
-    character(:), allocatable :: unit           !! of the error
     character(:), allocatable :: directory
     logical :: quiet = .false.
     logical :: terminal = .false.
-    real(wp) :: spent = 0.0_wp, work = 0.0_wp   !! on runs so far [s], and what they were guessed
+    real(wp) :: spent = 0.0_wp, work = 0.0_wp   !! on runs so far [s], and their estimated work
   end type session_type
 
 contains
@@ -55,14 +55,27 @@ contains
     if (.not. allocated(error)) call run_all(session, error)
     if (allocated(error)) return
     call say(session, '')
-    call say(session, table_text(session%plan, session%outcomes, session%unit))
-    call say(session, '  results in '//session%directory//': study.csv, study.txt; pictures by '// &
-      & './pf plot '//session%directory)
+    call say(session, table_text(session%plan, session%outcomes, session%measure))
+    call say(session, '  results in '//session%directory//': study.csv, study.txt'//newline// &
+      & '  pictures: '//plot_command(session%directory))
     if (.not. any(session%outcomes%judged)) call fail(error, 'no run of the study has an answer', &
       & status_no_answer)
   end subroutine run_study
 
-  !> Plan everything and find what is wrong before the first run.
+  !> The command that draws the tables. Pictures are the part of `./pf`; where the program was started
+  !> by itself, that of its project's folder is named.
+  function plot_command(directory) result(text)
+    character(*), intent(in) :: directory      !! of the tables
+    character(:), allocatable :: text
+    integer :: status
+
+    call get_environment_variable('PERIFORT_COMMAND', status=status)
+    text = './pf'
+    if (status == 0) text = program_command()
+    text = text//' plot '//quoted(directory)
+  end function plot_command
+
+  !> Plan everything, and check and set up every scene before the first run.
   subroutine begin_study(path, options, session, error)
     character(*), intent(in) :: path
     type(run_options_type), intent(in) :: options
@@ -78,7 +91,6 @@ contains
       call resolve_measure(plan%measure, plan%region, plan%norm, plan%scene, plan%source, &
         & session%measure, error)
       if (allocated(error)) return
-      session%unit = measure_unit(session%measure)
       call find_truth(session, error)
       if (allocated(error)) return
       session%directory = output_directory(plan%scene, options)
@@ -88,10 +100,11 @@ contains
           & "' is there already; use --overwrite, or --output for another folder")
         return
       end if
-      call make_directory(session%directory, error)
-      if (allocated(error)) return
       allocate (session%outcomes(size(plan%trials)))
       call choose_threads(options, plan)
+      call check_trials(session, error)
+      if (.not. allocated(error)) call make_directory(session%directory, error)
+      if (allocated(error)) return
       call say(session, to_text(size(plan%trials))//' run(s), '// &
         & to_text(nint(minval(plan%trials%points)))//' to '// &
         & to_text(nint(maxval(plan%trials%points)))//' points, '// &
@@ -147,10 +160,15 @@ contains
           return
         end do
       case ('finest')
-        session%finest = finest_of(plan)
         session%around = maxval(plan%trials%spacing)
-        if (size(plan%trials) == 1) call at_key(plan, 'against', 'a single run has no finer one', &
-          & "give 'values' several values", error)
+        if (size(plan%trials) == 1) then
+          call at_key(plan, 'against', 'a single run has no finer one', &
+            & "give 'values' several values", error)
+          return
+        end if
+        call finest_of(plan, session%finest, reason)
+        if (len(reason) > 0) call at_key(plan, 'against', reason, 'one run must be at least as '// &
+          & 'fine as all others in every key: add it, or compare with a closed form or a file', error)
       case default
         probe = ''
         if (session%measure%probe > 0) probe = trim(plan%scene%probes(session%measure%probe)%name)
@@ -179,31 +197,29 @@ contains
     call rule_fault(error, 'study', number, trim(key), message, note, plan%source)
   end subroutine at_key
 
-  !> The run with the smallest spacing; among equals that with the smallest step in time or the
-  !> smallest tolerance, then the first.
-  pure integer function finest_of(plan) result(finest)
-    type(plan_type), intent(in) :: plan
+  !> Set up every scene, in memory and one after another: what is wrong with the last is reported
+  !> before the first one runs.
+  subroutine check_trials(session, error)
+    type(session_type), intent(inout) :: session
+    type(error_type), allocatable, intent(out) :: error   !! with the settings of the scene
+    type(closed_form_type), allocatable :: form
+    character(:), allocatable :: reason
     integer :: t
 
-    finest = 1
-    do t = 2, size(plan%trials)
-      if (plan%trials(t)%spacing > plan%trials(finest)%spacing*(1 + 1.0e-9_wp)) cycle
-      if (plan%trials(t)%spacing < plan%trials(finest)%spacing*(1 - 1.0e-9_wp) .or. &
-        & care(plan%trials(t)%scene) < care(plan%trials(finest)%scene)) finest = t
+    do t = 1, size(session%plan%trials)
+      if (allocated(form)) deallocate (form)
+      associate (plan => session%plan)
+        if (plan%against == 'analytic') then
+          allocate (form)
+          call find_form(plan%analytic, plan%trials(t)%scene, form, reason)
+        end if
+        call check_trial(plan%trials(t)%scene, session%measure, form, error)
+        if (.not. allocated(error)) cycle
+        error%message = settings_text(plan, t)//': '//error%message
+        return
+      end associate
     end do
-  end function finest_of
-
-  !> The smaller, the more care is taken in time.
-  pure real(wp) function care(scene)
-    type(scene_type), intent(in) :: scene
-    if (scene%time%method == 'relaxation') then
-      care = scene%relaxation%tolerance
-    else if (is_set(scene%time%step)) then
-      care = scene%time%step
-    else
-      care = scene%time%safety
-    end if
-  end function care
+  end subroutine check_trials
 
   !> The same number of threads for all runs: as asked for, or one if even the largest is small.
   subroutine choose_threads(options, plan)
@@ -227,7 +243,7 @@ contains
     work = session%plan%trials%work
     order = ascending(work)
     if (session%finest > 0) order = [session%finest, pack(order, order /= session%finest)]
-    call say(session, head_text(session%plan, session%unit))
+    call say(session, head_text(session%plan, session%measure))
     do i = 1, size(order)
       call run_one(session, order(i), sum(session%plan%trials(order(i + 1:))%work), error)
       if (allocated(error)) exit
@@ -237,11 +253,11 @@ contains
       & ' of '//to_text(size(order))//' runs are in '//in_directory(session%directory, 'study.csv')
   end subroutine run_all
 
-  !> Make run `t`, judge it and write the table anew. `rest`: guessed work of the runs to come.
-  subroutine run_one(session, t, rest, error, silent)
+  !> Make run `t`, judge it and write the table anew. `remaining`: estimated work of the later runs.
+  subroutine run_one(session, t, remaining, error, silent)
     type(session_type), intent(inout) :: session
     integer, intent(in) :: t
-    real(wp), intent(in) :: rest
+    real(wp), intent(in) :: remaining
     type(error_type), allocatable, intent(out) :: error
     logical, intent(in), optional :: silent      !! the row is not shown
     type(closed_form_type), allocatable :: form
@@ -279,7 +295,8 @@ contains
       if (allocated(error)) return
       if (present(silent)) return
       line = row_text(plan, t, outcome)
-      if (rest > 0.0_wp) line = line//'   left '//duration_text(session%spent/session%work*rest)
+      if (remaining > 0.0_wp) line = line//'   left '// &
+        & duration_text(session%spent/session%work*remaining)
       call say(session, line)
     end associate
   end subroutine run_one
@@ -314,10 +331,11 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     call mark_front(session%outcomes)
+    call mark_true_errors(session%plan, session%outcomes)
     call put_file(session%directory, 'study.csv', csv_text(session%plan, session%outcomes), error)
     if (allocated(error)) return
     call put_file(session%directory, 'study.txt', table_text(session%plan, session%outcomes, &
-      & session%unit), error)
+      & session%measure), error)
   end subroutine keep_tables
 
   !> One more run at the end of the plan.

@@ -5,6 +5,7 @@ module pd_study_table
   use pd_base_text, only: join, newline, to_text
   use pd_output_files, only: in_directory, rename_file
   use pd_study_front, only: observed_orders, order_type
+  use pd_study_measure, only: measure_type, measure_unit, quantity_unit
   use pd_study_plan, only: plan_type, result_columns, shown_word
   use pd_study_trial, only: outcome_type
   implicit none (type, external)
@@ -12,11 +13,13 @@ module pd_study_table
   public :: csv_text, table_text, row_text, head_text, put_file, settings_text
 
   integer, parameter :: number_width = 11
+  integer, parameter :: value_width = 13
 
 contains
 
   !> The whole CSV file: a line for each run that has been made, in the order of the plan. A run
-  !> without an answer has nan as its error.
+  !> without an answer has nan as its value and error. The true error is the extrapolated one against
+  !> the finest run, nan where it is not known; against a closed form or a file it is the error.
   function csv_text(plan, outcomes) result(text)
     type(plan_type), intent(in) :: plan
     type(outcome_type), intent(in) :: outcomes(:)
@@ -36,9 +39,23 @@ contains
       associate (o => outcomes(t))
         text = text//error_text(o, 9)//','//to_text(o%seconds, 6)//','//to_text(o%points)//','// &
           & to_text(o%bonds)//','//to_text(o%steps)//','//to_text(o%bytes)//','// &
-          & to_text(o%energy_drift, 6)//','//trim(merge('1', '0', o%pareto))//newline
+          & to_text(o%energy_drift, 6)//','//trim(merge('1', '0', o%pareto))//','// &
+          & value_text(o, 12)//','//true_error_of(o)//newline
       end associate
     end do
+
+  contains
+
+    !> The last column of a row.
+    pure function true_error_of(outcome) result(text)
+      type(outcome_type), intent(in) :: outcome
+      character(:), allocatable :: text
+      if (plan%against == 'finest') then
+        text = true_text(outcome, 6, 'nan')
+      else
+        text = error_text(outcome, 9)
+      end if
+    end function true_error_of
   end function csv_text
 
   !> Whether a run was made, with or without an answer.
@@ -56,20 +73,39 @@ contains
     if (outcome%judged) text = to_text(outcome%error, digits)
   end function error_text
 
+  !> The measured value with so many digits; nan where there is none.
+  pure function value_text(outcome, digits) result(text)
+    type(outcome_type), intent(in) :: outcome
+    integer, intent(in) :: digits
+    character(:), allocatable :: text
+    text = 'nan'
+    if (outcome%done) text = to_text(outcome%value, digits)
+  end function value_text
+
+  !> The extrapolated true error with so many digits; `none` where it is not known.
+  pure function true_text(outcome, digits, none) result(text)
+    type(outcome_type), intent(in) :: outcome
+    integer, intent(in) :: digits
+    character(*), intent(in) :: none
+    character(:), allocatable :: text
+    text = none
+    if (outcome%extrapolated) text = to_text(outcome%true_error, digits)
+  end function true_text
+
   !> The whole table with what follows from it.
-  function table_text(plan, outcomes, unit) result(text)
+  function table_text(plan, outcomes, measure) result(text)
     type(plan_type), intent(in) :: plan
     type(outcome_type), intent(in) :: outcomes(:)
-    character(*), intent(in) :: unit              !! of the error
+    type(measure_type), intent(in) :: measure
     character(:), allocatable :: text
     type(order_type), allocatable :: orders(:)
     integer :: t, i
 
-    text = head_text(plan, unit)//newline
+    text = head_text(plan, measure)//newline
     do t = 1, size(outcomes)
       if (known(outcomes(t))) text = text//row_text(plan, t, outcomes(t))//newline
     end do
-    text = text//newline//'  * on the Pareto front: no run is better in error and time'//newline
+    text = text//newline//legend_text(plan, measure)
     call observed_orders(plan, outcomes, orders)
     if (size(orders) > 0) text = text//newline// &
       & "Observed orders: log of the errors' ratio over log of the values' ratio"// &
@@ -89,10 +125,37 @@ contains
     end do
   end function table_text
 
-  !> The line above the rows.
-  function head_text(plan, unit) result(text)
+  !> What the columns mean, one a line.
+  function legend_text(plan, measure) result(text)
     type(plan_type), intent(in) :: plan
-    character(*), intent(in) :: unit
+    type(measure_type), intent(in) :: measure
+    character(:), allocatable :: text
+
+    text = '  value       '//measure%name//' at the end of the run; of a vector its length, of a '// &
+      & 'field the root mean square over its points'//newline// &
+      & '  error       '//measure%norm//' norm of the difference from '
+    select case (plan%against)
+    case ('analytic')
+      text = text//'the closed form'
+    case ('finest')
+      text = text//'the finest run'
+    case default
+      text = text//plan%against
+    end select
+    text = text//newline
+    if (plan%against == 'finest') text = text// &
+      & '  true error  extrapolated: C h^p, by the fit C (h^p - r^p) of the errors; r is the '// &
+      & 'step h of the finest run'//newline
+    text = text//'  seconds     set-up and steps, median of the repeats'//newline// &
+      & '  drift       largest error of the energy balance over the largest energy'//newline// &
+      & '  *           on the Pareto front: no run has both a smaller error and a shorter time'// &
+      & newline
+  end function legend_text
+
+  !> The line above the rows.
+  function head_text(plan, measure) result(text)
+    type(plan_type), intent(in) :: plan
+    type(measure_type), intent(in) :: measure
     character(:), allocatable :: text
     integer :: v
 
@@ -100,15 +163,21 @@ contains
     do v = 1, size(plan%variables)
       text = text//right(plan%variables(v)%name, column_width(plan, v))
     end do
-    if (unit == '') then
-      text = text//right('error', number_width)
-    else
-      text = text//right('error ['//unit//']', number_width)
-    end if
+    text = text//right('value'//in_brackets(quantity_unit(measure)), value_width)// &
+      & right('error'//in_brackets(measure_unit(measure)), number_width)
+    if (plan%against == 'finest') text = text//right('true error', number_width)
     text = text//right('seconds', number_width)//right('points', number_width)// &
       & right('bonds', number_width)//right('steps', number_width)//right('bytes', number_width)// &
       & right('drift', number_width)
   end function head_text
+
+  !> ` [m]`, or nothing without a unit.
+  pure function in_brackets(unit) result(text)
+    character(*), intent(in) :: unit
+    character(:), allocatable :: text
+    text = ''
+    if (len(unit) > 0) text = ' ['//unit//']'
+  end function in_brackets
 
   !> The row of one run.
   function row_text(plan, t, outcome) result(text)
@@ -122,8 +191,10 @@ contains
     do v = 1, size(plan%variables)
       text = text//right(shown_word(plan%trials(t)%words(v)), column_width(plan, v))
     end do
-    text = text//right(error_text(outcome, 4), number_width)// &
-      & right(to_text(outcome%seconds, 3), number_width)// &
+    text = text//right(value_text(outcome, 6), value_width)// &
+      & right(error_text(outcome, 4), number_width)
+    if (plan%against == 'finest') text = text//right(true_text(outcome, 4, '-'), number_width)
+    text = text//right(to_text(outcome%seconds, 3), number_width)// &
       & right(to_text(outcome%points), number_width)// &
       & right(to_text(outcome%bonds), number_width)//right(to_text(outcome%steps), number_width)// &
       & right(to_text(outcome%bytes), number_width)// &

@@ -19,17 +19,20 @@ module pd_study_trial
   use pd_scene_types, only: scene_type
   use pd_study_closed_form, only: closed_form_type, components_of
   use pd_study_analytic, only: complete_form
-  use pd_study_measure, only: measure_type, of_column, of_field, of_probe, record_type
+  use pd_study_measure, only: measure_type, of_column, of_field, of_probe, record_type, value_of
   implicit none (type, external)
   private
-  public :: outcome_type, run_trial
+  public :: outcome_type, run_trial, check_trial
 
   !> What a run came to.
   type :: outcome_type
     logical :: done = .false.
     character(:), allocatable :: fault         !! why it has no answer
+    real(wp) :: value = 0.0_wp                 !! what was measured, see `value_of` of pd_study_measure
     real(wp) :: error = 0.0_wp                 !! in the norm of the study
     logical :: judged = .false.                !! the error is known
+    real(wp) :: true_error = 0.0_wp            !! extrapolated from the errors against the finest run
+    logical :: extrapolated = .false.          !! the true error is known
     logical :: truth = .false.                 !! it is what the others are compared with
     real(wp) :: seconds = 0.0_wp               !! set-up and steps, without measuring; the median
     integer :: repeats = 0
@@ -89,6 +92,7 @@ contains
         & watcher, seconds(r), outcome, fault, error)
       if (allocated(error)) return
       if (r == 1) record = watcher%record
+      if (r == 1 .and. .not. allocated(fault)) outcome%value = value_of(record)
       outcome%repeats = r
       outcome%seconds = median(seconds(:r))
       if (allocated(fault)) then
@@ -99,6 +103,52 @@ contains
     end do
     outcome%done = .true.
   end subroutine run_trial
+
+  !> Set a scene up as `run_trial` does, without running it: an error if that is not possible, if
+  !> what is measured is not there, or if the closed form does not hold for the points. The largest
+  !> frequency of `limit = 'spectral'` is not measured.
+  subroutine check_trial(scene, measure, form, error)
+    type(scene_type), intent(in) :: scene
+    type(measure_type), intent(in) :: measure
+    type(closed_form_type), allocatable, intent(inout) :: form
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: checked
+    type(set_up_type) :: set_up
+    type(watcher_type) :: watcher
+    type(outcome_type) :: outcome
+
+    checked = scene
+    checked%time%limit = 'equation'
+    call prepare(checked, set_up, error)
+    if (.not. allocated(error)) call begin_watch(checked, measure, 0.0_wp, set_up, form, watcher, &
+      & outcome, error)
+  end subroutine check_trial
+
+  !> What is measured in a scene that is set up, its size and its closed form, before the first step.
+  subroutine begin_watch(scene, measure, around, set_up, form, watcher, outcome, error)
+    type(scene_type), intent(in) :: scene
+    type(measure_type), intent(in) :: measure
+    real(wp), intent(in) :: around             !! as in `run_trial` [m]; below 0 for the time alone
+    type(set_up_type), intent(in) :: set_up
+    type(closed_form_type), allocatable, intent(inout) :: form
+    type(watcher_type), intent(inout) :: watcher
+    type(outcome_type), intent(inout) :: outcome
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: reason
+
+    watcher%measure = measure
+    watcher%quick = around < 0.0_wp
+    watcher%relaxation = set_up%plan%relaxes
+    watcher%every = history_interval(scene, set_up%plan)
+    watcher%probes = set_up%probes
+    if (watcher%quick) return
+    call choose_places(scene, set_up%system, around, watcher, error)
+    if (allocated(error)) return
+    call note_costs(set_up%system, set_up%plan%step, outcome)
+    if (.not. allocated(form)) return
+    call complete_form(scene, set_up%system, set_up%plan%steps*set_up%plan%step, form, reason)
+    if (len(reason) > 0) call fail(error, reason)
+  end subroutine begin_watch
 
   !> One repeat; with `around` < 0 nothing but the time is wanted.
   subroutine run_once(scene, measure, around, terminal, form, watcher, seconds, outcome, fault, &
@@ -113,7 +163,6 @@ contains
     type(outcome_type), intent(inout) :: outcome
     type(error_type), allocatable, intent(out) :: fault, error
     type(set_up_type) :: set_up
-    character(:), allocatable :: reason
     real(wp) :: begin, lost
 
     begin = wall_time()
@@ -121,22 +170,9 @@ contains
     call prepare(scene, set_up, error)
     if (allocated(error)) return
     lost = wall_time()
-    watcher%measure = measure
-    watcher%quick = around < 0.0_wp
+    call begin_watch(scene, measure, around, set_up, form, watcher, outcome, error)
+    if (allocated(error)) return
     associate (system => set_up%system, plan => set_up%plan)
-      watcher%relaxation = plan%relaxes
-      watcher%every = history_interval(scene, plan)
-      watcher%probes = set_up%probes
-      if (.not. watcher%quick) then
-        call choose_places(scene, system, around, watcher, error)
-        if (allocated(error)) return
-        call note_costs(system, plan%step, outcome)
-        if (allocated(form)) then
-          call complete_form(scene, system, plan%steps*plan%step, form, reason)
-          if (len(reason) > 0) call fail(error, reason)
-          if (allocated(error)) return
-        end if
-      end if
       ! one more than there are, since the last step would be shown of runs of any length
       call watcher%progress%start(plan%steps + 1_i8, terminal, .not. terminal, load=plan%relaxes)
       lost = wall_time() - lost
@@ -195,19 +231,31 @@ contains
         chosen = body%point > 0 .and. body%layer == 0
         if (measure%region /= '') chosen = chosen .and. region_mask(scene, body, measure%region)
         if (.not. any(chosen)) call fail(error, "the region '"//measure%region//"' has no points")
-      case default
+      case (of_column)
         columns = history_columns(system, watcher%probes, watcher%relaxation)
         do k = 1, size(columns)
           if (columns(k)%name == measure%name) watcher%column = k
         end do
         if (watcher%column == 0) call fail(error, "the history has no column '"//measure%name//"'")
+      case default
+        error stop 'internal error: unknown kind of a measure'
       end select
       if (allocated(error)) return
       watcher%slots = pack([(k, k=1, body%n_slots)], chosen)
       associate (record => watcher%record)
         record%x = transpose(body%x(watcher%slots, :))
         record%weight = [1.0_wp]
-        if (measure%kind == of_field) record%weight = body%volume(watcher%slots)
+        select case (measure%kind)
+        case (of_field)
+          record%weight = body%volume(watcher%slots)
+          record%place = 0
+        case (of_probe)
+          record%place = findloc(watcher%slots, watcher%probes(measure%probe)%slot, dim=1)
+        case (of_column)
+          record%place = 1
+        case default
+          error stop 'internal error: unknown kind of a measure'
+        end select
         record%spacing = maxval(body%spacing, mask=body%point > 0)
         k = 1
         if (measure%kind /= of_column) k = merge(1, components_of(measure%field, dim), &
