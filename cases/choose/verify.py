@@ -1,5 +1,5 @@
 """`perifort choose` on three cases: the error of the settings it chooses, against what was asked and
-what was foretold. --quick leaves out the plate with the hole."""
+what was predicted. --quick leaves out the plate with the hole."""
 import csv
 import re
 import subprocess
@@ -57,9 +57,9 @@ def main():
             case.show(f"{name}, error {target:g}: chosen", settings)
             case.equal("   exit status", status, 0)
             case.below("   measured error", measured, target * (1 + 1e-9))
-            for number, (_, foretold, found) in enumerate(tries, 1):
+            for number, (_, expected, found) in enumerate(tries, 1):
                 case.below(f"   try {number}: larger of measured over predicted and its inverse",
-                           max(found / foretold, foretold / found), 2.0)
+                           max(found / expected, expected / found), 2.0)
             if name == "bar_vibration":
                 case.near("   the same by a run of its own", bar_error(case, settings), measured,
                           relative=1e-3)

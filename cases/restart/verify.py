@@ -163,14 +163,14 @@ def stop_and_go_on(subject, what, tally, words=(), number=None):
         time.sleep(0.5 * subject.duration)
         run.send_signal(number)
     message = run.communicate()[1]
-    printed = re.search(r"to go on: perifort (.*)", message)
+    printed = re.search(r"to go on: (.*)", message)
     fault = ""
     if run.returncode != 4 or not printed:
         fault = f"status {run.returncode}: {message}"
     elif subject.name == "rest":
         fault = subject.check_amid(subject.folder)
     while not fault and run.returncode == 4:
-        run = subprocess.run([subject.program, *shlex.split(printed.group(1))],
+        run = subprocess.run(shlex.split(printed.group(1)),
                              stderr=subprocess.PIPE, text=True, check=False)
         if run.returncode not in (0, 4):
             fault = f"status {run.returncode}: {run.stderr}"

@@ -94,8 +94,8 @@ contains
       purpose = 'The values of the nearest point in every row of the history.'
     case ('study')
       purpose = 'A key that `perifort study` and `choose` vary. Several groups make the '// &
-        & 'product of their values; what is measured need stand in one of them only. '// &
-        & '`run` passes over it.'
+        & 'product of their values; what is measured has to be given in one of them only. '// &
+        & '`run` ignores it.'
     case default
       purpose = ''
     end select
@@ -456,12 +456,13 @@ contains
       & 'element', required=.true.)
     call keys%words('values', group%values, 'its values, one for each run; of body%points the '// &
       & 'count along x, the other counts follow in proportion', required=.true.)
-    call keys%key('together', group%together, 'goes in step with the group before it instead '// &
-      & 'of making the product')
+    call keys%key('together', group%together, 'varies together with the group before it '// &
+      & 'instead of making the product')
     call keys%key('measure', group%measure, 'a probe, a column of the history, or a field in '// &
       & 'the final state', default='required in one group')
     call keys%key('against', group%against, 'what it is compared with: analytic, a closed '// &
-      & 'form; finest, the run with the smallest spacing; or the name of a file, history.csv, '// &
+      & 'form; finest, the run that is the finest in every varied key; or the name of a file, '// &
+      & 'history.csv, '// &
       & 'a table of positions and values, or results (.vtkhdf)', default='required in one group')
     call keys%key('analytic', group%analytic, 'the closed form', allowed=closed_forms, &
       & default='the one that fits the scene')

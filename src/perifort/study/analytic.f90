@@ -82,8 +82,10 @@ contains
       call fit_hole(scene, form, reason)
     case ('chain_wave')
       call fit_chain(scene, form, reason)
-    case default
+    case ('linear_field')
       call fit_linear(scene, form, reason)
+    case default
+      error stop 'internal error: fit does not know a closed form of closed_forms'
     end select
   end subroutine fit
 
@@ -126,7 +128,7 @@ contains
     else if (scene%time%method /= 'explicit') then
       reason = "it needs &time method = 'explicit'"
     else if (size(scene%loads) > 0 .or. size(scene%removed) > 0) then
-      reason = 'the bar must be whole and free of loads'
+      reason = 'the bar must have no removed shapes and no loads'
     else if (size(scene%boundaries) /= 1) then
       reason = 'one end must be held by a &boundary with a side'
     else if (scene%boundaries(1)%side == '' .or. .not. rests(scene%boundaries(1), 1)) then
@@ -165,7 +167,7 @@ contains
         if (initial%region /= '' .or. initial%file /= '') &
           & reason = 'the initial state must be that of all points, by displacement_gradient'
         if (any(is_set(initial%velocity) .and. abs(initial%velocity) > 0.0_wp) .or. &
-          & any(abs(initial%velocity_gradient) > 0.0_wp)) reason = 'it must start at rest'
+          & any(abs(initial%velocity_gradient) > 0.0_wp)) reason = 'the initial velocity must be 0'
         if (.not. sets(initial, 1)) cycle
         slope = initial%displacement_gradient(1, 1)
         shift = merge(initial%displacement(1), 0.0_wp, is_set(initial%displacement(1)))
@@ -247,7 +249,7 @@ contains
     else if (scene%time%method /= 'explicit') then
       reason = "it needs &time method = 'explicit'"
     else if (size(scene%loads) + size(scene%boundaries) + size(scene%removed) > 0) then
-      reason = 'the chain must be whole, without loads and boundaries'
+      reason = 'the chain must have no removed shapes, without loads and boundaries'
     else if (size(scene%initial) /= 1) then
       reason = 'one &initial must give the wave'
     else if (scene%initial(1)%file == '' .or. scene%initial(1)%region /= '') then
@@ -264,14 +266,14 @@ contains
     integer :: i, c
 
     form%kind = form_linear
-    if (size(scene%loads) + size(scene%removed) > 0) reason = 'the body must be whole and unloaded'
+    if (size(scene%loads) + size(scene%removed) > 0) reason = 'the body must have no removed shapes and no loads'
     if (size(scene%initial) == 0) reason = 'no &initial gives a displacement_gradient'
     do i = 1, size(scene%initial)
       associate (initial => scene%initial(i))
         if (initial%region /= '' .or. initial%file /= '') &
           & reason = 'the initial state must be that of all points, by displacement_gradient'
         if (any(is_set(initial%velocity) .and. abs(initial%velocity) > 0.0_wp) .or. &
-          & any(abs(initial%velocity_gradient) > 0.0_wp)) reason = 'it must start at rest'
+          & any(abs(initial%velocity_gradient) > 0.0_wp)) reason = 'the initial velocity must be 0'
         do c = 1, form%dim
           if (.not. sets(initial, c)) cycle
           form%gradient(c, :) = initial%displacement_gradient(c, :)
@@ -334,7 +336,7 @@ contains
     form%lower = scene%bodies(1)%lower(1) + fastest*time + lead*rule%delta
     form%upper = scene%bodies(1)%upper(1) - fastest*time - lead*rule%delta
     if (form%lower >= form%upper) reason = "the closed form 'chain_wave' does not fit: until t = " &
-      & //to_text(time)//' s the ends are felt everywhere; make the chain longer by '// &
+      & //to_text(time)//' s waves from the ends reach every point; make the chain longer by '// &
       & to_text(form%lower - form%upper)//' m, or end sooner'
   end subroutine complete_form
 
@@ -350,7 +352,7 @@ contains
     k = 0.0_wp
     reason = "the closed form 'chain_wave' does not fit: "
     if (n < 3 .or. all(abs(form%u) <= 0.0_wp) .and. all(abs(form%v) <= 0.0_wp)) then
-      reason = reason//'the file gives no wave'
+      reason = reason//'the values of the file are not a wave'
       return
     end if
     ! displacements and velocities in units of their own
@@ -361,7 +363,7 @@ contains
     cosine = both/(2*square)
     rest = max(misfit(form%u), misfit(form%v))
     if (abs(cosine) >= 1.0_wp .or. rest > pure_wave*2*(1 - abs(min(cosine, 1.0_wp)))) then
-      reason = reason//'the initial state is no wave of a single wave number'
+      reason = reason//'the initial state is not a wave of a single wave number'
       return
     end if
     k = acos(cosine)/form%spacing

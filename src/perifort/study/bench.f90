@@ -58,7 +58,7 @@ contains
     do i = 1, size(kernels)
       if (bytes_needed(kernels(i)) > 0.9_wp*available_memory()) then
         write (out, '(a)') kernel_label(kernels(i))//' left out: needs about '// &
-          & with_unit(bytes_needed(kernels(i)), 'B', 3)//', free are '// &
+          & with_unit(bytes_needed(kernels(i)), 'B', 3)//', available '// &
           & with_unit(real(available_memory(), wp), 'B', 3)
         cycle
       end if
@@ -85,8 +85,8 @@ contains
     if (.not. allocated(error) .and. done == 0) &
       & call fail(error, 'no body fits into the free memory of '// &
       & with_unit(real(available_memory(), wp), 'B', 3)//'; ask for fewer --points')
-    if (busy < 0.9_wp) write (out, '(a)') '', 'The machine was busy: a single thread got only '// &
-      & to_text(100*busy, 2)//' % of a core at times. The column cpu does not count the waiting.'
+    if (busy < 0.9_wp) write (out, '(a)') '', 'Warning: other programs used the machine: a thread had only '// &
+      & to_text(100*busy, 2)//' % of a core at times. The column cpu is not affected.'
     call close_csv(options, csv, error)
   end subroutine run_bench
 

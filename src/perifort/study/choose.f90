@@ -25,7 +25,7 @@ module pd_study_choose
   integer, parameter :: most_tries = 3
   real(wp), parameter :: farthest = 16.0_wp   !! steps finer than the finest run's by no more
 
-  !> Settings with what is expected of them.
+  !> Settings with their predicted error and time.
   type :: choice_type
     logical :: found = .false.
     logical :: meets = .false.           !! error and time are expected to be met

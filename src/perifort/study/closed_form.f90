@@ -47,7 +47,7 @@ contains
     integer, intent(in) :: dim
     select case (field)
     case ('displacement', 'velocity', 'force_density'); number = dim
-    case default; number = 1
+    case default; number = 1  ! all others are scalars
     end select
   end function components_of
 
@@ -71,8 +71,10 @@ contains
       call hole(form, field, x, values, known)
     case (form_chain)
       call chain(form, field, x(1), t, values(1), known)
-    case default
+    case (form_linear)
       call linear(form, field, x, values, known)
+    case default
+      error stop 'internal error: field_at does not know a closed form'
     end select
   end subroutine field_at
 

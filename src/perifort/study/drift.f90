@@ -1,4 +1,4 @@
-!> What each integrator does to the energy of a free vibration, at parts of its own largest step.
+!> Energy drift of each integrator in a free vibration, at fractions of its own largest stable step.
 module pd_study_drift
   use pd_base_kinds, only: wp
   use pd_base_clock, only: wall_time
@@ -15,7 +15,7 @@ module pd_study_drift
   character(16), parameter :: integrators(4) = [character(16) :: 'forward_backward', &
     & 'adams_bashforth', 'adams_moulton', 'runge_kutta']
   real(wp), parameter :: parts(3) = [0.5_wp, 0.8_wp, 0.95_wp]  !! of the integrator's largest step
-  real(wp), parameter :: strain = 1.0e-6_wp  !! at the start: what is not linear is no matter
+  real(wp), parameter :: strain = 1.0e-6_wp  !! at the start: second-order terms are negligible
   integer, parameter :: looks = 50           !! at the energy, in each run
   integer, parameter :: passes = 60          !! of smoothing
   integer, parameter :: most_steps = 1000000
@@ -40,10 +40,10 @@ contains
     call random_shape(body, rough)
     smooth = rough
     call smoothed(body, step, passes, smooth)
-    write (unit, '(/, a, 3(/, a))') 'Energy of a free vibration: the part gained (+) or lost '// &
-      & '(-) in a million steps, extrapolated', 'from the steps made, or the steps to half '// &
-      & 'of it. smooth: high frequencies are taken', 'out of the start; rough: all alike', &
-      & '  integrator        part of its limit  steps made  smooth'// &
+    write (unit, '(/, a, 3(/, a))') 'Energy drift of a free vibration: relative change in a million '// &
+      & 'steps, extrapolated from the steps made;', 'where that is large, the number of steps in '// &
+      & 'which the energy changes by half. smooth: start', 'without high frequencies; rough: start '// &
+      & 'with all frequencies alike', '  integrator        part of its limit  steps made  smooth'// &
       & repeat(' ', 18)//'rough'
     do i = 1, size(integrators)
       do p = 1, size(parts)
@@ -59,8 +59,8 @@ contains
         flush (unit)
       end do
     end do
-    write (unit, '(a)') '  velocity_verlet is the scheme of forward_backward; most runs are '// &
-      & 'nearer to the smooth start'
+    write (unit, '(a)') '  velocity_verlet is the same scheme as forward_backward; most '// &
+      & 'scenes are closer to the smooth start'
   end subroutine study_drift
 
   !> Wall time of a step [s].
@@ -86,7 +86,7 @@ contains
     end do
   end function seconds_of_step
 
-  !> One run from `shape`, and in words what came of the energy.
+  !> One run from `shape`, and the change of its energy in words.
   subroutine measure(body, integrator, dt, every, shape, result)
     type(system_type), intent(inout) :: body
     character(*), intent(in) :: integrator
@@ -111,13 +111,13 @@ contains
     drift = slope_of(watch%step, watch%energy)/watch%energy(1)
     half = findloc(watch%energy < watch%energy(1)/2, .true., dim=1)
     if (half > 0) then
-      result = 'half lost in '//to_text(nint(watch%step(half)))
+      result = '-50 % in '//to_text(nint(watch%step(half)))
     else if (abs(drift) <= 0.5e-6_wp) then
       result = trim(merge('+', ' ', drift > 0.0_wp))//to_text(1.0e6_wp*drift, 2)
     else if (drift < 0.0_wp) then
-      result = 'half lost in '//trim(with_unit(0.5_wp/abs(drift), '', 2))
+      result = '-50 % in '//trim(with_unit(0.5_wp/abs(drift), '', 2))
     else
-      result = 'half as much more in '//trim(with_unit(0.5_wp/abs(drift), '', 2))
+      result = '+50 % in '//trim(with_unit(0.5_wp/abs(drift), '', 2))
     end if
   end subroutine measure
 

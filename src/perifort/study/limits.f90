@@ -72,16 +72,16 @@ contains
       if (scene%header%title /= '') write (out, '(a)') trim(scene%header%title)
       write (out, '(a)') '  '//to_text(system%body%n_points)//' points, '// &
         & to_text(system%family%n_bonds)//' bonds, '//system%family%describe()
-      if (scene%time%method == 'relaxation') write (out, '(a)') '  The scene relaxes to rest: '// &
+      if (scene%time%method == 'relaxation') write (out, '(a)') '  The scene is static: '// &
         & 'these are the limits of explicit steps of its body, with the', &
-        & '  densities given in &material, 1 kg/m3 where none is'
+        & '  densities given in &material, 1 kg/m3 where none is given'
       write (out, '(a)') '  measuring the largest frequency, in a few hundred evaluations of '// &
         & 'the forces ...'
       flush (out)
       call measure_limits(system, limits)
       if (.not. limits%spectral < huge(1.0_wp)) then
         call fail(error, 'nothing can vibrate: every component of every point with bonds is '// &
-          & 'constrained, so that no step is too large')
+          & 'constrained, so that there is no limit of the step')
         return
       end if
       write (out, '(a)') text_of(system, limits)
@@ -169,10 +169,10 @@ contains
     text = text//newline//'                   ('//to_text(limits%spectrum%evaluations)// &
       & ' evaluations of the forces; omega^2 to '// &
       & to_text(100*limits%spectrum%residual/limits%spectrum%squared, 1)//' %)'//newline
-    if (limits%lasting > 0.0_wp) text = text//'  whatever breaks  '// &
+    if (limits%lasting > 0.0_wp) text = text//'  bonds breaking   '// &
       & with_unit(limits%lasting, 's', 6)//', '//to_text(limits%lasting/limits%equation, 4)// &
-      & " of 7.25 as used: what &time limit = 'spectral' takes here"//newline
-    text = text//'Confirmed by the motion of a small disturbance at random:'
+      & " of 7.25 as used: valid for any broken bonds, taken by &time limit = 'spectral'"//newline
+    text = text//'Check by the growth of a small random disturbance:'
   end function text_of
 
   !> A point and its place.
@@ -197,12 +197,12 @@ contains
 
     do i = 1, 2
       call growth_of(system, parts(i)*limit, seconds/2, growth, steps)
-      text = '  at '//to_text(parts(i))//' of it   '//to_text(growth, 3)//' times as large in '// &
+      text = '  at '//to_text(parts(i))//' of it   amplitude times '//to_text(growth, 3)//' in '// &
         & to_text(steps)//' steps: '
       if (growth >= unbounded) then
         text = text//'unstable'
       else if (steps < most_steps) then
-        text = text//'no time for more'
+        text = text//'undecided, out of time'
       else if (growth < bounded) then
         text = text//'stable'
       else

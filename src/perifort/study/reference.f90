@@ -47,9 +47,9 @@ contains
     fault = ''
     error_norm = 0.0_wp
     if (.not. any(of)) then
-      fault = "the closed form '"//form%name//"' says nothing of '"//measure%name//"'"
+      fault = "the closed form '"//form%name//"' has no values of '"//measure%name//"'"
       if (form%lower > -huge(1.0_wp)) fault = fault//', or only between x = '// &
-        & to_text(form%lower)//' and '//to_text(form%upper)//' m, where the ends are not felt'
+        & to_text(form%lower)//' and '//to_text(form%upper)//' m, where waves from the ends do not reach'
       return
     end if
     error_norm = difference(measure%norm, record, reference, of)
@@ -106,7 +106,7 @@ contains
       end do
     end do
     if (.not. any(of)) then
-      fault = 'no place and time of the run is among those compared with'
+      fault = 'no position and time of the run lies within those compared with'
       return
     end if
     error_norm = difference(measure%norm, record, reference, of)

@@ -64,14 +64,14 @@ contains
     write (unit, '(a)') '', &
       & 'Horizon 3.015 spacings, '//trim(merge('with   ', 'without', surface))// &
       & ' surface correction; bonds are directed.', &
-      & '  ns/bond   a whole step (forces, the look for breaking bonds where they can, accounts', &
-      & '            of work, new velocities and displacements; no output), wall time, median', &
+      & '  ns/bond   a complete step (forces, detection of breaking bonds, external work, new', &
+      & '            velocities and displacements; no output), wall time, median', &
       & '  cpu       the same in processor time per thread', &
-      & '  forces    without accounts and motion', &
+      & '  forces    the forces alone', &
       & '  B/pt      memory of points and families; build/pt: time to build the families [ns]', &
-      & '  GB/s      what a step must move between memory and processor, % of the triad', &
-      & '  GFLOP/s   operations of the loops'' formulas, % of the multiply-adds', &
-      & '  eff       time on one thread over threads times time', &
+      & '  GB/s      memory traffic that a step needs, % of the bandwidth (triad)', &
+      & '  GFLOP/s   arithmetic of the force loops, % of the peak (multiply-adds)', &
+      & '  eff       parallel efficiency: time on one thread over (threads x time)', &
       & '', left//' |'//middle//' |'//right, &
       & repeat('-', len(left) + len(middle) + len(right) + 4)
   end subroutine table_head
@@ -82,7 +82,7 @@ contains
     character(:), allocatable :: text
     text = to_text(machine%threads)//trim(merge(' thread: ', ' threads:', machine%threads == 1))// &
       & ' triad '//with_unit(machine%bandwidth, 'B/s', 3)//', multiply-adds in registers '// &
-      & with_unit(machine%peak, 'FLOP/s', 3)//' (with the code the compiler makes of them)'
+      & with_unit(machine%peak, 'FLOP/s', 3)//' (compiled code)'
   end function machine_row
 
   !> One row of the table.

@@ -1,4 +1,4 @@
-!> How much of rounding a run amplifies: the same free vibration with displacements of any size, far
+!> The rounding error of a run: the same free vibration with displacements of any size, far
 !> from the origin, and in other sizes, compared digit by digit.
 module pd_study_rounding
   use pd_base_kinds, only: wp
@@ -56,10 +56,11 @@ contains
     call vibrate(body, -start, slope_strain, step, steps, answer, error)
     if (allocated(error)) return
     slope = (slope + answer)/(2*slope_strain)
-    write (unit, '(/, a, 3(/, a))') 'Rounding: a free vibration, smooth at the start, after '// &
-      & to_text(steps)//' steps: displacements over those of the', 'start, beside a run with '// &
-      & 'strains of 1e-20. The geometry''s share is that of first order in the', 'strain', &
-      & '  largest strain  apart      without the geometry''s share  digits'
+    write (unit, '(/, a, 3(/, a))') 'Rounding error of a free vibration without high frequencies '// &
+      & 'after '//to_text(steps)//' steps: relative difference', 'from the run with a strain of '// &
+      & '1e-20. The geometric nonlinearity is the part of the difference that is of first', &
+      & 'order in the strain; the last column counts the digits that agree without it.', &
+      & '  largest strain  difference without nonlinearity          digits'
     least = 16.0_wp
     do i = 1, size(strains)
       call vibrate(body, start, strains(i), step, steps, answer, fault)
@@ -80,8 +81,9 @@ contains
     call twin('in nanometres', 0.0_wp, 1.0e-9_wp)
     call twin('in kilometres', 0.0_wp, 1.0e3_wp)
     if (allocated(error)) return
-    write (unit, '(a)') '  (moved and resized at a strain of '//to_text(usual, 1)//') These '// &
-      & 'and strains up to '//to_text(tiny_strain, 1)//' agree to '//to_text(least, 3)//' digits'
+    write (unit, '(a)') '  The moved and the resized bodies have a strain of '// &
+      & to_text(usual, 1)//'. They and strains up to '//to_text(tiny_strain, 1)//' agree to '// &
+      & to_text(least, 3)//' digits'
 
   contains
 
@@ -98,7 +100,7 @@ contains
       if (other%family%n_bonds /= body%family%n_bonds) then
         least = 0.0_wp
         write (unit, '(a)') '  '//label//': has '//to_text(other%family%n_bonds)// &
-          & ' bonds instead of '//to_text(body%family%n_bonds)//': rounding of the places decides'
+          & ' bonds instead of '//to_text(body%family%n_bonds)//': rounding of the positions decides'
         return
       end if
       call vibrate(other, factor*start, usual, factor*step, steps, there, error)
