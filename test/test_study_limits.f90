@@ -259,7 +259,7 @@ contains
       call expect_true(error, ratio > 1.0_wp, 'above 7.25')
       call expect_true(error, any(index(lines(:n), 'in kilometres') > 0) .and. &
         & any(index(lines(:n), 'runge_kutta') > 0) .and. any(index(lines(:n), 'at 1.005 of') > 0) &
-        & .and. (any(index(lines(:n), 'relaxes') > 0) .eqv. i == 2), 'all parts')
+        & .and. (any(index(lines(:n), 'static') > 0) .eqv. i == 2), 'all parts')
     end do
   end subroutine test_command
 

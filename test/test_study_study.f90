@@ -353,8 +353,8 @@ contains
     call expect_true(error, exact%outcomes(3)%error < 0.2_wp*exact%outcomes(2)%error, 'finest')
   end subroutine test_finest
 
-  !> The run that is compared with has the finest value of every key that refines, wherever its values
-  !> stand; without such a run the study is refused.
+  !> The run that is compared with has the finest value of every key that refines, wherever its
+  !> values stand; without such a run the study is refused.
   subroutine test_finest_of_all(error)
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session
@@ -369,8 +369,8 @@ contains
     call studied('finest_of_all', bar//study//'values = 0.8, 0.4 together = .true. /', session, &
       & fault)
     call expect_refused(error, fault, 'none has body%points = 40, time%safety = 0.4')
-    call studied('finest_of_all', bar//"&study vary = 'time%integrator' values = 'runge_kutta', "// &
-      & "'velocity_verlet' measure = 'centre' against = 'finest' /", session, fault)
+    call studied('finest_of_all', bar//"&study vary = 'time%integrator' values = "// &
+      & "'runge_kutta', 'velocity_verlet' measure = 'centre' against = 'finest' /", session, fault)
     call expect_refused(error, fault, 'no run is finer than the others')
   end subroutine test_finest_of_all
 
@@ -383,17 +383,18 @@ contains
     if (allocated(fault)) call expect_true(error, index(fault%message, part) > 0, fault%message)
   end subroutine expect_refused
 
-  !> Errors against the finest run, extrapolated to true errors, against those from the closed form: a bar
-  !> in tension, wrong by its ends' part alone, which is of first order. The fit assumes that the errors of
-  !> all runs have one shape; the interpolation between points and the search of the order by steps of
-  !> 0.02 leave a few per cent.
+  !> Errors against the finest run, extrapolated to true errors, against those from the closed form:
+  !> a bar in tension, wrong by its ends' part alone, which is of first order. The fit assumes that
+  !> the errors of all runs have one shape; the interpolation between points and the search of the
+  !> order by steps of 0.02 leave a few per cent.
   subroutine test_true_errors(error)
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session, exact
     type(fault_type), allocatable :: fault
     type(table_type) :: table
     character(*), parameter :: pulled = '&scene dimension = 1 area = 2e-4 / &time method = '// &
-      & "'relaxation' / &relaxation tolerance = 1e-9 / &body lower = 0.5 upper = 1.5 points = 20 / "// &
+      & "'relaxation' / &relaxation tolerance = 1e-9 / &body lower = 0.5 upper = 1.5 "// &
+      & 'points = 20 / '// &
       & "&material youngs_modulus = 200e9 / &boundary side = 'x_min' displacement_x = 1e-6 / "// &
       & "&load side = 'x_max' force_x = 100 /"//line
     character(*), parameter :: study = "&study vary = 'body%points' values = 20, 40, 80, 160 "// &
@@ -402,7 +403,8 @@ contains
 
     call studied('true', pulled//study//"'analytic' /", exact, fault)
     if (.not. allocated(fault)) call studied('true', pulled//study//"'finest' /", session, fault)
-    if (.not. allocated(fault)) call read_table(here//'/true/study.csv', table, fault, allowed=['*'])
+    if (.not. allocated(fault)) call read_table(here//'/true/study.csv', table, fault, &
+      & allowed=['*'])
     call accept(error, fault)
     if (allocated(error)) return
     n = size(session%outcomes)
@@ -423,8 +425,8 @@ contains
       & 'and it matters')
   end subroutine test_true_errors
 
-  !> The last scene cannot be measured, since no point of its coarse lattice lies in the region: nothing
-  !> is run and nothing written.
+  !> The last scene cannot be measured, since no point of its coarse lattice lies in the region:
+  !> nothing is run and nothing written.
   subroutine test_checked_first(error)
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session
@@ -439,8 +441,8 @@ contains
     call expect_true(error, .not. file_exists(here//'/checked_first/study.csv'), 'no table')
   end subroutine test_checked_first
 
-  !> Three runs: of a coarse one that is by chance better than a finer one, of one without an answer and
-  !> of the fit the reason stands in one line each.
+  !> Of a coarse run that is by chance better than a finer one, of one without an answer and of the
+  !> fit the reason stands in one line each.
   subroutine test_notes(error)
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session
@@ -454,10 +456,10 @@ contains
     session%outcomes(2:4)%error = [1.0e-3_wp, 5.0e-3_wp, 2.0e-3_wp]
     text = line_notes(session%plan, session%outcomes)
     call expect_true(error, index(text, 'Fit over time%safety: order ') > 0, text)
-    call expect_true(error, index(text, line//'  time%safety = 2.0: not used: no answer'//line) > 0, &
-      & text)
-    call expect_true(error, index(text, line//'  time%safety = 0.8: error taken as 0.005 instead '// &
-      & 'of 0.001: a finer run has that error (time%safety = 0.4)'//line) > 0, text)
+    call expect_true(error, index(text, line//'  time%safety = 2.0: not used: no answer'//line) &
+      & > 0, text)
+    call expect_true(error, index(text, line//'  time%safety = 0.8: error taken as 0.005 '// &
+      & 'instead of 0.001: a finer run has that error (time%safety = 0.4)'//line) > 0, text)
     call expect_true(error, index(text, '  time%safety = 0.2') == 0, text)
   end subroutine test_notes
 

@@ -7,8 +7,8 @@ module pd_command_help
 
 contains
 
-  !> The help of a command; of the program for '' or `help`. `./pf` prints these texts from doc/printed
-  !> where nothing is built; a test keeps them equal.
+  !> The help of a command; of the program for '' or `help`. `./pf` prints these texts from
+  !> doc/printed where nothing is built; a test keeps them equal.
   pure function help_text(command) result(text)
     character(*), intent(in) :: command             !! one of `command_names`, or ''
     character(:), allocatable :: text
@@ -60,8 +60,8 @@ contains
         & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', '', &
         & 'Run the scene in FILE with all values in its groups &study. Prints for each run the', &
         & 'measured value, its error, time, size and energy drift (the largest error of the', &
-        & 'energy balance over the largest energy); then the Pareto front and the observed orders', &
-        & 'of convergence. All scenes are checked and set up before the first run. Writes', &
+        & 'energy balance over the largest energy); then the Pareto front and the observed', &
+        & 'orders of convergence. All scenes are checked and set up before the first run. Writes', &
         & 'study.csv, complete after every run, and study.txt; ./pf plot draws them.', '', &
         & tables], newline)
     case ('choose')
@@ -94,19 +94,19 @@ contains
         & '               [--family FAMILY] [--breaking WORD] [--precision WORD] [--surface]', &
         & '               [--seconds S] [--csv FILE]', &
         & '', &
-        & 'Measure the speed of the force loops on standard bodies (cube, plate, bar) and compare', &
-        & 'it with the memory bandwidth and the peak performance of this machine. Takes one or', &
-        & 'two minutes.', &
+        & 'Measure the speed of the force loops on standard bodies (cube, plate, bar), and', &
+        & 'compare it with the memory bandwidth and the peak performance of this machine.', &
+        & 'Takes one or two minutes.', &
         & '', &
         & '  --points N ...    points along an edge (default: 80 in 3D, 500 in 2D, 1000 in 1D)', &
         & '  --dimension D ... 1, 2, 3 or some of them (default: all)', &
-        & '  --threads N,...   numbers of threads (default: 1 and all; bars: 1); 1 is always measured', &
+        & '  --threads N,...   numbers of threads (default: 1 and all; bars: 1); always with 1', &
         & '  --model MODEL     state_based, bond_based or both (default)', &
         & '  --family FAMILY   lattice, list or both (default)', &
         & '  --breaking WORD   on: bonds can break; off; or both (default, for lists off)', &
         & '  --precision WORD  of bonds: double (default), mixed or both', &
         & '  --surface         with surface correction (default: without)', &
-        & '  --seconds S       least time of each of the five or more repeats [s] (default: 0.25)', &
+        & '  --seconds S       least time of each of five or more repeats [s] (default: 0.25)', &
         & '  --csv FILE        also write the numbers to FILE; an existing file is replaced'], &
         & newline)
     case ('version')

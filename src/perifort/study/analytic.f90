@@ -128,7 +128,7 @@ contains
     else if (scene%time%method /= 'explicit') then
       reason = "it needs &time method = 'explicit'"
     else if (size(scene%loads) > 0 .or. size(scene%removed) > 0) then
-      reason = 'the bar must have no removed shapes and no loads'
+      reason = 'the bar must be free of removed shapes and of loads'
     else if (size(scene%boundaries) /= 1) then
       reason = 'one end must be held by a &boundary with a side'
     else if (scene%boundaries(1)%side == '' .or. .not. rests(scene%boundaries(1), 1)) then
@@ -249,7 +249,7 @@ contains
     else if (scene%time%method /= 'explicit') then
       reason = "it needs &time method = 'explicit'"
     else if (size(scene%loads) + size(scene%boundaries) + size(scene%removed) > 0) then
-      reason = 'the chain must have no removed shapes, without loads and boundaries'
+      reason = 'the chain must be without loads and boundaries, and without removed shapes'
     else if (size(scene%initial) /= 1) then
       reason = 'one &initial must give the wave'
     else if (scene%initial(1)%file == '' .or. scene%initial(1)%region /= '') then
@@ -266,7 +266,8 @@ contains
     integer :: i, c
 
     form%kind = form_linear
-    if (size(scene%loads) + size(scene%removed) > 0) reason = 'the body must have no removed shapes and no loads'
+    if (size(scene%loads) + size(scene%removed) > 0) &
+      & reason = 'the body must have no removed shapes and no loads'
     if (size(scene%initial) == 0) reason = 'no &initial gives a displacement_gradient'
     do i = 1, size(scene%initial)
       associate (initial => scene%initial(i))

@@ -85,8 +85,9 @@ contains
     if (.not. allocated(error) .and. done == 0) &
       & call fail(error, 'no body fits into the free memory of '// &
       & with_unit(real(available_memory(), wp), 'B', 3)//'; ask for fewer --points')
-    if (busy < 0.9_wp) write (out, '(a)') '', 'Warning: other programs used the machine: a thread had only '// &
-      & to_text(100*busy, 2)//' % of a core at times. The column cpu is not affected.'
+    if (busy < 0.9_wp) write (out, '(a)') '', 'Warning: other programs used the '// &
+      & 'machine: a thread had only '//to_text(100*busy, 2)//' % of a core at times. '// &
+      & 'The column cpu is not affected.'
     call close_csv(options, csv, error)
   end subroutine run_bench
 

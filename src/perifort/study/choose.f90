@@ -1,5 +1,5 @@
-!> `perifort choose`: the fastest settings that meet an error, predicted from the runs of a study and
-!> then run.
+!> `perifort choose`: the fastest settings that meet an error, predicted from the runs of a study
+!> and then run.
 !>
 !> One variable may take values between and beyond its listed ones: the number of points, or else
 !> the time step, its safety or the tolerance. The runs that differ in it alone make a line with its
@@ -300,8 +300,8 @@ contains
     call add_trial(session, trial)
     t = size(session%plan%trials)
     if (choice%meets) then
-      call say(session, 'The fastest settings with a predicted error of at most '//to_text(target)// &
-        & within(limit)//':')
+      call say(session, 'The fastest settings with a predicted error of at most '// &
+        & to_text(target)//within(limit)//':')
     else
       call say(session, 'No settings have a predicted error of at most '//to_text(target)// &
         & within(limit)//'. The best of them:')

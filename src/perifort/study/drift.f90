@@ -40,10 +40,11 @@ contains
     call random_shape(body, rough)
     smooth = rough
     call smoothed(body, step, passes, smooth)
-    write (unit, '(/, a, 3(/, a))') 'Energy drift of a free vibration: relative change in a million '// &
-      & 'steps, extrapolated from the steps made;', 'where that is large, the number of steps in '// &
-      & 'which the energy changes by half. smooth: start', 'without high frequencies; rough: start '// &
-      & 'with all frequencies alike', '  integrator        part of its limit  steps made  smooth'// &
+    write (unit, '(/, a, 3(/, a))') 'Energy drift of a free vibration: relative change in a '// &
+      & 'million steps, extrapolated from the steps made;', 'where that is large, the number '// &
+      & 'of steps in which the energy changes by half. smooth:', 'start without high '// &
+      & 'frequencies; rough: start with all frequencies alike', &
+      & '  integrator        part of its limit  steps made  smooth'// &
       & repeat(' ', 18)//'rough'
     do i = 1, size(integrators)
       do p = 1, size(parts)

@@ -11,14 +11,14 @@ module pd_study_lines
   use pd_study_trial, only: outcome_type
   implicit none (type, external)
   private
-  public :: continuous_variable, finest_of, law_of, on_line, line_notes, mark_true_errors, step_of, &
-    & usable_runs
+  public :: continuous_variable, finest_of, law_of, on_line, line_notes, mark_true_errors, &
+    & step_of, usable_runs
 
 contains
 
   !> The run that is the finest in every variable that refines (points, time step, safety,
-  !> tolerance). Among several the one with the smallest spacing, then with the smallest time step or
-  !> tolerance, then the first. `reason` is '' unless there is no such run.
+  !> tolerance). Among several the one with the smallest spacing, then with the smallest time step
+  !> or tolerance, then the first. `reason` is '' unless there is no such run.
   subroutine finest_of(plan, finest, reason)
     type(plan_type), intent(in) :: plan
     integer, intent(out) :: finest                        !! number of the run; 0 if there is none
@@ -47,8 +47,8 @@ contains
       reason = 'no run is the finest in every varied key: none has '//wanted
       return
     else if (refining == 0 .and. minval(step) >= maxval(step)*(1 - 1.0e-9_wp)) then
-      reason = 'no run is finer than the others: no varied key refines points, time step, safety '// &
-        & 'or tolerance'
+      reason = 'no run is finer than the others: no varied key refines points, time step, '// &
+        & 'safety or tolerance'
       return
     end if
     do t = 1, size(plan%trials)
@@ -73,8 +73,8 @@ contains
   end function care
 
   !> The variable that may take values between and beyond those given: one that refines a body, else
-  !> the time step, its safety or the tolerance; 0 if none. Variables that vary together with it must
-  !> be positive numbers.
+  !> the time step, its safety or the tolerance; 0 if none. Variables that vary together with it
+  !> must be positive numbers.
   pure integer function continuous_variable(plan) result(free)
     type(plan_type), intent(in) :: plan
 
@@ -193,8 +193,8 @@ contains
     text = ''
     free = continuous_variable(plan)
     if (free == 0) then
-      text = 'No fit: no varied key is a number of points, a time step, a safety or a tolerance.'// &
-        & ' The choice is one of the runs.'//newline
+      text = 'No fit: no varied key is a number of points, a time step, a safety or a '// &
+        & 'tolerance. The choice is one of the runs.'//newline
       return
     end if
     usable = usable_runs(outcomes)

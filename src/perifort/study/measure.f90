@@ -183,8 +183,8 @@ contains
   end function difference
 
   !> What a run measured, as one number: the value in the last row; of a vector its length; of many
-  !> places the root of the mean square, weighted as in the norm. Of a single place its value with its
-  !> sign. 0 without rows.
+  !> places the root of the mean square, weighted as in the norm. Of a single place its value with
+  !> its sign. 0 without rows.
   pure real(wp) function value_of(record) result(value)
     type(record_type), intent(in) :: record
     integer :: p

@@ -406,7 +406,8 @@ contains
     end do
   end function common_divisor
 
-  !> Points, spacing and an estimate of the work of a run; an error if it does not fit into the memory.
+  !> Points, spacing and an estimate of the work of a run; an error if it does not fit into the
+  !> memory.
   subroutine size_up(trial, error)
     type(trial_type), intent(inout) :: trial
     type(error_type), allocatable, intent(out) :: error

@@ -11,7 +11,7 @@ module pd_study_predict
   private
   public :: law_type, fit_law, error_at, true_error_at, seconds_at, least_order
 
-  real(wp), parameter :: least_order = 0.15_wp   !! below it the error does not decrease with the step
+  real(wp), parameter :: least_order = 0.15_wp   !! below it the error does not decrease with h
   real(wp), parameter :: least_with_reference = 0.5_wp  !! the error falls to 0 there in any case
   real(wp), parameter :: most_order = 8.0_wp
   real(wp), parameter :: favour = 1.5_wp         !! weight of a run over that of the next coarser
@@ -26,7 +26,7 @@ module pd_study_predict
     real(wp) :: last_factor = 0.0_wp      !! log C beyond the finest run
     real(wp) :: last_order = 0.0_wp       !! p beyond the finest run
     logical :: extrapolates = .false.     !! the fit holds beyond the finest run
-    real(wp) :: margin = 1.1_wp           !! factor of safety for the scatter of the runs about the fit
+    real(wp) :: margin = 1.1_wp           !! on the target, for the scatter of the runs
     real(wp) :: slope = 0.0_wp            !! q
     real(wp) :: log_cost = 0.0_wp         !! log c
   end type law_type

@@ -49,7 +49,7 @@ contains
     if (.not. any(of)) then
       fault = "the closed form '"//form%name//"' has no values of '"//measure%name//"'"
       if (form%lower > -huge(1.0_wp)) fault = fault//', or only between x = '// &
-        & to_text(form%lower)//' and '//to_text(form%upper)//' m, where waves from the ends do not reach'
+        & to_text(form%lower)//' and '//to_text(form%upper)//' m, before waves from the ends arrive'
       return
     end if
     error_norm = difference(measure%norm, record, reference, of)

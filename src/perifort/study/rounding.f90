@@ -56,10 +56,10 @@ contains
     call vibrate(body, -start, slope_strain, step, steps, answer, error)
     if (allocated(error)) return
     slope = (slope + answer)/(2*slope_strain)
-    write (unit, '(/, a, 3(/, a))') 'Rounding error of a free vibration without high frequencies '// &
-      & 'after '//to_text(steps)//' steps: relative difference', 'from the run with a strain of '// &
-      & '1e-20. The geometric nonlinearity is the part of the difference that is of first', &
-      & 'order in the strain; the last column counts the digits that agree without it.', &
+    write (unit, '(/, a, 3(/, a))') 'Rounding error of a free vibration without high '// &
+      & 'frequencies after '//to_text(steps)//' steps: relative', 'difference from the run '// &
+      & 'with a strain of 1e-20. The geometric nonlinearity is the part of the', &
+      & 'difference that is of first order in the strain; the last column counts the digits that agree without it.', &
       & '  largest strain  difference without nonlinearity          digits'
     least = 16.0_wp
     do i = 1, size(strains)
@@ -100,7 +100,7 @@ contains
       if (other%family%n_bonds /= body%family%n_bonds) then
         least = 0.0_wp
         write (unit, '(a)') '  '//label//': has '//to_text(other%family%n_bonds)// &
-          & ' bonds instead of '//to_text(body%family%n_bonds)//': rounding of the positions decides'
+          & ' bonds instead of '//to_text(body%family%n_bonds)//': rounding of positions decides'
         return
       end if
       call vibrate(other, factor*start, usual, factor*step, steps, there, error)

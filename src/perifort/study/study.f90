@@ -62,8 +62,8 @@ contains
       & status_no_answer)
   end subroutine run_study
 
-  !> The command that draws the tables. Pictures are the part of `./pf`; where the program was started
-  !> by itself, that of its project's folder is named.
+  !> The command that draws the tables. `./pf` makes the pictures; where the program was started by
+  !> itself, that of its project's folder is named.
   function plot_command(directory) result(text)
     character(*), intent(in) :: directory      !! of the tables
     character(:), allocatable :: text
@@ -168,7 +168,8 @@ contains
         end if
         call finest_of(plan, session%finest, reason)
         if (len(reason) > 0) call at_key(plan, 'against', reason, 'one run must be at least as '// &
-          & 'fine as all others in every key: add it, or compare with a closed form or a file', error)
+          & 'fine as all others in every key: add it, or compare with a closed form or a file', &
+          & error)
       case default
         probe = ''
         if (session%measure%probe > 0) probe = trim(plan%scene%probes(session%measure%probe)%name)

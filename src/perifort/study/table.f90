@@ -18,8 +18,8 @@ module pd_study_table
 contains
 
   !> The whole CSV file: a line for each run that has been made, in the order of the plan. A run
-  !> without an answer has nan as its value and error. The true error is the extrapolated one against
-  !> the finest run, nan where it is not known; against a closed form or a file it is the error.
+  !> without an answer has nan as its value and error. With the finest run as reference
+  !> the true error is extrapolated, nan where it is not known; else it is the error.
   function csv_text(plan, outcomes) result(text)
     type(plan_type), intent(in) :: plan
     type(outcome_type), intent(in) :: outcomes(:)
@@ -131,8 +131,8 @@ contains
     type(measure_type), intent(in) :: measure
     character(:), allocatable :: text
 
-    text = '  value       '//measure%name//' at the end of the run; of a vector its length, of a '// &
-      & 'field the root mean square over its points'//newline// &
+    text = '  value       '//measure%name//' at the end of the run; of a vector its length, of '// &
+      & 'a field the root mean square over its points'//newline// &
       & '  error       '//measure%norm//' norm of the difference from '
     select case (plan%against)
     case ('analytic')

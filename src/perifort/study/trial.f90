@@ -28,10 +28,10 @@ module pd_study_trial
   type :: outcome_type
     logical :: done = .false.
     character(:), allocatable :: fault         !! why it has no answer
-    real(wp) :: value = 0.0_wp                 !! what was measured, see `value_of` of pd_study_measure
+    real(wp) :: value = 0.0_wp                 !! what was measured; pd_study_measure: value_of
     real(wp) :: error = 0.0_wp                 !! in the norm of the study
     logical :: judged = .false.                !! the error is known
-    real(wp) :: true_error = 0.0_wp            !! extrapolated from the errors against the finest run
+    real(wp) :: true_error = 0.0_wp            !! extrapolated from errors against the finest run
     logical :: extrapolated = .false.          !! the true error is known
     logical :: truth = .false.                 !! it is what the others are compared with
     real(wp) :: seconds = 0.0_wp               !! set-up and steps, without measuring; the median
@@ -124,7 +124,8 @@ contains
       & outcome, error)
   end subroutine check_trial
 
-  !> What is measured in a scene that is set up, its size and its closed form, before the first step.
+  !> What is measured in a scene that is set up, its size and its closed form, before the first
+  !> step.
   subroutine begin_watch(scene, measure, around, set_up, form, watcher, outcome, error)
     type(scene_type), intent(in) :: scene
     type(measure_type), intent(in) :: measure
