@@ -59,8 +59,8 @@ contains
     write (unit, '(/, a, 3(/, a))') 'Rounding error of a free vibration without high '// &
       & 'frequencies after '//to_text(steps)//' steps: relative', 'difference from the run '// &
       & 'with a strain of 1e-20. The geometric nonlinearity is the part of the', &
-      & 'difference that is of first order in the strain; the last column counts the digits that '// &
-      & 'agree without it.', &
+      & 'difference that is of first order in the strain; the last column counts the digits '// &
+      & 'that agree without it.', &
       & '  largest strain  difference without nonlinearity          digits'
     least = 16.0_wp
     do i = 1, size(strains)
