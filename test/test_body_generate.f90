@@ -140,7 +140,7 @@ contains
     real(wp) :: delta
 
     call write_cloud([character(22) :: '# x y z volume', &
-      & '0.0 0.0 9.0 2.0e-3', '1.0, 0.25, 0, 8.0e-3'])
+      & '0.0 0.0 9.0 2.0e-3', '1.0, 0.25, 9, 8.0e-3'])
     call cloud_scene(scene)
     call generate_body(scene, body, delta, fault)
     if (allocated(fault)) then
@@ -170,6 +170,8 @@ contains
     call expect_refused(scene, ':1', error)
     call write_cloud(['0 0 zero 1'])
     call expect_refused(scene, 'zero', error)
+    call write_cloud(['0 0 0 1   ', '1 0 0.1 1 '])
+    call expect_refused(scene, 'no direction z', error)
     call write_cloud(['# nothing '])
     call expect_refused(scene, 'no rows', error)
     call remove_cloud()

@@ -32,6 +32,7 @@ contains
       & new_unittest('on two threads', test_two_threads), &
       & new_unittest('a block in 3D', test_block), &
       & new_unittest('a list, bonds that break late', test_list), &
+      & new_unittest('temperatures that vary in time', test_heated), &
       & new_unittest('a relaxation with a growing crack', test_relaxation), &
       & new_unittest('relaxations that go other ways', test_ways_to_rest), &
       & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
@@ -373,6 +374,35 @@ contains
     call run_in_pieces(scene, 'pieces', 1, pieces, error)
     call expect_same_results(error, 'whole', 'pieces', 3)
   end subroutine test_list
+
+  !> Heat that comes in during the steps, explicit and over load steps.
+  subroutine test_heated(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    do i = 1, 2
+      if (allocated(error)) return
+      if (i == 1) then
+        call plate(scene)
+        scene%time%steps = 12
+      else
+        call slow_plate(scene)
+      end if
+      deallocate (scene%initial)
+      allocate (scene%initial(1))
+      scene%initial(1)%temperature_change = 100.0_wp
+      scene%initial(1)%times = [0.0_wp, merge(1.0e-6_wp, 1.0_wp, i == 1)]
+      scene%initial(1)%values = [0.2_wp, 1.0_wp]
+      scene%materials(1)%thermal_expansion = 1.0e-5_wp
+      call run(scene, 'whole', fault)
+      call accept(error, fault)
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_same_results(error, 'whole', 'pieces', 3)
+    end do
+  end subroutine test_heated
 
   !> Two load steps, in the second of which bonds break and it relaxes again; cut after every
   !> iteration and every load step, with a load beside the imposed displacements.

@@ -277,6 +277,8 @@ contains
   subroutine test_courses(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: load = base//"&load side = 'x_min' pressure = 1 "
+    character(*), parameter :: still = scene_2d//soft//square//"&time method = 'relaxation' /"
+    type(scene_type) :: scene
 
     call expect_fault(error, load//'times = 0 1 /', "'times' without 'values'|a/b.nml:5")
     call expect_fault(error, load//'values = 0 1 /', "'values' without 'times'")
@@ -284,6 +286,17 @@ contains
     call expect_fault(error, load//'times = 0 1 1 values = 0 1 2 /', "'times' do not increase")
     call expect_fault(error, load//'times = 0 1 values = 0 1 ramp_time = 1 /', &
       & "'ramp_time' and 'times' are both given")
+    call expect_fault(error, still//"&load side = 'x_min' pressure = 1 times = 0 2 values "// &
+      & "= 0 1 /", "the time 2 of 'times' is never reached|a/b.nml:4|from 0 to 1")
+    call expect_fault(error, still//"&boundary side = 'x_min' displacement_x = 1 ramp_time = 3 /", &
+      & "the ramp does not end|a/b.nml:4|from 0 to 1")
+    call expect_fault(error, still//'&initial temperature_change = 1 ramp_time = 3 /', &
+      & "the ramp does not end|a/b.nml:4|from 0 to 1")
+    call expect_fault(error, still//'&initial velocity_x = 1 ramp_time = 1 /', &
+      & 'a course in time without a temperature_change|a/b.nml:4')
+    call expect_scene(error, still//'&initial temperature_change = 1 /', scene)
+    if (allocated(error)) return
+    call check(error, scene%initial(1)%ramp_time, 1.0_wp)
   end subroutine test_courses
 
   subroutine test_clouds(error)

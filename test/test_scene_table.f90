@@ -20,6 +20,7 @@ contains
       & new_unittest('a header names the columns', test_header), &
       & new_unittest('faults have a place', test_faults), &
       & new_unittest('faults of headers', test_header_faults), &
+      & new_unittest('numbers too small to matter are 0', test_tiny), &
       & new_unittest('many rows', test_many), &
       & new_unittest('a table from a file', test_file)]
   end subroutine collect_scene_table
@@ -43,6 +44,28 @@ contains
     if (allocated(error)) return
     call check(error, all(table%lines == [3, 4]) .and. size(table%names) == 0)
   end subroutine test_rows
+
+  !> Computed tables hold the rounding errors of other programs, down to denormal numbers and below.
+  subroutine test_tiny(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(table_type) :: table
+    type(scene_error), allocatable :: found
+    character(8), parameter :: words(5) = [character(8) :: '1e-31', '-3e-45', '1d-310', '-7e-999', &
+      & '1e-99999']
+    integer :: i
+
+    do i = 1, size(words)
+      call read_table_text('2.0 '//trim(words(i))//line//'1.0 0', 't.txt', table, found)
+      call check(error,.not. allocated(found), trim(words(i))//' is refused')
+      if (allocated(error)) return
+      call check(error, abs(table%values(2, 1)) <= 0.0_wp, trim(words(i))//' is not 0')
+      if (allocated(error)) return
+      call check(error, table%values(1, 1), 2.0_wp)
+      if (allocated(error)) return
+    end do
+    call read_table_text('1 1e31', 't.txt', table, found)
+    call check(error, allocated(found), 'a huge number passes')
+  end subroutine test_tiny
 
   subroutine test_header(error)
     type(error_type), allocatable, intent(out) :: error

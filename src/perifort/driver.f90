@@ -3,7 +3,7 @@
 module pd_driver
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_base_kinds, only: wp, i8
+  use pd_base_kinds, only: wp, i2, i8
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: let_writes_fail, watch_for_interrupt
@@ -29,7 +29,7 @@ module pd_driver
   use pd_force_weights, only: build_weights
   use pd_motion_bounds, only: check_bounds
   use pd_motion_explicit, only: run_explicit, begin_steps => begin_memory
-  use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, region_mask
+  use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, heating_of_scene, region_mask
   use pd_motion_keep, only: checksum_of_start
   use pd_motion_plan, only: plan_type, make_plan, depth_of
   use pd_motion_relaxation, only: run_relaxation, fill_memory
@@ -214,6 +214,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)
+    integer(i2), allocatable :: heated_by(:)
     real(wp) :: delta
     integer(i8) :: cut
     integer :: lonely, i
@@ -238,10 +239,12 @@ contains
 
       call timer%start('conditions')
       call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
-        & error)
+        & heated_by, error)
       if (allocated(error)) return
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
         & no_fail_zone(scene, system%body), temperature_change, system%model)
+      if (system%model%thermal) call heating_of_scene(scene, heated_by, system%model%expansion, &
+        & system%heating)
       call motions_of_scene(scene, system%body, system%motions, error)
       if (allocated(error)) return
       call loads_of_scene(scene, system%body, system%loads, error)

@@ -167,8 +167,8 @@ contains
     number = int(size(body%grids), i2)
   end function number_of_grid
 
-  !> Points of a cloud file: columns x y z volume (coordinates the dimension doesn't use are
-  !> ignored).
+  !> Points of a cloud file: columns x y z volume. Coordinates that the dimension doesn't use must be
+  !> the same for all points.
   subroutine cloud_points(scene, i, depth, body, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: i
@@ -177,7 +177,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(table_type) :: table
     character(:), allocatable :: path
-    integer :: worst
+    integer :: worst, c
 
     path = resolve_path(trim(scene%bodies(i)%file), scene%file)
     call read_table(path, table, error, columns=4)
@@ -195,6 +195,15 @@ contains
       return
     end if
     body%spacing = (body%volume/depth)**(1.0_wp/body%dim)
+    do c = body%dim + 1, 3
+      worst = maxloc(abs(table%values(c, :) - table%values(c, 1)), dim=1)
+      if (abs(table%values(c, worst) - table%values(c, 1)) <= touch*maxval(body%spacing)) cycle
+      call fail(error, 'a scene of dimension '//to_text(body%dim)//' has no direction '// &
+        & 'xyz'(c:c)//', but the points of the cloud differ in it: '// &
+        & to_text(table%values(c, 1))//' and '//to_text(table%values(c, worst))//newline// &
+        & ' --> '//path//':'//to_text(table%lines(worst)))
+      return
+    end do
   end subroutine cloud_points
 
   !> Number of a material by name; '' is the only one.

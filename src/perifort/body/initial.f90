@@ -1,6 +1,6 @@
 !> Initial state (7.8): displacement, velocity and temperature change of every point.
 module pd_body_initial
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i2
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_types, only: scene_type, is_set
@@ -16,22 +16,26 @@ module pd_body_initial
 
 contains
 
-  !> The groups are applied in order, each setting what it names; `u` [m] and `v` [m/s] are
-  !> (n_slots, dim), `temperature_change` [K] (n_slots).
-  subroutine initial_state(scene, body, u, v, temperature_change, error)
+  !> The groups are applied in order, each setting what it names.
+  subroutine initial_state(scene, body, u, v, temperature_change, heated_by, error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
-    real(wp), allocatable, intent(out) :: u(:, :), v(:, :), temperature_change(:)
-    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable, intent(out) :: u(:, :)                !! displacement (n_slots, dim) [m]
+    real(wp), allocatable, intent(out) :: v(:, :)                !! velocity (n_slots, dim) [m/s]
+    real(wp), allocatable, intent(out) :: temperature_change(:)  !! of each slot [K]
+    integer(i2), allocatable, intent(out) :: heated_by(:)        !! number of the `&initial` that
+                                                                 !! heats each slot, or 0
+    type(error_type), allocatable, intent(out) :: error          !! of a file of initial values
     logical, allocatable :: chosen(:)
     integer :: i, r
 
     allocate (u(body%n_slots, body%dim), v(body%n_slots, body%dim), source=0.0_wp)
     allocate (temperature_change(body%n_slots), source=0.0_wp)
+    allocate (heated_by(body%n_slots), source=0_i2)
     do i = 1, size(scene%initial)
       associate (group => scene%initial(i))
         if (group%file /= '') then
-          call state_from_file(scene, i, body, u, v, temperature_change, error)
+          call state_from_file(scene, i, body, u, v, temperature_change, heated_by, error)
           if (allocated(error)) return
           cycle
         end if
@@ -43,8 +47,11 @@ contains
         end do
         call set_field(body, chosen, group%displacement, group%displacement_gradient, u)
         call set_field(body, chosen, group%velocity, group%velocity_gradient, v)
-        if (is_set(group%temperature_change)) &
-          & where (chosen) temperature_change = group%temperature_change
+        if (.not. is_set(group%temperature_change)) cycle
+        where (chosen)
+          temperature_change = group%temperature_change
+          heated_by = int(i, i2)
+        end where
       end associate
     end do
   end subroutine initial_state
@@ -68,11 +75,12 @@ contains
   end subroutine set_field
 
   !> Columns of a table, one row per point in the order of the results.
-  subroutine state_from_file(scene, number, body, u, v, temperature_change, error)
+  subroutine state_from_file(scene, number, body, u, v, temperature_change, heated_by, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: number
     type(body_type), intent(in) :: body
     real(wp), intent(inout) :: u(:, :), v(:, :), temperature_change(:)
+    integer(i2), intent(inout) :: heated_by(:)
     type(error_type), allocatable, intent(out) :: error
     character(18), parameter :: known(7) = [character(18) :: 'displacement_x', 'displacement_y', &
       & 'displacement_z', 'velocity_x', 'velocity_y', 'velocity_z', 'temperature_change']
@@ -98,8 +106,9 @@ contains
         u(body%slot, which) = table%values(column, :)
       case (4:6)
         v(body%slot, which - 3) = table%values(column, :)
-      case default
+      case default  ! the last of the known names
         temperature_change(body%slot) = table%values(column, :)
+        heated_by(body%slot) = int(number, i2)
       end select
     end do
   end subroutine state_from_file

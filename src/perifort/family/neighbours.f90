@@ -1,6 +1,6 @@
 !> What must not be: points on top of each other. And what may surprise: points with no neighbour.
 module pd_family_neighbours
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i1, i4
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
@@ -12,21 +12,22 @@ module pd_family_neighbours
 contains
 
   !> An error if two bodies overlap (centres closer than half a spacing) or two points coincide;
-  !> `lonely` is the number of points without any bond.
-  subroutine check_overlap(body, family, lonely, error)
+  !> `isolated` is the number of points without any bond.
+  subroutine check_overlap(body, family, isolated, error)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
-    integer, intent(out) :: lonely
+    integer, intent(out) :: isolated
     type(error_type), allocatable, intent(out) :: error
     type(bonds_type) :: bonds
     integer(i4), allocatable :: other(:)
+    integer(i1), allocatable :: alone(:)
     integer :: k, i, j
     real(wp) :: near
 
-    lonely = 0
+    isolated = 0
     allocate (other(body%n_slots), source=0_i4)
-    !$omp parallel default(none) shared(body, family, other) private(bonds, k, i, j, near) &
-    !$omp reduction(+:lonely)
+    allocate (alone(body%n_slots), source=0_i1)
+    !$omp parallel default(none) shared(body, family, other, alone) private(bonds, k, i, j, near)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
@@ -34,7 +35,7 @@ contains
       ! alike slots have their members at the same distances
       if (family%alike(k) /= k) cycle
       call family%bonds_of(k, bonds)
-      if (bonds%n == 0) lonely = lonely + 1
+      if (bonds%n == 0) alone(k) = 1_i1
       do i = 1, bonds%n
         j = bonds%j(i)
         near = 1.0e-6_wp
@@ -43,6 +44,10 @@ contains
       end do
     end do
     !$omp end parallel
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      if (alone(family%alike(k)) == 1_i1) isolated = isolated + 1
+    end do
     k = findloc(other > 0, .true., dim=1)
     if (k == 0) return
     j = other(k)

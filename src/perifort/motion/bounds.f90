@@ -7,6 +7,7 @@ module pd_motion_bounds
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text, with_unit
+  use pd_motion_heating, only: largest_expansion
   use pd_motion_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_scene_rules, only: scene_fault
@@ -28,7 +29,7 @@ contains
     type(system_type), intent(in) :: system
     type(plan_type), intent(in) :: plan
     type(error_type), allocatable, intent(out) :: error
-    real(wp) :: delta, factor
+    real(wp) :: delta, factor, largest
     integer :: i, c
 
     delta = system%family%rule%delta
@@ -61,9 +62,9 @@ contains
       if (allocated(error)) return
     end do
     if (.not. system%model%thermal) return
-    if (maxval(abs(system%model%expansion)) > most_expansion) call scene_fault(error, scene, &
-      & 'initial', i, 'temperature_change', 'the temperature strains the body by '// &
-      & to_text(maxval(abs(system%model%expansion)), 3), &
+    largest = largest_expansion(system%heating, system%model%expansion)
+    if (largest > most_expansion) call scene_fault(error, scene, 'initial', i, &
+      & 'temperature_change', 'the temperature strains the body by '//to_text(largest, 3), &
       & 'thermal_expansion times temperature_change may be '//to_text(most_expansion))
 
   contains

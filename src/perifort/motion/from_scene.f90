@@ -1,6 +1,6 @@
 !> Boundary conditions and loads of a scene, on the slots they hold.
 module pd_motion_from_scene
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type
   use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type, load_group, is_set
@@ -9,9 +9,10 @@ module pd_motion_from_scene
   use pd_body_shapes, only: inside
   use pd_motion_conditions, only: motion_type, load_type, moved_by_displacement, moved_by_velocity
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve
+  use pd_motion_heating, only: heating_type, new_heating
   implicit none (type, external)
   private
-  public :: motions_of_scene, loads_of_scene, region_mask
+  public :: motions_of_scene, loads_of_scene, heating_of_scene, region_mask
 
 contains
 
@@ -97,6 +98,24 @@ contains
       end associate
     end do
   end subroutine loads_of_scene
+
+  !> Courses of the temperature changes of every `&initial`.
+  subroutine heating_of_scene(scene, heated_by, expansion, heating)
+    type(scene_type), intent(in) :: scene
+    integer(i2), intent(in) :: heated_by(:)     !! number of the group that heats each slot, or 0
+    real(wp), intent(in) :: expansion(:)        !! alpha dT of each slot at factor 1 [-]
+    type(heating_type), intent(out) :: heating  !! empty if the temperature is constant in time
+    type(curve_type), allocatable :: curves(:)
+    integer :: i
+
+    allocate (curves(size(scene%initial)))
+    do i = 1, size(curves)
+      associate (group => scene%initial(i))
+        curves(i) = course(scene, group%ramp_time, group%times, group%values)
+      end associate
+    end do
+    call new_heating(expansion, heated_by, curves, heating)
+  end subroutine heating_of_scene
 
   !> Slots in the region of this name.
   function region_mask(scene, body, name) result(mask)

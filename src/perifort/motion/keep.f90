@@ -5,6 +5,7 @@ module pd_motion_keep
   use pd_base_archive, only: archive_type
   use pd_base_checksum, only: checksum_type
   use pd_base_kinds, only: wp, i1, i8
+  use pd_motion_heating, only: keep_heating
   use pd_motion_memory, only: keep_memory
   use pd_motion_system, only: system_type
   implicit none (type, external)
@@ -43,6 +44,8 @@ contains
     do m = 1, size(system%motions)
       system%motions(m)%reaction = reactions(:, m)
     end do
+    if (allocated(system%heating%curves)) &
+      & call keep_heating(archive, system%heating, system%model%expansion)
     call keep_memory(archive, system%memory)
   end subroutine keep_system
 
@@ -59,7 +62,11 @@ contains
       call add(system%state%v(:, c))
     end do
     call add(system%body%volume)
-    if (allocated(system%model%expansion)) call add(system%model%expansion)
+    if (allocated(system%heating%full)) then
+      call add(system%heating%full)
+    else if (allocated(system%model%expansion)) then
+      call add(system%model%expansion)
+    end if
     value = checksum%value()
 
   contains

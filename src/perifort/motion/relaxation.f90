@@ -13,7 +13,8 @@ module pd_motion_relaxation
   use pd_motion_rigid, only: rigid_type, find_free_motions, check_balance, remove_free_motions
   use pd_motion_fault, only: faulty_slot, greatest_stretch, place
   use pd_motion_rescue, only: good_state_type, keep_good, show_good
-  use pd_motion_system, only: system_type, evaluate, break_now, account, add_loads
+  use pd_motion_system, only: system_type, bring_temperature, evaluate, break_now, account, &
+    & add_loads
   implicit none (type, external)
   private
   public :: relaxation_type, run_relaxation, fill_memory
@@ -71,6 +72,7 @@ contains
       amid = .false.
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
+      call bring_temperature(system, instant%time)
       do
         dynamic = system%memory%iteration > 0 .or. .not. relaxation%conjugate_gradient
         if (.not. dynamic) then

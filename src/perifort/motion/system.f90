@@ -11,12 +11,13 @@ module pd_motion_system
   use pd_force_reference, only: point_dilatation, point_force
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
     & moved_by_velocity
+  use pd_motion_heating, only: heating_type, heat, apply_factors
   use pd_motion_memory, only: memory_type
   use pd_motion_watch, only: watch_type
   implicit none (type, external)
   private
-  public :: system_type, state_type, start_system, evaluate, break_now, account, energies_type, &
-    & energies_of, add_loads, inverse_density, velocities_now
+  public :: system_type, state_type, start_system, bring_temperature, evaluate, break_now, account, &
+    & energies_type, energies_of, add_loads, inverse_density, velocities_now
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -34,6 +35,7 @@ module pd_motion_system
     type(state_type) :: state
     type(motion_type), allocatable :: motions(:)
     type(load_type), allocatable :: loads(:)
+    type(heating_type) :: heating               !! temperature changes that vary in time
     integer(i1), allocatable :: held(:, :)      !! 1 where a component is constrained (n_slots, dim)
     integer(i1), allocatable :: strained(:)     !! marks of the last pass
     integer(i8) :: broken = 0_i8                !! bonds broken during the run
@@ -118,6 +120,7 @@ contains
     late = breaking .and. system%model%breaking .and. system%break_late
     associate (state => system%state, model => system%model)
       call impose(system%motions, t, state%u, state%v)
+      call bring_temperature(system, t)
       if (model%dilatation) then
         call dilatation_pass(system%family, model, state%u, state%p, system%strained)
         if (early) then
@@ -135,6 +138,13 @@ contains
     end associate
     if (late) call break_marked(system, slots)
   end subroutine evaluate
+
+  !> Bring the thermal strains to time `t`.
+  subroutine bring_temperature(system, t)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t  !! [s]; in relaxation 0 to 1 over the load steps
+    if (allocated(system%heating%curves)) call heat(system%heating, t, system%model%expansion)
+  end subroutine bring_temperature
 
   !> Break every bond beyond its limit at the present displacements (relaxation, after a load step);
   !> `number` is how many broke. Forces are not renewed.
@@ -246,6 +256,7 @@ contains
     if (present(at_rest)) moving = .not. at_rest
     first = .not. allocated(system%last_u)
     if (first) call allocate_account(system)
+    if (allocated(system%heating%curves)) call account_heat(system, t, first)
     if (system%loaded_and_held) then
       allocate (applied(system%body%n_slots, system%body%dim), source=0.0_wp)
       call add_loads(system, t, 1.0_wp, .false., applied)
@@ -285,6 +296,57 @@ contains
       end associate
     end do
   end subroutine account
+
+  !> Work of varying temperature since the last call: the strain energy that it changes at fixed
+  !> displacements, by the trapezoidal rule. The energy is quadratic in the thermal strain, so that
+  !> a central difference gives its rate exactly.
+  subroutine account_heat(system, t, first)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t         !! of the present instant [s]
+    logical, intent(in) :: first      !! whether nothing has been accounted yet
+    real(wp) :: rate
+    integer :: i, last
+
+    associate (heating => system%heating)
+      do i = 1, size(heating%curves)
+        last = size(heating%curves(i)%times)
+        rate = 0.0_wp
+        ! past its last time a course is constant
+        if (t < heating%curves(i)%times(last) .or. &
+          & abs(heating%factors(i) - heating%last_factors(i)) > 0.0_wp) then
+          rate = energy_at(heating%factors(i) + 0.5_wp) - energy_at(heating%factors(i) - 0.5_wp)
+          call apply_factors(heating, heating%factors, system%model%expansion)
+        end if
+        if (.not. first) system%external_work = system%external_work + (heating%last_rates(i) &
+          & + rate)/2*(heating%factors(i) - heating%last_factors(i))
+        heating%last_factors(i) = heating%factors(i)
+        heating%last_rates(i) = rate
+      end do
+    end associate
+
+  contains
+
+    !> Strain energy with another factor of the `i`-th course [J].
+    real(wp) function energy_at(factor)
+      real(wp), intent(in) :: factor
+      real(wp) :: factors(size(system%heating%factors))
+
+      factors = system%heating%factors
+      factors(i) = factor
+      call apply_factors(system%heating, factors, system%model%expansion)
+      energy_at = strain_energy(system)
+    end function energy_at
+  end subroutine account_heat
+
+  !> Strain energy of the present displacements [J].
+  real(wp) function strain_energy(system) result(energy)
+    type(system_type), intent(inout) :: system
+    real(wp), allocatable :: density(:)
+
+    allocate (density(system%body%n_slots))
+    call energy_pass(system%family, system%model, system%state%u, density)
+    energy = inner(density, system%body%volume)
+  end function strain_energy
 
   !> One component's share of the work since its last force and place; `n` counts the components.
   !> With `mass` and the imposed velocity `v` its gain in kinetic energy comes on top.
@@ -352,8 +414,7 @@ contains
     integer :: k, c
 
     allocate (density(system%body%n_slots), mass(system%body%n_slots))
-    call energy_pass(system%family, system%model, system%state%u, density)
-    energies%strain = inner(density, system%body%volume)
+    energies%strain = strain_energy(system)
     !$omp parallel do schedule(static) default(none) shared(system, v, density, mass) private(k, c)
     do k = 1, system%body%n_slots
       mass(k) = system%body%volume(k)/inverse_density(system%model, k)

@@ -5,6 +5,7 @@ module pd_output_doubts
   use pd_base_warnings, only: warnings_type
   use pd_scene_doubts, only: doubts_of_scene
   use pd_scene_types, only: scene_type
+  use pd_motion_course_warnings, only: warn_of_courses
   use pd_motion_from_scene, only: region_mask
   use pd_motion_plan, only: plan_type
   use pd_motion_system, only: system_type
@@ -27,6 +28,7 @@ contains
     integer :: i, k
 
     call doubts_of_scene(scene, warnings)
+    call warn_of_courses(scene, system, plan, warnings)
     if (lonely > 0) call warnings%add('lonely', to_text(lonely)// &
       & ' points have no neighbour: nothing pulls at them', tell=.false.)
     if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &

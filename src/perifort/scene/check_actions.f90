@@ -13,9 +13,10 @@ module pd_scene_check_actions
 
 contains
 
-  !> One `&initial`.
+  !> One `&initial`; in relaxation its temperature change grows over the load steps unless it says
+  !> otherwise.
   subroutine check_initial(scene, number, error, source)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(inout) :: scene
     integer, intent(in) :: number
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
@@ -47,6 +48,16 @@ contains
           & 'expected displacement_x.., velocity_x.., a gradient, temperature_change or file', &
           & source)
       end if
+      if (allocated(error)) return
+      if (.not. is_set(initial%temperature_change) .and. initial%file == '') then
+        if (allocated(initial%times) .or. is_set(initial%ramp_time)) call rule_fault(error, &
+          & 'initial', number, merge('times    ', 'ramp_time', allocated(initial%times)), &
+          & 'a course in time without a temperature_change', &
+          & 'displacements and velocities of &initial hold at t = 0', source)
+        return
+      end if
+      call check_course(scene, initial%ramp_time, initial%times, initial%values, 'initial', &
+        & number, error, source)
     end associate
 
   contains
@@ -104,10 +115,8 @@ contains
           & "' has a layer already", 'from &boundary number '//to_text(i), source)
         return
       end do
-      call check_course(boundary%ramp_time, boundary%times, boundary%values, 'boundary', number, &
-        & error, source)
-      if (scene%time%method == 'relaxation' .and. .not. allocated(boundary%times) .and. &
-        & .not. is_set(boundary%ramp_time)) boundary%ramp_time = 1.0_wp
+      call check_course(scene, boundary%ramp_time, boundary%times, boundary%values, 'boundary', &
+        & number, error, source)
     end associate
   end subroutine check_boundary
 
@@ -146,9 +155,8 @@ contains
           & "a pressure needs a 'side'; a region takes force_x.. or body_force_x..", source)
         return
       end if
-      call check_course(load%ramp_time, load%times, load%values, 'load', number, error, source)
-      if (scene%time%method == 'relaxation' .and. .not. allocated(load%times) .and. &
-        & .not. is_set(load%ramp_time)) load%ramp_time = 1.0_wp
+      call check_course(scene, load%ramp_time, load%times, load%values, 'load', number, error, &
+        & source)
     end associate
   end subroutine check_load
 
@@ -197,16 +205,23 @@ contains
       & "a 'side' of a body that is a cloud", "a cloud has no sides; use a 'region'", source)
   end subroutine check_place
 
-  !> At once, by a ramp, or by times and values.
-  subroutine check_course(ramp_time, times, values, group, number, error, source)
-    real(wp), intent(in) :: ramp_time
-    real(wp), allocatable, intent(in) :: times(:), values(:)
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+  !> At once, by a ramp, or by times and values. In relaxation, where time runs from 0 to 1 over the
+  !> load steps, a course that says nothing is a ramp over all of them, and none may go beyond 1,
+  !> for what stands there would never act.
+  subroutine check_course(scene, ramp_time, times, values, group, number, error, source)
+    type(scene_type), intent(in) :: scene                 !! for its method
+    real(wp), intent(inout) :: ramp_time                  !! length of the ramp [s]
+    real(wp), allocatable, intent(in) :: times(:)         !! of the table [s]
+    real(wp), allocatable, intent(in) :: values(:)        !! factors at `times` [-]
+    character(*), intent(in) :: group                     !! name of the group, for messages
+    integer, intent(in) :: number                         !! which group of this name
+    type(error_type), allocatable, intent(out) :: error   !! the broken rule
+    type(source_type), intent(in), optional :: source     !! the scanned file, for places
+    character(*), parameter :: load_time = 'in relaxation time runs from 0 to 1 over the load steps'
+    logical :: relaxes
     integer :: i
 
+    relaxes = scene%time%method == 'relaxation'
     if (allocated(times) .neqv. allocated(values)) then
       if (allocated(times)) then
         call rule_fault(error, group, number, 'times', "'times' without 'values'", &
@@ -217,7 +232,13 @@ contains
       end if
       return
     end if
-    if (.not. allocated(times)) return
+    if (.not. allocated(times)) then
+      if (relaxes .and. .not. is_set(ramp_time)) ramp_time = 1.0_wp
+      if (relaxes .and. ramp_time > 1.0_wp) call rule_fault(error, group, number, 'ramp_time', &
+        & "the ramp does not end: 'ramp_time' is "//to_text(ramp_time), load_time// &
+        & '; expected at most 1', source)
+      return
+    end if
     if (is_set(ramp_time)) then
       call rule_fault(error, group, number, 'ramp_time', "'ramp_time' and 'times' are both given", &
         & 'give one of them', source)
@@ -231,6 +252,9 @@ contains
           & to_text(times(i))//' after '//to_text(times(i - 1)), source)
         return
       end do
+      if (relaxes .and. any(times > 1.0_wp)) call rule_fault(error, group, number, 'times', &
+        & "the time "//to_text(maxval(times))//" of 'times' is never reached", load_time// &
+        & '; expected at most 1', source)
     end if
   end subroutine check_course
 

@@ -11,7 +11,6 @@ module pd_scene_check_bodies
   implicit none (type, external)
   private
   public :: check_body, check_shape, check_material, check_crack, check_file, needed_ratio
-  public :: memory_per_point
 
   real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
   !> What a point of a lattice takes at the peak, while families are built, measured on cubes

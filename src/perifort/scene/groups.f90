@@ -317,6 +317,7 @@ contains
       & 'G(i,j) = dv_i/dx_j: adds G x to the velocity')
     call keys%key('temperature_change', group%temperature_change, 'K', 'temperature change', &
       & default='0')
+    call visit_course(keys, group%ramp_time, group%times, group%values, 'the temperature change ')
     call keys%key('file', group%file, 'a table with a header that names columns among '// &
       & 'displacement_x.., velocity_x.., temperature_change, and a row per point')
   end subroutine visit_initial
@@ -351,13 +352,18 @@ contains
     call visit_course(keys, group%ramp_time, group%times, group%values)
   end subroutine visit_load
 
-  !> The course in time of a boundary or a load.
-  subroutine visit_course(keys, ramp_time, times, values)
-    type(keys_type), intent(inout) :: keys
-    real(wp), intent(inout) :: ramp_time
-    real(wp), allocatable, intent(inout) :: times(:), values(:)
+  !> The course in time of a temperature change, a boundary or a load.
+  subroutine visit_course(keys, ramp_time, times, values, subject)
+    type(keys_type), intent(inout) :: keys             !! visitor
+    real(wp), intent(inout) :: ramp_time               !! length of a ramp from 0 [s]
+    real(wp), allocatable, intent(inout) :: times(:)   !! of a table [s]
+    real(wp), allocatable, intent(inout) :: values(:)  !! factors at `times` [-]
+    character(*), intent(in), optional :: subject      !! what varies, if not all of the group
+    character(:), allocatable :: who
 
-    call keys%key('ramp_time', ramp_time, 's', 'grows linearly from 0 during this time', &
+    who = ''
+    if (present(subject)) who = subject
+    call keys%key('ramp_time', ramp_time, 's', who//'grows linearly from 0 during this time', &
       & above=0.0_wp, default='at once; in relaxation 1, the end of the load steps')
     call keys%list('times', times, 's', 'instead of ramp_time: increasing times')
     call keys%list('values', values, '-', 'factors at these times, linear between them')

@@ -158,13 +158,16 @@ contains
         read (text(:last), *, iostat=status) values
         ! After a failed read the values are not set.
         if (status == 0) then
-          if (all(abs(values) <= largest_real)) return
+          if (all(abs(values) <= largest_real)) then
+            where (abs(values)*largest_real < 0.999_wp) values = 0.0_wp
+            return
+          end if
         end if
       end if
       final = 0
       do i = 1, size(values)
         call next_word(text(:last), final, first)
-        call parse_real(text(first:final), values(i), note)
+        call parse_real(text(first:final), values(i), note, tiny_is_zero=.true.)
         if (len(note) == 0) cycle
         call source_fault(source, line, first, final - first + 1, &
           & "bad value '"//text(first:final)//"'", note, error)

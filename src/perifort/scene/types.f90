@@ -89,6 +89,9 @@ module pd_scene_types
     real(wp) :: displacement_gradient(3, 3) = 0.0_wp  !! H(i,j) = du_i/dx_j [-]
     real(wp) :: velocity_gradient(3, 3) = 0.0_wp      !! [1/s]
     real(wp) :: temperature_change = unset       !! [K]
+    real(wp) :: ramp_time = unset                !! of the temperature change [s]
+    real(wp), allocatable :: times(:)            !! of the temperature change [s]
+    real(wp), allocatable :: values(:)           !! factors at `times` [-]
     character(path_length) :: file = ''          !! a table of columns, a row per point
   end type initial_group
 

@@ -27,13 +27,19 @@ module pd_scene_values
 contains
 
   !> A finite real; `note` says what was expected if the word is not one, else it is ''.
-  subroutine parse_real(word, value, note)
+  subroutine parse_real(word, value, note, tiny_is_zero)
     character(*), intent(in) :: word
     real(wp), intent(out) :: value
     character(:), allocatable, intent(out) :: note
+    logical, intent(in), optional :: tiny_is_zero  !! read sizes below 1/largest_real as 0, as
+                                                   !! computed tables have them, instead of
+                                                   !! refusing them (default)
+    logical :: zero
     integer :: i, whole, exponent, status, mark
     character(:), allocatable :: text
 
+    zero = .false.
+    if (present(tiny_is_zero)) zero = tiny_is_zero
     value = 0.0_wp
     note = 'expected a number'
     text = lower_case(word)
@@ -58,6 +64,7 @@ contains
       if (verify(text(i:), digits) /= 0) return
       if (len(text) - i > 6) then
         note = out_of_range()
+        if (zero .and. text(mark + 1:mark + 1) == '-') note = ''
         return
       end if
       read (text(mark + 1:), *, iostat=status) exponent
@@ -66,13 +73,18 @@ contains
     ! A read of 1e999 would raise an overflow, which a build with traps turns into a crash.
     if (abs(exponent + whole) > largest_power .and. scan(text(:mark - 1), '123456789') > 0) then
       note = out_of_range()
+      if (zero .and. exponent < 0) note = ''
       return
     end if
     read (word, *, iostat=status) value
     if (status /= 0) return
     note = ''
-    if (abs(value) > largest_real .or. (abs(value)*largest_real < 0.999_wp .and. &
-      & abs(value) > 0.0_wp)) note = out_of_range()
+    if (abs(value)*largest_real < 0.999_wp) then
+      if (abs(value) > 0.0_wp .and. .not. zero) note = out_of_range()
+      if (zero) value = 0.0_wp
+    else if (abs(value) > largest_real) then
+      note = out_of_range()
+    end if
   end subroutine parse_real
 
   !> What is said of a real too large or too small to compute with.
