@@ -133,10 +133,12 @@ contains
       do c = system%body%dim, 1, -1
         relaxation%mass(:, c) = safety*relaxation%mass(:, 1)/4
       end do
-    case default
+    case ('frame_invariant')
       do c = 1, system%body%dim
         relaxation%mass(:, c) = safety*bound/2
       end do
+    case default
+      error stop 'internal: unknown density matrix'
     end select
   end subroutine plan_relaxation
 

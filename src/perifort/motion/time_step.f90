@@ -247,7 +247,8 @@ contains
     case ('adams_bashforth'); limit = 0.72_wp
     case ('adams_moulton'); limit = 1.29_wp
     case ('runge_kutta'); limit = 2.83_wp
-    case default; limit = 2.0_wp
+    case ('forward_backward', 'velocity_verlet'); limit = 2.0_wp
+    case default; error stop 'internal: unknown integrator'
     end select
   end function integrator_limit
 
@@ -257,7 +258,8 @@ contains
     select case (integrator)
     case ('runge_kutta'); evaluations = 4
     case ('adams_moulton'); evaluations = 2
-    case default; evaluations = 1
+    case ('forward_backward', 'velocity_verlet', 'adams_bashforth'); evaluations = 1
+    case default; error stop 'internal: unknown integrator'
     end select
   end function evaluations
 
