@@ -73,14 +73,14 @@ contains
     !$omp end parallel
   end subroutine stiffness_bound
 
-  !> Gd or Gb of the bond k-j along the unit vector n.
+  !> The size of Gd or Gb of the bond k-j along the unit vector n.
   pure real(wp) function factor(model, g, n, k, j)
     type(model_type), intent(in) :: model
     real(wp), allocatable, intent(in) :: g(:, :)
     real(wp), intent(in) :: n(:)
     integer, intent(in) :: k, j
     factor = 1.0_wp
-    if (model%surface) factor = bond_factor(n, g(k, :), g(j, :))
+    if (model%surface) factor = abs(bond_factor(n, g(k, :), g(j, :)))
   end function factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
