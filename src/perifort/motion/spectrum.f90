@@ -16,6 +16,7 @@ module pd_motion_spectrum
   implicit none (type, external)
   private
   public :: spectrum_type, largest_frequency, lasting_frequency, stable_step_of
+  public :: may_be_unstable, lowest_eigenvalue
 
   !> What was found.
   type :: spectrum_type
@@ -30,6 +31,13 @@ module pd_motion_spectrum
   integer, parameter :: most_evaluations = 2000  !! no body needs them but by a fault
   integer, parameter :: look_every = 8           !! evaluations between looks at the Ritz value
   integer, parameter :: seed = 20250829          !! of the start vector
+  !> Bodies have been found unstable from nu = -0.18 downwards (doc/extremes.md).
+  real(wp), parameter :: suspicious_ratio = -0.1_wp
+  !> An eigenvalue this far below 0, over the largest, is no rounding of a rigid motion's.
+  real(wp), parameter :: surely_negative = -1.0e-6_wp
+  !> Enough to find an eigenvalue below -1e-3 of the largest in a body of 1e8 components, with the
+  !> chance above.
+  integer, parameter :: stability_evaluations = 400
 
 contains
 
@@ -39,10 +47,14 @@ contains
   !> Appl. 13 (1992) 1094): for a random start vector, the chance that the value found is more than
   !> eps below the largest is at most 1.648 sqrt(n) exp(-sqrt(eps) (2 m - 1)) after m steps. The
   !> start vector is random, yet always the same, and so is the result, on any number of threads.
-  subroutine largest_frequency(system, accuracy, spectrum)
+  !>
+  !> With `factor` it is the largest frequency of the stretches alone, with the stiffness of every
+  !> slot times its factor.
+  subroutine largest_frequency(system, accuracy, spectrum, factor)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: accuracy              !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum
+    real(wp), intent(in), optional :: factor(:)   !! (n_slots) [-]
     real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :)
     real(wp), allocatable :: diagonal(:), beside(:)
     real(wp) :: length, last
@@ -60,7 +72,7 @@ contains
     call random_start(system, scale(:, :, 1), now)
     length = length_of(now)
     do m = 1, most_evaluations
-      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m))
+      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m), factor)
       length = beside(m)
       spectrum%evaluations = m
       ! a length of rounding: the vectors so far hold all that the start vector consists of
@@ -75,18 +87,36 @@ contains
   end subroutine largest_frequency
 
   !> A bound of the largest frequency that no breaking of bonds can exceed, however many and in
-  !> whatever order. `squared` is that of the stretches alone, without dilatation, which every
-  !> broken bond lowers, times the largest beta_k = 1 + m_k sum(Gd^2/Gb vc V/|xi|)/q_k: by the
-  !> inequality of Cauchy the dilatation's energy at k is at most beta_k - 1 times that of k's
-  !> stretches, whichever of its bonds are left. A negative a lowers the energy and counts as 0.
+  !> whatever order. By the inequality of Cauchy the dilatation's energy at k is at most beta_k - 1
+  !> times that of k's stretches, whichever of its bonds are left, so that the stretches alone, the
+  !> share of each point times its beta_k, have the larger energy, which every broken bond lowers.
+  !>
+  !> Where beta differs from material to material, it stands at each point. In bodies of one
+  !> material the largest beta is taken out of the sum instead: that costs at most a few per cent of
+  !> the step, and the fast loops can measure what is left.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: accuracy
-    type(spectrum_type), intent(out) :: spectrum
+    real(wp), intent(in) :: accuracy               !! of omega^2, relative
+    type(spectrum_type), intent(out) :: spectrum   !! `squared` and `residual` of the bound
+    real(wp), parameter :: alike = 1.01_wp         !! one material's largest beta over another's
+    real(wp), allocatable :: factor(:), largest(:)
     real(wp) :: beta
     logical :: dilatation
+    integer :: k
 
-    beta = largest_share(system)
+    call dilatation_shares(system, factor)
+    allocate (largest(size(system%model%materials)), source=0.0_wp)
+    do k = 1, system%body%n_slots
+      if (system%body%point(k) == 0) cycle
+      associate (m => system%model%material(k))
+        largest(m) = max(largest(m), factor(k))
+      end associate
+    end do
+    beta = maxval(largest)
+    if (beta > alike*minval(largest, mask=largest > 0.0_wp)) then
+      call largest_frequency(system, accuracy, spectrum, factor)
+      return
+    end if
     dilatation = system%model%dilatation
     system%model%dilatation = .false.
     call largest_frequency(system, accuracy, spectrum)
@@ -95,6 +125,54 @@ contains
     spectrum%residual = beta*spectrum%residual
   end subroutine lasting_frequency
 
+  !> Whether a body may be unstable as it stands, before any load: with a strongly negative
+  !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0.
+  pure logical function may_be_unstable(system)
+    type(system_type), intent(in) :: system
+    may_be_unstable = system%model%dilatation .and. system%model%surface .and. &
+      & any(system%model%materials%a < 0.0_wp .and. &
+      & system%model%materials%poissons_ratio < suspicious_ratio)
+  end function may_be_unstable
+
+  !> The lowest eigenvalue of the undeformed, unheated body's stiffness, its constrained components
+  !> held, over the largest one [-]; 0 unless it is surely negative. A Ritz value is never below the
+  !> lowest eigenvalue, so what is found negative is proved to be, and the search ends there: the
+  !> lowest eigenvalue may lie further down.
+  subroutine lowest_eigenvalue(system, lowest)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(out) :: lowest
+    real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :), u(:, :)
+    real(wp), allocatable :: diagonal(:), beside(:)
+    real(wp) :: length, top, bottom, last
+    integer :: m, free
+    logical :: thermal
+
+    lowest = 0.0_wp
+    call make_scale(system, scale, free)
+    if (free == 0) return
+    allocate (now, before, w, kw, mold=scale(:, :, 1))
+    allocate (diagonal(stability_evaluations), beside(stability_evaluations))
+    call move_alloc(system%state%u, u)
+    allocate (system%state%u, source=0.0_wp*u)
+    thermal = system%model%thermal
+    system%model%thermal = .false.
+    before = 0.0_wp
+    call random_start(system, scale(:, :, 1), now)
+    length = length_of(now)
+    do m = 1, stability_evaluations
+      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m))
+      length = beside(m)
+      if (length <= 1.0e-13_wp*maxval(abs(diagonal(:m)))) beside(m) = 0.0_wp
+      if (mod(m, look_every) /= 0 .and. beside(m) > 0.0_wp) cycle
+      call largest_ritz_value(diagonal(:m), beside(:m - 1), top, last)
+      call largest_ritz_value(-diagonal(:m), beside(:m - 1), bottom, last)
+      if (-bottom < surely_negative*top) lowest = -bottom/top
+      if (lowest < 0.0_wp .or. beside(m) <= 0.0_wp) exit
+    end do
+    system%model%thermal = thermal
+    call move_alloc(u, system%state%u)
+  end subroutine lowest_eigenvalue
+
   !> 2/omega [s], with the residual on the side of caution; huge if nothing vibrates.
   elemental real(wp) function stable_step_of(spectrum) result(step)
     type(spectrum_type), intent(in) :: spectrum
@@ -102,17 +180,18 @@ contains
     if (spectrum%squared > 0.0_wp) step = 2/sqrt(spectrum%squared + spectrum%residual)
   end function stable_step_of
 
-  !> beta of `lasting_frequency`.
-  real(wp) function largest_share(system) result(share)
+  !> beta_k = 1 + m_k sum(Gd^2/Gb vc V/|xi|)/q_k of every slot, 1 where there is no point. A
+  !> negative a lowers the energy and counts as 0.
+  subroutine dilatation_shares(system, beta)
     type(system_type), intent(in) :: system
+    real(wp), allocatable, intent(out) :: beta(:)   !! (n_slots) [-]
     type(bonds_type) :: bonds
     real(wp) :: sum_of_bonds, Gd, Gb, n(system%body%dim)
     integer :: k, i
 
-    share = 1.0_wp
+    allocate (beta(system%body%n_slots), source=1.0_wp)
     if (.not. system%model%dilatation) return
-    !$omp parallel default(none) shared(system) private(bonds, sum_of_bonds, Gd, Gb, n, k, i) &
-    !$omp reduction(max:share)
+    !$omp parallel default(none) shared(system, beta) private(bonds, sum_of_bonds, Gd, Gb, n, k, i)
     call allocate_bonds(system%family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, system%body%n_slots
@@ -133,11 +212,11 @@ contains
           end if
           sum_of_bonds = sum_of_bonds + Gd**2/Gb*bonds%weight(i)/bonds%length(i)
         end do
-        share = max(share, 1 + 2*material%a*material%t**2*sum_of_bonds/material%q)
+        beta(k) = 1 + 2*material%a*material%t**2*sum_of_bonds/material%q
       end associate
     end do
     !$omp end parallel
-  end function largest_share
+  end subroutine dilatation_shares
 
   !> u = scale(:, :, 1) y and, for the forces f = K u, A y = scale(:, :, 2) f; both 0 where nothing
   !> can move. `free` is how many components can.
@@ -194,7 +273,7 @@ contains
 
   !> One step of the recurrence: q = now/length becomes the newest vector, and
   !> A q - diagonal q - length before, of length `beside`, the one to come.
-  subroutine recur(system, scale, length, now, before, w, kw, diagonal, beside)
+  subroutine recur(system, scale, length, now, before, w, kw, diagonal, beside, factor)
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: scale(:, :, :)   !! of places and of forces
     real(wp), intent(in) :: length
@@ -202,6 +281,7 @@ contains
     real(wp), intent(inout), contiguous :: before(:, :)  !! in: the vector before; out: q
     real(wp), intent(inout), contiguous :: w(:, :), kw(:, :)  !! room
     real(wp), intent(out) :: diagonal, beside
+    real(wp), intent(in), optional :: factor(:)          !! see `apply_tangent`
     integer :: c
 
     do c = 1, size(now, 2)
@@ -209,7 +289,7 @@ contains
       w(:, c) = now(:, c)
       call multiply_by(w(:, c), scale(:, c, 1))
     end do
-    call apply_tangent(system, system%state%u, w, kw)
+    call apply_tangent(system, system%state%u, w, kw, factor)
     diagonal = 0.0_wp
     do c = 1, size(now, 2)
       call multiply_by(kw(:, c), scale(:, c, 2))
