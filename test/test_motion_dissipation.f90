@@ -167,8 +167,9 @@ contains
   end subroutine test_invariant
 
   !> The gap of the balance (root mean square of all steps) over what was dissipated, at 0.8, 0.4
-  !> and 0.2 of the stable step: at most a few per cent at 0.8, and of second order between 0.4 and 0.2. Which bonds break when
-  !> differs from step to step, so that the order is met to 0.5; with the squares it is 1.0.
+  !> and 0.2 of the stable step: at most a few per cent at 0.8, and of second order between 0.4 and
+  !> 0.2. Which bonds break when differs from step to step, so that the order is met to 0.5; with
+  !> the squares it is 1.0.
   subroutine test_bodies(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

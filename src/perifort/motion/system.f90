@@ -58,7 +58,7 @@ module pd_motion_system
   type :: pairing_type
     real(wp) :: offset = 0.0_wp  !! from the present instant to the other one [s]
     real(wp) :: kick = 0.0_wp    !! 0 where the accelerations a of the present are not known yet [s]
-    real(wp) :: held = 0.0_wp    !! the offset that the work of constrained components amounts to [s]
+    real(wp) :: held = 0.0_wp    !! the offset that the work of imposed motion implies [s]
   end type pairing_type
 
   !> Energies at one instant [J].
