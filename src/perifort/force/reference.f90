@@ -8,8 +8,7 @@ module pd_force_reference
   implicit none (type, external)
   private
   public :: bond_state_type, state_of_bond, point_dilatation, point_force, point_energy
-  public :: energy_product, stretch_force, point_damage, reference_dilatation, reference_force
-  public :: reference_energy
+  public :: energy_product, point_damage, reference_dilatation, reference_force, reference_energy
 
   !> How a bond is deformed.
   type :: bond_state_type
@@ -187,37 +186,6 @@ contains
     end do
     !$omp end parallel
   end subroutine reference_force
-
-  !> Force density of the stretches alone, as if there were no dilatation, with the stiffness q of
-  !> every slot times a factor of its own (doc/theory.md, 6, the bound when bonds break).
-  subroutine stretch_force(family, model, factor, u, force)
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: factor(:)       !! (n_slots) [-]
-    real(wp), intent(in) :: u(:, :)         !! displacements (n_slots, dim) [m]
-    real(wp), intent(out) :: force(:, :)    !! (n_slots, dim) [N/m3]
-    type(bonds_type) :: bonds
-    type(bond_state_type) :: state
-    integer :: k, j, i
-
-    !$omp parallel default(none) shared(family, model, factor, u, force) &
-    !$omp private(bonds, state, k, j, i)
-    call allocate_bonds(family, bonds)
-    !$omp do schedule(static)
-    do k = 1, family%n_slots
-      force(k, :) = 0.0_wp
-      call family%bonds_of(k, bonds)
-      do i = 1, bonds%n
-        if (.not. bonds%intact(i)) cycle
-        j = bonds%j(i)
-        state = state_of_bond(model, u, k, bonds, i)
-        force(k, :) = force(k, :) + (factor(k)*model%materials(model%material(k))%q &
-          & + factor(j)*model%materials(model%material(j))%q)*state%Gb*state%stretch &
-          & *bonds%weight(i)*state%direction(:size(u, 2))
-      end do
-    end do
-    !$omp end parallel
-  end subroutine stretch_force
 
   !> Strain energy density of all slots [J/m3].
   subroutine reference_energy(family, model, u, energy)

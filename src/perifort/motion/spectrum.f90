@@ -7,9 +7,11 @@
 !> it does not harm the value itself nor its residual (C. C. Paige, J. Inst. Maths Applics 18 (1976)
 !> 341).
 module pd_motion_spectrum
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i2, i4
   use pd_base_numbers, only: inner, noise, pi
+  use pd_body_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_family_lattice, only: lattice_family_type
   use pd_family_surface, only: bond_factor
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
@@ -47,14 +49,10 @@ contains
   !> Appl. 13 (1992) 1094): for a random start vector, the chance that the value found is more than
   !> eps below the largest is at most 1.648 sqrt(n) exp(-sqrt(eps) (2 m - 1)) after m steps. The
   !> start vector is random, yet always the same, and so is the result, on any number of threads.
-  !>
-  !> With `factor` it is the largest frequency of the stretches alone, with the stiffness of every
-  !> slot times its factor.
-  subroutine largest_frequency(system, accuracy, spectrum, factor)
+  subroutine largest_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: accuracy              !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum
-    real(wp), intent(in), optional :: factor(:)   !! (n_slots) [-]
     real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :)
     real(wp), allocatable :: diagonal(:), beside(:)
     real(wp) :: length, last
@@ -72,7 +70,7 @@ contains
     call random_start(system, scale(:, :, 1), now)
     length = length_of(now)
     do m = 1, most_evaluations
-      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m), factor)
+      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m))
       length = beside(m)
       spectrum%evaluations = m
       ! a length of rounding: the vectors so far hold all that the start vector consists of
@@ -93,37 +91,97 @@ contains
   !>
   !> Where beta differs from material to material, it stands at each point. In bodies of one
   !> material the largest beta is taken out of the sum instead: that costs at most a few per cent of
-  !> the step, and the fast loops can measure what is left.
+  !> the step, and a lattice keeps the tables of its weights.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: accuracy               !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum   !! `squared` and `residual` of the bound
     real(wp), parameter :: alike = 1.01_wp         !! one material's largest beta over another's
-    real(wp), allocatable :: factor(:), largest(:)
+    real(wp), allocatable :: share(:), largest(:)
     real(wp) :: beta
     logical :: dilatation
     integer :: k
 
-    call dilatation_shares(system, factor)
+    call dilatation_shares(system, share)
     allocate (largest(size(system%model%materials)), source=0.0_wp)
     do k = 1, system%body%n_slots
       if (system%body%point(k) == 0) cycle
       associate (m => system%model%material(k))
-        largest(m) = max(largest(m), factor(k))
+        largest(m) = max(largest(m), share(k))
       end associate
     end do
     beta = maxval(largest)
-    if (beta > alike*minval(largest, mask=largest > 0.0_wp)) then
-      call largest_frequency(system, accuracy, spectrum, factor)
-      return
-    end if
     dilatation = system%model%dilatation
     system%model%dilatation = .false.
-    call largest_frequency(system, accuracy, spectrum)
+    if (beta > alike*minval(largest, mask=largest > 0.0_wp)) then
+      call stiffened_frequency(system, share, accuracy, spectrum)
+    else
+      call largest_frequency(system, accuracy, spectrum)
+      spectrum%squared = beta*spectrum%squared
+      spectrum%residual = beta*spectrum%residual
+    end if
     system%model%dilatation = dilatation
-    spectrum%squared = beta*spectrum%squared
-    spectrum%residual = beta*spectrum%residual
   end subroutine lasting_frequency
+
+  !> The largest frequency with the stiffness q of every slot times its `share`, rounded up by at
+  !> most half a per cent (by more where that makes too many materials): slots of one material and
+  !> of shares that are rounded to one number make a material of their own for the time of the
+  !> measurement, in which a lattice makes its weights anew in every pass.
+  subroutine stiffened_frequency(system, share, accuracy, spectrum)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: share(:)               !! at least 1 (n_slots) [-]
+    real(wp), intent(in) :: accuracy               !! of omega^2, relative
+    type(spectrum_type), intent(out) :: spectrum
+    integer, parameter :: most_materials = 30000   !! whose numbers have two bytes
+    real(wp) :: grain                              !! one rounded share over the next smaller one
+    type(material_type), allocatable :: materials(:), finer(:)
+    integer(i2), allocatable :: material(:)
+    integer(i4), allocatable :: tables(:)
+    integer, allocatable :: number(:, :)
+    integer :: k, g, n
+
+    call move_alloc(system%model%materials, materials)
+    grain = max(1.005_wp, maxval(share)**(real(size(materials), wp)/most_materials))
+    allocate (material, source=system%model%material)
+    allocate (number(size(materials), 0:grains(maxval(share))), source=0)
+    allocate (finer(size(number)))
+    n = 0
+    do k = 1, system%body%n_slots
+      g = grains(share(k))
+      associate (m => material(k))
+        if (number(m, g) == 0) then
+          n = n + 1
+          number(m, g) = n
+          finer(n) = materials(m)
+          finer(n)%q = materials(m)%q*grain**g
+        end if
+        system%model%material(k) = int(number(m, g), i2)
+      end associate
+    end do
+    system%model%materials = finer(:n)
+    select type (family => system%family)
+    type is (lattice_family_type)
+      tables = family%weights
+      family%weights = 0_i4
+    end select
+    call largest_frequency(system, accuracy, spectrum)
+    select type (family => system%family)
+    type is (lattice_family_type)
+      family%weights = tables
+    end select
+    system%model%material = material
+    deallocate (system%model%materials)
+    call move_alloc(materials, system%model%materials)
+
+  contains
+
+    !> The number of grains that a share is rounded up to.
+    pure integer function grains(value)
+      real(wp), intent(in) :: value
+      grains = ceiling(log(max(1.0_wp, value))/log(grain))
+    end function grains
+
+  end subroutine stiffened_frequency
 
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
   !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0.
@@ -273,7 +331,7 @@ contains
 
   !> One step of the recurrence: q = now/length becomes the newest vector, and
   !> A q - diagonal q - length before, of length `beside`, the one to come.
-  subroutine recur(system, scale, length, now, before, w, kw, diagonal, beside, factor)
+  subroutine recur(system, scale, length, now, before, w, kw, diagonal, beside)
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: scale(:, :, :)   !! of places and of forces
     real(wp), intent(in) :: length
@@ -281,7 +339,6 @@ contains
     real(wp), intent(inout), contiguous :: before(:, :)  !! in: the vector before; out: q
     real(wp), intent(inout), contiguous :: w(:, :), kw(:, :)  !! room
     real(wp), intent(out) :: diagonal, beside
-    real(wp), intent(in), optional :: factor(:)          !! see `apply_tangent`
     integer :: c
 
     do c = 1, size(now, 2)
@@ -289,7 +346,7 @@ contains
       w(:, c) = now(:, c)
       call multiply_by(w(:, c), scale(:, c, 1))
     end do
-    call apply_tangent(system, system%state%u, w, kw, factor)
+    call apply_tangent(system, system%state%u, w, kw)
     diagonal = 0.0_wp
     do c = 1, size(now, 2)
       call multiply_by(kw(:, c), scale(:, c, 2))

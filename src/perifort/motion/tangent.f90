@@ -3,7 +3,6 @@
 module pd_motion_tangent
   use pd_base_kinds, only: wp, i1
   use pd_force_forces, only: dilatation_pass, force_pass
-  use pd_force_reference, only: stretch_force
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -29,15 +28,11 @@ contains
   !> An undeformed body without temperature change costs one evaluation of the forces, and the
   !> result is exact but for rounding. Elsewhere two evaluations make a central difference: some ten
   !> digits remain where displacements are as large as the spacing, more where they are smaller.
-  !>
-  !> With `factor` it is the tangent of the stretches alone, with the stiffness of every slot times
-  !> its factor; that takes the general loops, which are slower.
-  subroutine apply_tangent(system, u, w, kw, factor)
+  subroutine apply_tangent(system, u, w, kw)
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(in), contiguous :: w(:, :)
     real(wp), intent(inout), contiguous :: kw(:, :)
-    real(wp), intent(in), optional :: factor(:)  !! (n_slots) [-]
     real(wp), allocatable :: moved(:, :), behind(:, :)
     real(wp) :: length, strain, spacing, step
     logical :: projected
@@ -54,7 +49,7 @@ contains
     if (.not. strain > 0.0_wp) then
       step = undeformed_step*spacing/length
       call displace(u, step, w, moved)
-      call forces_at(system, moved, kw, factor)
+      call forces_at(system, moved, kw)
       call difference(-1/step, kw)
       return
     end if
@@ -64,28 +59,22 @@ contains
     projected = system%model%projected
     system%model%projected = .false.
     call displace(u, -step, w, moved)
-    call forces_at(system, moved, behind, factor)
+    call forces_at(system, moved, behind)
     call displace(u, step, w, moved)
-    call forces_at(system, moved, kw, factor)
+    call forces_at(system, moved, kw)
     system%model%projected = projected
     call difference(-1/(2*step), kw, behind)
   end subroutine apply_tangent
 
-  !> Internal force density at displacements `u`, or, with `factor`, that of `stretch_force`. The
-  !> marks of strained slots, which bond breaking looks at, and the dilatation of the system's own
-  !> state are left alone.
-  subroutine forces_at(system, u, force, factor)
+  !> Internal force density at displacements `u`. The marks of strained slots, which bond breaking
+  !> looks at, and the dilatation of the system's own state are left alone.
+  subroutine forces_at(system, u, force)
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: force(:, :)
-    real(wp), intent(in), optional :: factor(:)  !! of the stretches' stiffness (n_slots) [-]
     real(wp), allocatable :: p(:)
     integer(i1), allocatable :: strained(:)
 
-    if (present(factor)) then
-      call stretch_force(system%family, system%model, factor, u, force)
-      return
-    end if
     associate (n => system%body%n_slots, model => system%model)
       allocate (p(merge(n, 0, model%dilatation)), source=0.0_wp)
       allocate (strained(merge(n, 0, model%breaking)), source=0_i1)
