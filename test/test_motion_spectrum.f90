@@ -259,8 +259,9 @@ contains
   end subroutine two_materials
 
   !> The step of the bound over 7.25, computed elsewhere with sparse matrices and ARPACK, given to
-  !> three decimals, to which the accuracy of the measurement adds 1e-3/2. With one factor for all
-  !> points, the largest, these are 1.347 and 0.837: the bound gives 1.3 and 2.5 times the step.
+  !> three decimals; the accuracy of the measurement may add 1e-3/2 to it, the rounding of the shares
+  !> take a quarter per cent from it. With one factor for all points, the largest, these are 1.347
+  !> and 0.837: the bound gives 1.3 and 2.5 times the step.
   subroutine test_two_materials(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -278,7 +279,7 @@ contains
         if (allocated(error)) return
         call lasting_frequency(set_up%system, 1.0e-3_wp, lasting)
         call expect_true(error, lasting%converged, 'converged')
-        call expect(error, 2/sqrt(lasting%squared)/set_up%plan%limit, ratios(i), 1.5e-3_wp, &
+        call expect(error, 2/sqrt(lasting%squared)/set_up%plan%limit, ratios(i), 6.0e-3_wp, &
           & 'step over 7.25, body '//text_of(real(i, wp))//', '//families(f))
       end do
     end do
