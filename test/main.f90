@@ -35,6 +35,7 @@ program main
   use test_force_contract, only: collect_force_contract
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_conjugate_gradient, only: collect_motion_conjugate_gradient
+  use test_motion_dissipation, only: collect_motion_dissipation
   use test_motion_explicit, only: collect_motion_explicit
   use test_motion_heating, only: collect_motion_heating
   use test_motion_newton, only: collect_motion_newton
@@ -105,6 +106,7 @@ program main
   call register('force_contract', collect_force_contract)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_conjugate_gradient', collect_motion_conjugate_gradient)
+  call register('motion_dissipation', collect_motion_dissipation)
   call register('motion_explicit', collect_motion_explicit)
   call register('motion_heating', collect_motion_heating)
   call register('motion_newton', collect_motion_newton)

@@ -343,7 +343,7 @@ contains
       call ready_alone(scene, set_up, error)
       call expect_energy(set_up, 0.9_wp, 800, error)
     end do
-    ! down to -0.8 a block is stable with surface correction, too
+    ! this block is stable at -0.8 with surface correction, too (not every one is)
     call box_scene([7, 6, 6], dx, -0.8_wp, scene)
     scene%horizon%surface_correction = 'energy'
     call ready_alone(scene, set_up, error)

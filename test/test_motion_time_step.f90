@@ -3,6 +3,7 @@ module test_motion_time_step
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
   use pd_driver, only: set_up_type
+  use pd_family_lattice, only: lattice_family_type
   use pd_motion_explicit, only: run_explicit
   use pd_motion_system, only: system_type, evaluate
   use pd_motion_time_step, only: stiffness_bound
@@ -25,6 +26,8 @@ contains
     testsuite = [ &
       & new_unittest('the bound of a bar in closed form', test_bar), &
       & new_unittest('lattices and lists have the same bounds', test_families), &
+      & new_unittest('one number M gives the step and the mass of relaxation', test_mass), &
+      & new_unittest('weights of either sign count with their size', test_signs), &
       & new_unittest('the step never exceeds the true limit', test_limit), &
       & new_unittest('at 0.99 of the step every body stays bounded', test_bounded), &
       & new_unittest('duration ends exactly, in whole steps', test_duration)]
@@ -117,6 +120,71 @@ contains
     call expect(error, set_up%plan%limit, sqrt(2*density_of_steel/expected), &
       & 1.0e-12_wp*set_up%plan%limit, 'stable step of a bar')
   end subroutine test_bar
+
+  !> M_k of a plate and a block of nu = 0.42 with surface correction, from a statement of the theory
+  !> in numpy (first point, sum, largest; ten digits): the step is sqrt(2 rho/M), the fictitious
+  !> mass of every component M/2.
+  subroutine test_mass(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    real(wp), parameter :: known(3, 2) = reshape([3.245170520e15_wp, 3.124199272e17_wp, &
+      & 5.031425921e15_wp, 1.339916690e16_wp, 5.068636980e18_wp, 2.677117077e16_wp], [3, 2])
+    character(*), parameter :: families(2) = [character(7) :: 'lattice', 'list']
+    integer :: b, f, c
+
+    do b = 1, 2
+      do f = 1, size(families)
+        if (b == 1) call box_scene([9, 8], spacing, 0.42_wp, scene)
+        if (b == 2) call box_scene([7, 6, 6], spacing, 0.42_wp, scene)
+        scene%horizon%surface_correction = 'energy'
+        scene%horizon%family = families(f)
+        call ready(scene, set_up, error)
+        if (allocated(error)) return
+        call expect(error, set_up%plan%limit/sqrt(2*density_of_steel/known(3, b)), 1.0_wp, &
+          & 1.0e-9_wp, 'step, '//families(f))
+        scene%time%method = 'relaxation'
+        call ready(scene, set_up, error)
+        if (allocated(error)) return
+        associate (slot => set_up%system%body%slot, mass => set_up%plan%relaxation%mass)
+          do c = 1, set_up%system%body%dim
+            call expect(error, 2*mass(slot(1), c)/known(1, b), 1.0_wp, 1.0e-9_wp, 'first point')
+            call expect(error, 2*sum(mass(slot, c))/known(2, b), 1.0_wp, 1.0e-9_wp, 'sum of M')
+            call expect(error, 2*maxval(mass(slot, c))/known(3, b), 1.0_wp, 1.0e-9_wp, 'largest')
+          end do
+        end associate
+      end do
+    end do
+  end subroutine test_mass
+
+  !> A lattice's bound does not change with the sign of its weights.
+  subroutine test_signs(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: positive(:), negative(:)
+    integer :: i
+
+    call box_scene([9, 8], spacing, 0.42_wp, scene)
+    call ready(scene, set_up, error)
+    if (allocated(error)) return
+    associate (system => set_up%system)
+      allocate (positive(system%body%n_slots), negative(system%body%n_slots), source=0.0_wp)
+      call stiffness_bound(system%body, system%family, system%model, positive)
+      select type (family => system%family)
+      type is (lattice_family_type)
+        do i = 1, size(family%table)
+          family%table(i)%stretch = -family%table(i)%stretch
+          family%table(i)%dilatation = -family%table(i)%dilatation
+        end do
+      class default
+        call expect_true(error, .false., 'a plate has no lattice family')
+      end select
+      call stiffness_bound(system%body, system%family, system%model, negative)
+    end associate
+    call expect_true(error, any(positive > 0.0_wp) .and. &
+      & all(abs(positive - negative) <= 0.0_wp), 'bound with the signs turned')
+  end subroutine test_signs
 
   !> Largest eigenvalue of -K/rho by power iteration with the forces: a Rayleigh quotient is never
   !> above it, so what is found is a lower bound of omega^2.

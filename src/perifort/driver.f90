@@ -49,7 +49,8 @@ module pd_driver
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads, &
     & check_memory, output_directory, history_interval
 
-  real(wp), parameter :: doubtful_balance = 0.1_wp  !! of the energy in play
+  real(wp), parameter :: doubtful_balance = 0.1_wp      !! of the energy in play
+  real(wp), parameter :: doubtful_dissipation = 0.05_wp !! of the dissipated energy
 
   !> Everything that stands before the first step.
   type :: set_up_type
@@ -128,9 +129,7 @@ contains
       call recorder%timer%stop('time stepping')
       call recorder%progress%finish()
       call recorder%energy_balance(system, balance, share)
-      if (share > doubtful_balance .and. .not. allocated(error)) call recorder%warn('balance', &
-        & 'the energies are off by '//to_text(100*share, 2)//' %: the answer is doubtful; a '// &
-        & 'smaller step may help')
+      if (.not. allocated(error)) call warn_of_balance(system, recorder, balance, share)
       call recorder%results%put_warnings(recorder%warnings%text())
       stopped = .false.
       if (allocated(error)) stopped = error%status == status_interrupted
@@ -144,6 +143,25 @@ contains
       call say(options, summary_after(system, recorder, directory))
     end associate
   end subroutine run_scene
+
+  !> Warn if energy was gained or lost that nothing explains: much of what is in play, or, where
+  !> bonds have broken, much of what they dissipated.
+  subroutine warn_of_balance(system, recorder, balance, share)
+    type(system_type), intent(in) :: system
+    type(recorder_type), intent(inout) :: recorder
+    real(wp), intent(in) :: balance  !! energy that nothing explains [J]
+    real(wp), intent(in) :: share    !! its size over the energy in play [-], < 0 without a balance
+
+    if (share > doubtful_balance) then
+      call recorder%warn('balance', 'the energy balance is off by '//to_text(100*share, 2)// &
+        & ' % of the energy: the answer is not reliable; a smaller step may help')
+    else if (share >= 0.0_wp .and. abs(system%dissipated) > 0.0_wp .and. &
+      & abs(balance) > doubtful_dissipation*abs(system%dissipated)) then
+      call recorder%warn('dissipation', 'the energy balance is off by '// &
+        & to_text(100*abs(balance/system%dissipated), 2)// &
+        & ' % of the dissipated energy, which is known no better; a smaller step helps')
+    end if
+  end subroutine warn_of_balance
 
   !> Read, validate, build points and families, and say what a run would do, without running.
   subroutine check_scene(scene, options, error)

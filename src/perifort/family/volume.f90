@@ -24,9 +24,10 @@ contains
     character(*), intent(in) :: name
     select case (name)
     case ('none'); number = volume_none
+    case ('linear'); number = volume_linear
     case ('linear_extended'); number = volume_linear_extended
     case ('exact'); number = volume_exact
-    case default; number = volume_linear
+    case default; error stop 'internal: unknown volume correction'
     end select
   end function volume_rule_number
 
@@ -55,8 +56,10 @@ contains
       vc = 1.0_wp
     case (volume_exact)
       vc = covered_fraction(xi, spacing, rule%delta)
-    case default
+    case (volume_linear, volume_linear_extended)
       vc = max(0.0_wp, min(1.0_wp, (rule%delta + spacing/2 - length)/spacing))
+    case default
+      error stop 'internal: unknown volume correction'
     end select
   end function volume_correction
 

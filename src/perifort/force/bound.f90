@@ -11,7 +11,8 @@ module pd_force_bound
 
 contains
 
-  !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken.
+  !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken. Weights of
+  !> either sign count with their size.
   subroutine lattice_bound(family, model, bound)
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
@@ -76,13 +77,13 @@ contains
     do m = 1, weights%n
       inverse_length = sqrt(weights%geometry(4, m))
       if (pass == 1) then
-        sums = sums + weights%dilatation(:, m)*inverse_length
+        sums = sums + abs(weights%dilatation(:, m))*inverse_length
         cycle
       end if
-      sums = sums + weights%stretch(:, m)*weights%geometry(4, m)
+      sums = sums + abs(weights%stretch(:, m))*weights%geometry(4, m)
       if (.not. model%dilatation) cycle
       j = first + weights%shift(m)
-      sums = sums + (own + inverse(j:j + lanes - 1))*weights%dilatation(:, m)*inverse_length
+      sums = sums + (own + inverse(j:j + lanes - 1))*abs(weights%dilatation(:, m))*inverse_length
     end do
     if (pass == 2) then
       bound(first:first + lanes - 1) = sums

@@ -6,7 +6,8 @@ module pd_force_breaking
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_family_offsets, only: lanes
   use pd_force_model, only: model_type, bond_limit
-  use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, point_damage
+  use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
+    & energy_product, point_damage
   implicit none (type, external)
   private
   public :: strained_slots, break_bonds, damage_of
@@ -34,30 +35,39 @@ contains
     end do
   end subroutine strained_slots
 
-  !> Break the bonds of `slots`, ascending, that are beyond their limit at displacements `u`. On
-  !> return `slots` holds those that lost a bond, `broken` the number of bonds (each counted once)
-  !> and `dissipated` [J] the strain energy lost at fixed u; `damage` is brought up to date.
-  subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated)
+  !> Break the bonds of `slots` that are beyond their limit at displacements `u`, and count the
+  !> strain energy that is lost: at fixed `u`, and, for each set of `others`, with the products of
+  !> the stretches and dilatations under `u` and under that set in place of the squares
+  !> (doc/theory.md, 9).
+  subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated, others, &
+    & products)
     type(body_type), intent(in) :: body
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    integer(i4), allocatable, intent(inout) :: slots(:)
-    real(wp), intent(inout) :: damage(:)
-    integer(i8), intent(out) :: broken
-    real(wp), intent(out) :: dissipated
+    real(wp), intent(in) :: u(:, :)       !! displacements (n_slots, dim) [m]
+    integer(i4), allocatable, intent(inout) :: slots(:)  !! in: where to look, ascending;
+                                                         !! out: those that lost a bond
+    real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
+    integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
+    real(wp), intent(out) :: dissipated   !! energy lost at fixed u [J]
+    real(wp), intent(in), optional :: others(:, :, :)  !! other displacements, read at `slots` and
+                                                       !! at the ends of their bonds alone
+                                                       !! (n_slots, dim, sets) [m]
+    real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
     type(bonds_type) :: bonds
-    real(wp), allocatable :: lost(:)
+    real(wp), allocatable :: lost(:, :), before(:)
     integer, allocatable :: number(:), first(:)
     logical :: breaks
-    integer :: g, m, k, i
+    integer :: g, m, k, i, sets
 
-    allocate (lost(size(slots)), source=0.0_wp)
+    sets = 0
+    if (present(others)) sets = size(others, 3)
+    allocate (lost(size(slots), 0:sets), before(0:sets), source=0.0_wp)
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
     !$omp parallel default(none) &
-    !$omp shared(body, family, model, u, slots, damage, lost, number, first) &
-    !$omp private(bonds, g, m, k, i, breaks)
+    !$omp shared(body, family, model, u, others, slots, damage, lost, number, first) &
+    !$omp firstprivate(before) private(bonds, g, m, k, i, breaks)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 4)
     do g = 1, size(first) - 1
@@ -67,21 +77,39 @@ contains
         do i = 1, bonds%n
           call decide(model, u, k, bonds, i, breaks)
           if (.not. breaks) cycle
-          if (number(m) == 0) lost(m) = point_energy(model, u, k, bonds)
+          if (number(m) == 0) call energies(model, u, k, bonds, before, others)
           number(m) = number(m) + 1
           call family%break_bond(k, i)
         end do
         if (number(m) == 0) cycle
         call family%bonds_of(k, bonds)
-        lost(m) = (lost(m) - point_energy(model, u, k, bonds))*body%volume(k)
+        call energies(model, u, k, bonds, lost(m, :), others)
+        lost(m, :) = (before - lost(m, :))*body%volume(k)
         damage(k) = point_damage(bonds)
       end do
     end do
     !$omp end parallel
     broken = sum(int(number, i8))/2_i8
-    dissipated = sum(lost)
+    dissipated = sum(lost(:, 0))
+    if (present(products)) products = sum(lost(:, 1:), 1)
     slots = pack(slots, number > 0)
   end subroutine break_bonds
+
+  !> Energy density of slot `k` [J/m3]: as it is, and with the products of each set of `others`.
+  pure subroutine energies(model, u, k, bonds, density, others)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)                    !! displacements (n_slots, dim) [m]
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds              !! of slot `k`
+    real(wp), intent(out) :: density(0:)               !! (0:sets) [J/m3]
+    real(wp), intent(in), optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
+    integer :: o
+
+    density(0) = point_energy(model, u, k, bonds)
+    do o = 1, ubound(density, 1)
+      density(o) = energy_product(model, u, others(:, :, o), k, bonds)
+    end do
+  end subroutine energies
 
   !> Ascending slots in groups that one thread must work on: those whose bonds may share a byte. The
   !> slots of group g are `slots(first(g):first(g+1) - 1)`.

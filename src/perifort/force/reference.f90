@@ -8,7 +8,7 @@ module pd_force_reference
   implicit none (type, external)
   private
   public :: bond_state_type, state_of_bond, point_dilatation, point_force, point_energy
-  public :: point_damage, reference_dilatation, reference_force, reference_energy
+  public :: energy_product, point_damage, reference_dilatation, reference_force, reference_energy
 
   !> How a bond is deformed.
   type :: bond_state_type
@@ -95,23 +95,37 @@ contains
   !> Strain energy density W of slot `k` [J/m3] (doc/theory.md, 9).
   pure real(wp) function point_energy(model, u, k, bonds) result(energy)
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
+    real(wp), intent(in) :: u(:, :)           !! displacements (n_slots, dim) [m]
     integer, intent(in) :: k
-    type(bonds_type), intent(in) :: bonds
-    type(bond_state_type) :: state
+    type(bonds_type), intent(in) :: bonds     !! of slot `k`
+    energy = energy_product(model, u, u, k, bonds)
+  end function point_energy
+
+  !> The strain energy density W of slot `k` with the products of the stretches, and of the
+  !> dilatations, of two instants in place of the squares [J/m3] (doc/theory.md, 9).
+  pure real(wp) function energy_product(model, u, other, k, bonds) result(energy)
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: u(:, :)           !! displacements of one instant (n_slots, dim) [m]
+    real(wp), intent(in) :: other(:, :)       !! of the other; read at `k` and at its bonds' ends
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds     !! of slot `k`
+    type(bond_state_type) :: state, state_of_other
     integer :: i
 
     energy = 0.0_wp
     do i = 1, bonds%n
       if (.not. bonds%intact(i)) cycle
       state = state_of_bond(model, u, k, bonds, i)
-      energy = energy + state%Gb*state%stretch**2*bonds%length(i)*bonds%weight(i)
+      state_of_other = state_of_bond(model, other, k, bonds, i)
+      energy = energy + state%Gb*(state%stretch*state_of_other%stretch)*bonds%length(i) &
+        & *bonds%weight(i)
     end do
     associate (m => model%materials(model%material(k)))
       energy = m%q/2*energy
-      if (abs(m%a) > 0.0_wp) energy = energy + m%a*point_dilatation(model, u, k, bonds)**2
+      if (abs(m%a) > 0.0_wp) energy = energy + m%a*point_dilatation(model, u, k, bonds) &
+        & *point_dilatation(model, other, k, bonds)
     end associate
-  end function point_energy
+  end function energy_product
 
   !> Local damage phi of a point: the part of its family's volume behind broken bonds.
   pure real(wp) function point_damage(bonds) result(damage)

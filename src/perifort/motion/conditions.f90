@@ -51,7 +51,8 @@ contains
   pure subroutine impose(motions, t, u, v)
     type(motion_type), intent(in) :: motions(:)
     real(wp), intent(in) :: t
-    real(wp), intent(inout) :: u(:, :), v(:, :)
+    real(wp), intent(inout) :: u(:, :)            !! displacements (n_slots, dim) [m]
+    real(wp), intent(inout), optional :: v(:, :)  !! velocities (n_slots, dim) [m/s]
     real(wp) :: factor, rate, path
     integer :: m, c, i
 
@@ -67,13 +68,13 @@ contains
             do i = 1, size(motion%slots)
               if (motion%held(i, c) == 0_i1) cycle
               u(motion%slots(i), c) = motion%amplitude(c)*factor
-              v(motion%slots(i), c) = motion%amplitude(c)*rate
+              if (present(v)) v(motion%slots(i), c) = motion%amplitude(c)*rate
             end do
           case (moved_by_velocity)
             do i = 1, size(motion%slots)
               if (motion%held(i, c) == 0_i1) cycle
               u(motion%slots(i), c) = motion%start(i, c) + motion%amplitude(c)*path
-              v(motion%slots(i), c) = motion%amplitude(c)*factor
+              if (present(v)) v(motion%slots(i), c) = motion%amplitude(c)*factor
             end do
           case default
             continue  ! a free component

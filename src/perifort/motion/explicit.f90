@@ -12,8 +12,8 @@ module pd_motion_explicit
   use pd_motion_fault, only: explain_fault, faulty_slot, points_at_once, stays_within
   use pd_motion_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_watch, only: watch_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, evaluate, account, &
-    & add_loads, inverse_density, velocities_now
+  use pd_motion_system, only: system_type, energies_type, energies_of, pairing_type, evaluate, &
+    & account, add_loads, inverse_density, velocities_now
   implicit none (type, external)
   private
   public :: run_explicit, begin_memory
@@ -57,7 +57,8 @@ contains
       instant%time = n*dt
       instant%last = n == steps
       if (n > seen) then
-        call evaluate(system, instant%time, breaking=.true.)
+        call evaluate(system, instant%time, breaking=.true., &
+          & pairing=pairing_of(integrator, n, dt, system%break_late))
         ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
         instant%kick = 0.0_wp
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
@@ -154,6 +155,49 @@ contains
     at_half_steps = integrator == 'forward_backward' .or. integrator == 'velocity_verlet'
   end function at_half_steps
 
+  !> With which instant that of step `n` is paired where the energy of bonds is counted that break
+  !> then. An integrator's sums let such a bond pull up to t_n and for a part of a step more (or
+  !> less, if negative), and the products with displacements of twice that part of a step away
+  !> count the work of that force (doc/theory.md, 9).
+  pure type(pairing_type) function pairing_of(integrator, n, dt, late) result(pairing)
+    character(*), intent(in) :: integrator
+    integer, intent(in) :: n        !! complete steps
+    real(wp), intent(in) :: dt      !! [s]
+    logical, intent(in) :: late     !! bonds break after the forces
+    real(wp) :: part
+
+    part = 0.0_wp
+    select case (integrator)
+    case ('forward_backward', 'velocity_verlet')
+      ! the first kick is half a kick, which no bond that breaks at t = 0 has a part in
+      if (late) then
+        part = 0.5_wp
+      else if (n > 0) then
+        part = -0.5_wp
+      end if
+    case ('adams_bashforth')
+      ! the first two steps are Runge-Kutta's; then 23/12, -16/12 and 5/12 of the last three
+      select case (n)
+      case (0); part = merge(7.0_wp, 0.0_wp, late)/12
+      case (1); part = merge(-4.0_wp, 5.0_wp, late)/12
+      case default; part = merge(0.5_wp, -0.5_wp, late)
+      end select
+    case ('adams_moulton')
+      if (late) part = merge(0.5_wp, 1.0_wp/6, n > 0)
+    case ('runge_kutta')
+      if (late) part = 1.0_wp/6
+    case default
+      error stop 'internal: unknown integrator'
+    end select
+    pairing%offset = 2*part*dt
+    if (n > 0) pairing%held = -dt
+    if (.not. late) return
+    pairing%held = dt
+    ! the accelerations are known then: velocities are brought to the middle of the way
+    pairing%kick = part*dt
+    if (at_half_steps(integrator)) pairing%kick = merge(dt, dt/2, n > 0)
+  end function pairing_of
+
   !> Room for what the integrator carries from step to step.
   subroutine begin_memory(system, integrator)
     type(system_type), intent(inout) :: system
@@ -202,8 +246,10 @@ contains
         call correct(system, t, dt, start)
       end if
       call shift(start, system%memory)
-    case default
+    case ('runge_kutta')
       call runge_kutta(system, t, dt, start)
+    case default
+      error stop 'internal: unknown integrator'
     end select
   end subroutine advance
 

@@ -32,6 +32,8 @@ contains
     call archive%keep('broken bonds', system%broken)
     call archive%keep('dissipated energy', system%dissipated)
     call archive%keep('external work', system%external_work)
+    call archive%keep('dissipation due', system%dissipation_due)
+    call archive%keep('work due', system%work_due)
     call archive%keep('last place', system%last_u)
     call archive%keep('last force', system%last_force)
     call archive%keep('last velocity', system%last_v)

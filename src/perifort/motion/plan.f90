@@ -6,7 +6,8 @@ module pd_motion_plan
   use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type, is_set
   use pd_motion_relaxation, only: relaxation_type
-  use pd_motion_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, stable_step_of
+  use pd_motion_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
+    & stable_step_of, may_be_unstable, lowest_eigenvalue
   use pd_motion_system, only: system_type
   use pd_motion_time_step, only: stiffness_bound, stable_step, printed_step, book_step, &
     & chapter_stiffness, constant_stiffness, integrator_limit
@@ -29,6 +30,8 @@ module pd_motion_plan
     integer :: evaluations = 0         !! of the forces, that the largest frequency took
     real(wp) :: printed = 0.0_wp       !! 7.25 as printed [s], 0 if it has no value
     real(wp) :: book = 0.0_wp          !! the book's estimate sqrt(2 rho dx/(V_h c)) [s]
+    real(wp) :: lowest = 0.0_wp        !! < 0: the body is unstable as it stands, by this eigenvalue
+                                       !! of its stiffness over the largest one [-]
     type(relaxation_type) :: relaxation
   end type plan_type
 
@@ -53,6 +56,7 @@ contains
         & 'is the horizon''s ratio or length too small?')
       return
     end if
+    if (may_be_unstable(system)) call lowest_eigenvalue(system, plan%lowest)
     if (plan%relaxes) then
       call plan_relaxation(scene, system, bound, plan%relaxation)
       plan%steps = plan%relaxation%load_steps
@@ -133,10 +137,12 @@ contains
       do c = system%body%dim, 1, -1
         relaxation%mass(:, c) = safety*relaxation%mass(:, 1)/4
       end do
-    case default
+    case ('frame_invariant')
       do c = 1, system%body%dim
         relaxation%mass(:, c) = safety*bound/2
       end do
+    case default
+      error stop 'internal: unknown density matrix'
     end select
   end subroutine plan_relaxation
 

@@ -7,15 +7,18 @@
 !> it does not harm the value itself nor its residual (C. C. Paige, J. Inst. Maths Applics 18 (1976)
 !> 341).
 module pd_motion_spectrum
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i2, i4
   use pd_base_numbers, only: inner, noise, pi
+  use pd_body_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_family_lattice, only: lattice_family_type
   use pd_family_surface, only: bond_factor
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   implicit none (type, external)
   private
   public :: spectrum_type, largest_frequency, lasting_frequency, stable_step_of
+  public :: may_be_unstable, lowest_eigenvalue
 
   !> What was found.
   type :: spectrum_type
@@ -30,6 +33,13 @@ module pd_motion_spectrum
   integer, parameter :: most_evaluations = 2000  !! no body needs them but by a fault
   integer, parameter :: look_every = 8           !! evaluations between looks at the Ritz value
   integer, parameter :: seed = 20250829          !! of the start vector
+  !> Bodies have been found unstable from nu = -0.18 downwards (doc/extremes.md).
+  real(wp), parameter :: suspicious_ratio = -0.1_wp
+  !> An eigenvalue this far below 0, over the largest, is no rounding of a rigid motion's.
+  real(wp), parameter :: surely_negative = -1.0e-6_wp
+  !> Enough to find an eigenvalue below -1e-3 of the largest in a body of 1e8 components, with the
+  !> chance above.
+  integer, parameter :: stability_evaluations = 400
 
 contains
 
@@ -75,25 +85,151 @@ contains
   end subroutine largest_frequency
 
   !> A bound of the largest frequency that no breaking of bonds can exceed, however many and in
-  !> whatever order. `squared` is that of the stretches alone, without dilatation, which every
-  !> broken bond lowers, times the largest beta_k = 1 + m_k sum(Gd^2/Gb vc V/|xi|)/q_k: by the
-  !> inequality of Cauchy the dilatation's energy at k is at most beta_k - 1 times that of k's
-  !> stretches, whichever of its bonds are left. A negative a lowers the energy and counts as 0.
+  !> whatever order. By the inequality of Cauchy the dilatation's energy at k is at most beta_k - 1
+  !> times that of k's stretches, whichever of its bonds are left, so that the stretches alone, the
+  !> share of each point times its beta_k, have the larger energy, which every broken bond lowers.
+  !>
+  !> Where beta differs from material to material, it stands at each point. In bodies of one
+  !> material the largest beta is taken out of the sum instead: that costs at most a few per cent of
+  !> the step, and a lattice keeps the tables of its weights.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: accuracy
-    type(spectrum_type), intent(out) :: spectrum
+    real(wp), intent(in) :: accuracy               !! of omega^2, relative
+    type(spectrum_type), intent(out) :: spectrum   !! `squared` and `residual` of the bound
+    real(wp), parameter :: alike = 1.01_wp         !! one material's largest beta over another's
+    real(wp), allocatable :: share(:), largest(:)
     real(wp) :: beta
     logical :: dilatation
+    integer :: k
 
-    beta = largest_share(system)
+    call dilatation_shares(system, share)
+    allocate (largest(size(system%model%materials)), source=0.0_wp)
+    do k = 1, system%body%n_slots
+      if (system%body%point(k) == 0) cycle
+      associate (m => system%model%material(k))
+        largest(m) = max(largest(m), share(k))
+      end associate
+    end do
+    beta = maxval(largest)
     dilatation = system%model%dilatation
     system%model%dilatation = .false.
-    call largest_frequency(system, accuracy, spectrum)
+    if (beta > alike*minval(largest, mask=largest > 0.0_wp)) then
+      call stiffened_frequency(system, share, accuracy, spectrum)
+    else
+      call largest_frequency(system, accuracy, spectrum)
+      spectrum%squared = beta*spectrum%squared
+      spectrum%residual = beta*spectrum%residual
+    end if
     system%model%dilatation = dilatation
-    spectrum%squared = beta*spectrum%squared
-    spectrum%residual = beta*spectrum%residual
   end subroutine lasting_frequency
+
+  !> The largest frequency with the stiffness q of every slot times its `share`, rounded up by at
+  !> most half a per cent (by more where that makes too many materials): slots of one material and
+  !> of shares that are rounded to one number make a material of their own for the time of the
+  !> measurement, in which a lattice makes its weights anew in every pass.
+  subroutine stiffened_frequency(system, share, accuracy, spectrum)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: share(:)               !! at least 1 (n_slots) [-]
+    real(wp), intent(in) :: accuracy               !! of omega^2, relative
+    type(spectrum_type), intent(out) :: spectrum
+    integer, parameter :: most_materials = 30000   !! whose numbers have two bytes
+    real(wp) :: grain                              !! one rounded share over the next smaller one
+    type(material_type), allocatable :: materials(:), finer(:)
+    integer(i2), allocatable :: material(:)
+    integer(i4), allocatable :: tables(:)
+    integer, allocatable :: number(:, :)
+    integer :: k, g, n
+
+    call move_alloc(system%model%materials, materials)
+    grain = max(1.005_wp, maxval(share)**(real(size(materials), wp)/most_materials))
+    allocate (material, source=system%model%material)
+    allocate (number(size(materials), 0:grains(maxval(share))), source=0)
+    allocate (finer(size(number)))
+    n = 0
+    do k = 1, system%body%n_slots
+      g = grains(share(k))
+      associate (m => material(k))
+        if (number(m, g) == 0) then
+          n = n + 1
+          number(m, g) = n
+          finer(n) = materials(m)
+          finer(n)%q = materials(m)%q*grain**g
+        end if
+        system%model%material(k) = int(number(m, g), i2)
+      end associate
+    end do
+    system%model%materials = finer(:n)
+    select type (family => system%family)
+    type is (lattice_family_type)
+      tables = family%weights
+      family%weights = 0_i4
+    end select
+    call largest_frequency(system, accuracy, spectrum)
+    select type (family => system%family)
+    type is (lattice_family_type)
+      family%weights = tables
+    end select
+    system%model%material = material
+    deallocate (system%model%materials)
+    call move_alloc(materials, system%model%materials)
+
+  contains
+
+    !> The number of grains that a share is rounded up to.
+    pure integer function grains(value)
+      real(wp), intent(in) :: value
+      grains = ceiling(log(max(1.0_wp, value))/log(grain))
+    end function grains
+
+  end subroutine stiffened_frequency
+
+  !> Whether a body may be unstable as it stands, before any load: with a strongly negative
+  !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0.
+  pure logical function may_be_unstable(system)
+    type(system_type), intent(in) :: system
+    may_be_unstable = system%model%dilatation .and. system%model%surface .and. &
+      & any(system%model%materials%a < 0.0_wp .and. &
+      & system%model%materials%poissons_ratio < suspicious_ratio)
+  end function may_be_unstable
+
+  !> The lowest eigenvalue of the undeformed, unheated body's stiffness, its constrained components
+  !> held, over the largest one [-]; 0 unless it is surely negative. A Ritz value is never below the
+  !> lowest eigenvalue, so what is found negative is proved to be, and the search ends there: the
+  !> lowest eigenvalue may lie further down.
+  subroutine lowest_eigenvalue(system, lowest)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(out) :: lowest
+    real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :), u(:, :)
+    real(wp), allocatable :: diagonal(:), beside(:)
+    real(wp) :: length, top, bottom, last
+    integer :: m, free
+    logical :: thermal
+
+    lowest = 0.0_wp
+    call make_scale(system, scale, free)
+    if (free == 0) return
+    allocate (now, before, w, kw, mold=scale(:, :, 1))
+    allocate (diagonal(stability_evaluations), beside(stability_evaluations))
+    call move_alloc(system%state%u, u)
+    allocate (system%state%u, source=0.0_wp*u)
+    thermal = system%model%thermal
+    system%model%thermal = .false.
+    before = 0.0_wp
+    call random_start(system, scale(:, :, 1), now)
+    length = length_of(now)
+    do m = 1, stability_evaluations
+      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m))
+      length = beside(m)
+      if (length <= 1.0e-13_wp*maxval(abs(diagonal(:m)))) beside(m) = 0.0_wp
+      if (mod(m, look_every) /= 0 .and. beside(m) > 0.0_wp) cycle
+      call largest_ritz_value(diagonal(:m), beside(:m - 1), top, last)
+      call largest_ritz_value(-diagonal(:m), beside(:m - 1), bottom, last)
+      if (-bottom < surely_negative*top) lowest = -bottom/top
+      if (lowest < 0.0_wp .or. beside(m) <= 0.0_wp) exit
+    end do
+    system%model%thermal = thermal
+    call move_alloc(u, system%state%u)
+  end subroutine lowest_eigenvalue
 
   !> 2/omega [s], with the residual on the side of caution; huge if nothing vibrates.
   elemental real(wp) function stable_step_of(spectrum) result(step)
@@ -102,17 +238,18 @@ contains
     if (spectrum%squared > 0.0_wp) step = 2/sqrt(spectrum%squared + spectrum%residual)
   end function stable_step_of
 
-  !> beta of `lasting_frequency`.
-  real(wp) function largest_share(system) result(share)
+  !> beta_k = 1 + m_k sum(Gd^2/Gb vc V/|xi|)/q_k of every slot, 1 where there is no point. A
+  !> negative a lowers the energy and counts as 0.
+  subroutine dilatation_shares(system, beta)
     type(system_type), intent(in) :: system
+    real(wp), allocatable, intent(out) :: beta(:)   !! (n_slots) [-]
     type(bonds_type) :: bonds
     real(wp) :: sum_of_bonds, Gd, Gb, n(system%body%dim)
     integer :: k, i
 
-    share = 1.0_wp
+    allocate (beta(system%body%n_slots), source=1.0_wp)
     if (.not. system%model%dilatation) return
-    !$omp parallel default(none) shared(system) private(bonds, sum_of_bonds, Gd, Gb, n, k, i) &
-    !$omp reduction(max:share)
+    !$omp parallel default(none) shared(system, beta) private(bonds, sum_of_bonds, Gd, Gb, n, k, i)
     call allocate_bonds(system%family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, system%body%n_slots
@@ -133,11 +270,11 @@ contains
           end if
           sum_of_bonds = sum_of_bonds + Gd**2/Gb*bonds%weight(i)/bonds%length(i)
         end do
-        share = max(share, 1 + 2*material%a*material%t**2*sum_of_bonds/material%q)
+        beta(k) = 1 + 2*material%a*material%t**2*sum_of_bonds/material%q
       end associate
     end do
     !$omp end parallel
-  end function largest_share
+  end subroutine dilatation_shares
 
   !> u = scale(:, :, 1) y and, for the forces f = K u, A y = scale(:, :, 2) f; both 0 where nothing
   !> can move. `free` is how many components can.

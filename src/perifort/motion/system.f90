@@ -16,8 +16,8 @@ module pd_motion_system
   use pd_motion_watch, only: watch_type
   implicit none (type, external)
   private
-  public :: system_type, state_type, start_system, bring_temperature, evaluate, break_now, account, &
-    & energies_type, energies_of, add_loads, inverse_density, velocities_now
+  public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
+    & break_now, account, energies_type, energies_of, add_loads, inverse_density, velocities_now
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -41,6 +41,8 @@ module pd_motion_system
     integer(i8) :: broken = 0_i8                !! bonds broken during the run
     real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking [J]
     real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
+    real(wp) :: dissipation_due = 0.0_wp        !! parts of both that fall into the step to come,
+    real(wp) :: work_due = 0.0_wp               !! of bonds that broke after the last forces [J]
     real(wp), allocatable :: last_u(:)          !! work accounting: place, force and imposed
     real(wp), allocatable :: last_force(:)      !! velocity (0 of loads) of each component that
     real(wp), allocatable :: last_v(:)          !! does work, at the last step
@@ -50,6 +52,15 @@ module pd_motion_system
     type(watch_type) :: watch                   !! over the energies
     real(wp) :: stable_step = 0.0_wp            !! the integrator's limit, 0: unknown [s]
   end type system_type
+
+  !> The other instant in the products of stretches by which the energy of breaking bonds is counted
+  !> (doc/theory.md, 9): its displacements are u + offset (v + kick a), those of constrained
+  !> components their course's. The default, no offset, makes the products squares.
+  type :: pairing_type
+    real(wp) :: offset = 0.0_wp  !! from the present instant to the other one [s]
+    real(wp) :: kick = 0.0_wp    !! 0 where the accelerations a of the present are not known yet [s]
+    real(wp) :: held = 0.0_wp    !! the offset that the work of imposed motion implies [s]
+  end type pairing_type
 
   !> Energies at one instant [J].
   type :: energies_type
@@ -109,34 +120,38 @@ contains
   !> marks the strained slots, and only those are computed again. With `break_late` the bonds of
   !> this instant still pull and break thereafter, as in the book's programs: a bond then lives up
   !> to a step too long, an error of first order in the step; the other order errs both ways.
-  subroutine evaluate(system, t, breaking)
+  subroutine evaluate(system, t, breaking, pairing)
     type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: t
-    logical, intent(in) :: breaking
+    real(wp), intent(in) :: t                            !! of this instant [s]
+    logical, intent(in) :: breaking                      !! whether bonds may break
+    type(pairing_type), intent(in), optional :: pairing  !! for their energy; squares by default
     integer(i4), allocatable :: slots(:)
+    type(pairing_type) :: pair
     logical :: early, late
 
+    if (present(pairing)) pair = pairing
     early = breaking .and. system%model%breaking .and. .not. system%break_late
     late = breaking .and. system%model%breaking .and. system%break_late
+    if (late) call settle_account(system)
     associate (state => system%state, model => system%model)
       call impose(system%motions, t, state%u, state%v)
       call bring_temperature(system, t)
       if (model%dilatation) then
         call dilatation_pass(system%family, model, state%u, state%p, system%strained)
         if (early) then
-          call break_marked(system, slots)
+          call break_marked(system, t, pair, slots)
           call renew_dilatation(system, slots)
         end if
         call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
       else
         call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
         if (early) then
-          call break_marked(system, slots)
+          call break_marked(system, t, pair, slots)
           call renew_force(system, slots)
         end if
       end if
     end associate
-    if (late) call break_marked(system, slots)
+    if (late) call break_marked(system, t, pair, slots)
   end subroutine evaluate
 
   !> Bring the thermal strains to time `t`.
@@ -147,31 +162,111 @@ contains
   end subroutine bring_temperature
 
   !> Break every bond beyond its limit at the present displacements (relaxation, after a load step);
-  !> `number` is how many broke. Forces are not renewed.
+  !> `number` is how many broke. Forces are not renewed. What breaks at an equilibrium dissipates
+  !> its energy at fixed displacements.
   subroutine break_now(system, number)
     type(system_type), intent(inout) :: system
     integer(i8), intent(out) :: number
     integer(i4), allocatable :: slots(:)
 
     number = system%broken
-    if (system%model%breaking) call break_marked(system, slots)
+    if (system%model%breaking) call break_marked(system, 0.0_wp, pairing_type(), slots)
     number = system%broken - number
   end subroutine break_now
 
-  !> Break bonds of the marked slots and count what that costs; `slots` are those that lost some.
-  subroutine break_marked(system, slots)
+  !> Break bonds of the marked slots and count what that dissipates.
+  subroutine break_marked(system, t, pairing, slots)
     type(system_type), intent(inout) :: system
-    integer(i4), allocatable, intent(out) :: slots(:)
+    real(wp), intent(in) :: t                          !! of the present displacements [s]
+    type(pairing_type), intent(in) :: pairing
+    integer(i4), allocatable, intent(out) :: slots(:)  !! those that lost some
+    real(wp), allocatable :: others(:, :, :), products(:)
     real(wp) :: dissipated
     integer(i8) :: broken
 
     call strained_slots(system%strained, slots)
     if (size(slots) == 0) return
-    call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
-      & system%state%damage, broken, dissipated)
+    if (abs(pairing%offset) > 0.0_wp .or. abs(pairing%held) > 0.0_wp) then
+      call displacements_at(system, t, pairing, slots, others)
+      allocate (products(size(others, 3)))
+      call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
+        & system%state%damage, broken, dissipated, others, products)
+      ! what bonds that break after the forces still do, they do in the step to come
+      system%dissipation_due = products(1) - dissipated
+      ! the trapezoidal rule lets bonds pull at constrained points up to half a step before or after
+      ! the present, whatever the integrator does
+      if (size(products) > 1) system%work_due = products(1) - products(2)
+      if (.not. system%break_late) call settle_account(system)
+    else
+      call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
+        & system%state%damage, broken, dissipated)
+    end if
     system%broken = system%broken + broken
     system%dissipated = system%dissipated + dissipated
   end subroutine break_marked
+
+  !> Add what is due to the accounts.
+  pure subroutine settle_account(system)
+    type(system_type), intent(inout) :: system
+    system%dissipated = system%dissipated + system%dissipation_due
+    system%external_work = system%external_work + system%work_due
+    system%dissipation_due = 0.0_wp
+    system%work_due = 0.0_wp
+  end subroutine settle_account
+
+  !> Displacements of the other instant of a pairing; where the work of constrained components is
+  !> summed with another offset, these in a second set. They are made only where they are needed, at
+  !> `slots` and at the ends of their bonds: the rest of `others` is left as it is allocated, so
+  !> that a step in which few bonds break pays for these alone.
+  subroutine displacements_at(system, t, pairing, slots, others)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t                            !! of the present displacements [s]
+    type(pairing_type), intent(in) :: pairing
+    integer(i4), intent(in) :: slots(:)
+    real(wp), allocatable, intent(out) :: others(:, :, :)  !! (n_slots, dim, 1 or 2) [m]
+    real(wp), allocatable :: loads(:, :)
+    type(bonds_type) :: bonds
+    logical :: two
+    integer :: m, i
+
+    two = size(system%motions) > 0 .and. abs(pairing%offset - pairing%held) > 0.0_wp
+    allocate (others(size(system%state%u, 1), size(system%state%u, 2), merge(2, 1, two)))
+    if (abs(pairing%kick) > 0.0_wp .and. size(system%loads) > 0) then
+      allocate (loads(size(others, 1), size(others, 2)), source=0.0_wp)
+      call add_loads(system, t, 1.0_wp, .false., loads)
+    end if
+    call allocate_bonds(system%family, bonds)
+    do m = 1, size(slots)
+      call system%family%bonds_of(slots(m), bonds)
+      call fill(int(slots(m)))
+      do i = 1, bonds%n
+        call fill(int(bonds%j(i)))
+      end do
+    end do
+    if (abs(pairing%offset) > 0.0_wp) &
+      & call impose(system%motions, t + pairing%offset, others(:, :, 1))
+    if (two) call impose(system%motions, t + pairing%held, others(:, :, 2))
+
+  contains
+
+    !> One slot of `others`.
+    subroutine fill(k)
+      integer, intent(in) :: k
+      real(wp) :: v(size(others, 2))
+      integer :: o
+
+      v = system%state%v(k, :)
+      if (abs(pairing%kick) > 0.0_wp) then
+        v = v + pairing%kick*inverse_density(system%model, k)*system%state%force(k, :)
+        if (allocated(loads)) &
+          & v = v + pairing%kick*inverse_density(system%model, k)*loads(k, :)
+      end if
+      do o = 1, size(others, 3)
+        others(k, :, o) = system%state%u(k, :) + pairing%offset*v
+      end do
+    end subroutine fill
+
+  end subroutine displacements_at
 
   !> Dilatation of some slots again, after they lost bonds.
   subroutine renew_dilatation(system, slots)

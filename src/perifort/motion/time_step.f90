@@ -73,14 +73,14 @@ contains
     !$omp end parallel
   end subroutine stiffness_bound
 
-  !> Gd or Gb of the bond k-j along the unit vector n.
+  !> The size of Gd or Gb of the bond k-j along the unit vector n.
   pure real(wp) function factor(model, g, n, k, j)
     type(model_type), intent(in) :: model
     real(wp), allocatable, intent(in) :: g(:, :)
     real(wp), intent(in) :: n(:)
     integer, intent(in) :: k, j
     factor = 1.0_wp
-    if (model%surface) factor = bond_factor(n, g(k, :), g(j, :))
+    if (model%surface) factor = abs(bond_factor(n, g(k, :), g(j, :)))
   end function factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
@@ -247,7 +247,8 @@ contains
     case ('adams_bashforth'); limit = 0.72_wp
     case ('adams_moulton'); limit = 1.29_wp
     case ('runge_kutta'); limit = 2.83_wp
-    case default; limit = 2.0_wp
+    case ('forward_backward', 'velocity_verlet'); limit = 2.0_wp
+    case default; error stop 'internal: unknown integrator'
     end select
   end function integrator_limit
 
@@ -257,7 +258,8 @@ contains
     select case (integrator)
     case ('runge_kutta'); evaluations = 4
     case ('adams_moulton'); evaluations = 2
-    case default; evaluations = 1
+    case ('forward_backward', 'velocity_verlet', 'adams_bashforth'); evaluations = 1
+    case default; error stop 'internal: unknown integrator'
     end select
   end function evaluations
 

@@ -16,7 +16,7 @@ module pd_motion_watch
   !> 1/(1 - (omega dt/2)^2), which is 50 at 0.99 of the limit; beyond the limit it grows without
   !> end.
   real(wp), parameter :: too_much = 100.0_wp
-  !> More than the balance is off where many bonds break (doc/theory.md, 9).
+  !> More than the balance is off at any stable step, bonds that break included (doc/theory.md, 9).
   real(wp), parameter :: good = 1.1_wp
   integer, parameter :: kinetic_every = 10  !! steps from one look at the kinetic energy to the next
   integer, parameter :: all_every = 2000    !! steps without a look at all energies, at most

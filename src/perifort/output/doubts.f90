@@ -33,6 +33,11 @@ contains
       & ' points have no neighbour: nothing pulls at them', tell=.false.)
     if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &
       & 'the time step is above the stable one', tell=.false.)
+    if (plan%lowest < 0.0_wp) call warnings%add('unstable body', &
+      & 'the body is unstable before any load: its stiffness has an eigenvalue of '// &
+      & to_text(plan%lowest, 2)//' of the largest one. With a strongly negative '// &
+      & "poissons_ratio, surface_correction = '"//trim(scene%horizon%surface_correction)// &
+      & "' makes the dilatation of corners too strong; with 'none' it is not", tell=.false.)
     do i = 1, size(scene%regions)
       if (any(region_mask(scene, system%body, scene%regions(i)%name))) cycle
       call warnings%add('empty region '//to_text(i), 'the region '// &

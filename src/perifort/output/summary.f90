@@ -160,7 +160,7 @@ contains
     type(system_type), intent(in) :: system
     type(recorder_type), intent(in) :: recorder
     character(*), intent(in) :: directory
-    character(:), allocatable :: text
+    character(:), allocatable :: text, parts
     real(wp) :: balance, share
     integer :: steps
 
@@ -182,8 +182,12 @@ contains
       end if
       text = text//line('external work', with_unit(system%external_work, 'J'))
       call recorder%energy_balance(system, balance, share)
-      if (share >= 0.0_wp) text = text//line('energy balance', 'off by '// &
-        & with_unit(balance, 'J')//', '//to_text(100*share, 2)//' % of the energy')
+      if (share >= 0.0_wp) then
+        parts = to_text(100*share, 2)//' % of the energy'
+        if (abs(system%dissipated) > 0.0_wp) parts = parts//', '// &
+          & to_text(100*abs(balance/system%dissipated), 2)//' % of the dissipated energy'
+        text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '//parts)
+      end if
     end associate
     if (recorder%warnings%count() > 0) text = text//line('warnings', &
       & to_text(recorder%warnings%count())//', kept in warnings.txt')
