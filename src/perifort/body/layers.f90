@@ -18,8 +18,8 @@ module pd_body_layers
 
   real(wp), parameter :: same_place = 1.0e-6_wp  !! of faces [spacings]
 
-  !> What the columns of one layer came to; columns of bodies that the layer does not touch at all
-  !> are not counted.
+  !> How many columns of a side have the layer and why the others have none. Bodies without a column
+  !> that has it are not counted.
   type :: layer_count_type
     integer :: boundary = 0     !! number of the `&boundary` group
     integer :: columns = 0      !! columns that have the layer
@@ -34,8 +34,8 @@ module pd_body_layers
   type :: side_type
     type(grid_type) :: grid
     integer(i2) :: number = 0_i2       !! of the grid; 0: nothing is left of the body
-    integer(i2) :: material = 0_i2
-    integer :: body = 0
+    integer(i2) :: material = 0_i2     !! number of its material
+    integer :: body = 0                !! number of the body
     integer :: rows = 0                !! of the layer
     integer, allocatable :: top(:, :)  !! level of each column's outermost cell, or `nothing`
     logical, allocatable :: has(:, :)  !! whether the column gets the layer
@@ -250,7 +250,7 @@ contains
     type(side_type), intent(in) :: side, other
     integer, intent(in) :: dim, axis, outward
     logical, intent(inout) :: hidden(:, :)
-    real(wp) :: edge
+    real(wp) :: edge, face
     integer :: c(2), m, n, i, low(2), high(2)
 
     c = across(axis)
@@ -270,9 +270,10 @@ contains
         end do
         low = max(low, 1)
         high = min(high, shape(side%top))
+        face = face_of(other, axis, outward, other%top(m, n))
         do i = low(2), high(2)
           hidden(low(1):high(1), i) = hidden(low(1):high(1), i) .or. &
-            & face_below(side%top(low(1):high(1), i), face_of(other, axis, outward, other%top(m, n)))
+            & ends_below(side%top(low(1):high(1), i), face)
         end do
       end do
     end do
@@ -280,13 +281,13 @@ contains
   contains
 
     !> Whether columns with these levels end further in than `face`.
-    elemental logical function face_below(level, face) result(is_below)
+    elemental logical function ends_below(level, face) result(is_below)
       integer, intent(in) :: level
       real(wp), intent(in) :: face
       is_below = .false.
       if (level /= nothing) is_below = face_of(side, axis, outward, level) &
         & < face - same_place*side%grid%spacing
-    end function face_below
+    end function ends_below
   end subroutine hide
 
   !> The cells (3, n) of the layer at one side, x fastest, then y, then z.

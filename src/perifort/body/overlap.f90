@@ -12,13 +12,15 @@ module pd_body_overlap
   private
   public :: check_lattices
 
-  real(wp), parameter :: tolerance = 1.0e-6_wp  !! how deep a point may lie in another body [spacings]
+  real(wp), parameter :: tolerance = 1.0e-6_wp  !! depth that a point may have in another body
+                                                !! [spacings]
 
   !> The cells of one lattice body and its layers.
   type :: cells_type
     type(grid_type) :: grid
-    integer :: n = 0                             !! points
-    integer :: low(3) = huge(0), high(3) = -huge(0)
+    integer :: n = 0                             !! points of the body, a cloud's too
+    integer :: low(3) = huge(0)                  !! the box of cells around them
+    integer :: high(3) = -huge(0)
     integer(i4), allocatable :: point(:, :, :)   !! the point in each cell of the box, 0 for none
   end type cells_type
 

@@ -47,8 +47,8 @@ contains
     end do
   end subroutine warn_before
 
-  !> Warn of bodies that are bonded because points of both lie within one horizon: the first few pairs
-  !> one by one.
+  !> Warn of bodies that are bonded because points of both lie within one horizon: the first few
+  !> pairs one by one.
   subroutine warn_of_joints(scene, system, warnings)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
