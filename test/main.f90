@@ -17,7 +17,11 @@ program main
   use test_base_text, only: collect_base_text
   use test_base_version, only: collect_base_version
   use test_body_generate, only: collect_body_generate
+  use test_body_layers, only: collect_body_layers
+  use test_body_layers, only: collect_body_layers
   use test_body_material, only: collect_body_material
+  use test_body_overlap, only: collect_body_overlap
+  use test_body_overlap, only: collect_body_overlap
   use test_command_line, only: collect_command_line
   use test_driver, only: collect_driver
   use test_extremes_contrast, only: collect_extremes_contrast
@@ -27,6 +31,8 @@ program main
   use test_extremes_steps, only: collect_extremes_steps
   use test_family_cells, only: collect_family_cells
   use test_family_cracks, only: collect_family_cracks
+  use test_family_joints, only: collect_family_joints
+  use test_family_joints, only: collect_family_joints
   use test_family_lattice, only: collect_family_lattice
   use test_family_slabs, only: collect_family_slabs
   use test_family_surface, only: collect_family_surface
@@ -88,7 +94,9 @@ program main
   call register('base_text', collect_base_text)
   call register('base_version', collect_base_version)
   call register('body_generate', collect_body_generate)
+  call register('body_layers', collect_body_layers)
   call register('body_material', collect_body_material)
+  call register('body_overlap', collect_body_overlap)
   call register('command_line', collect_command_line)
   call register('driver', collect_driver)
   call register('extremes_contrast', collect_extremes_contrast)
@@ -98,6 +106,7 @@ program main
   call register('extremes_steps', collect_extremes_steps)
   call register('family_cells', collect_family_cells)
   call register('family_cracks', collect_family_cracks)
+  call register('family_joints', collect_family_joints)
   call register('family_lattice', collect_family_lattice)
   call register('family_slabs', collect_family_slabs)
   call register('family_surface', collect_family_surface)

@@ -3,7 +3,8 @@ module test_body_generate
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: body_type
-  use pd_body_generate, only: generate_body, layer_rows
+  use pd_body_generate, only: generate_body
+  use pd_body_layers, only: layer_rows
   use pd_scene_types, only: scene_type, body_group, boundary_group
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect, expect_true

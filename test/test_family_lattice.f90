@@ -292,8 +292,8 @@ contains
       & 'displacements by lattices and lists')
   end subroutine test_motion
 
-  !> On one grid two points would share a cell; on two grids they come too close, which is less than
-  !> half a spacing: with a little more the bodies are taken.
+  !> On one grid two points would share a cell; on two grids points lie in cells of the other body:
+  !> with less than half a cell in common the bodies are taken.
   subroutine test_overlap(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -308,7 +308,7 @@ contains
       scene%bodies(2)%upper(1) = scene%bodies(2)%upper(1) + shifts(i)*spacing
       ! the facing columns are shift - 6 apart
       if (i == size(shifts)) exit
-      call expect_refused(error, scene, [character(16) :: 'overlap', 'bodies 1 and 2'])
+      call expect_refused(error, scene, [character(16) :: 'overlap', 'body 1', 'body 2'])
     end do
     call ready(scene, set_up, error)
   end subroutine test_overlap

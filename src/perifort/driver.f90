@@ -15,6 +15,7 @@ module pd_driver
   use pd_body_body, only: body_type
   use pd_body_generate, only: generate_body, touch
   use pd_body_initial, only: initial_state
+  use pd_body_layers, only: layer_count_type, layer_count_text
   use pd_body_memory, only: any_critical, check_memory
   use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
   use pd_body_shapes, only: inside
@@ -233,6 +234,7 @@ contains
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)
     integer(i2), allocatable :: heated_by(:)
+    type(layer_count_type), allocatable :: layers(:)
     real(wp) :: delta
     integer(i8) :: cut
     integer :: lonely, i
@@ -241,8 +243,12 @@ contains
     if (allocated(error)) return
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
-      call generate_body(scene, system%body, delta, error)
+      call generate_body(scene, system%body, delta, error, layers)
       if (allocated(error)) return
+      do i = 1, size(layers)
+        if (layer_count_text(scene, layers(i)) /= '') call set_up%warnings%add('layer '// &
+          & to_text(i), layer_count_text(scene, layers(i)), tell=.false.)
+      end do
       materials = materials_of_scene(scene, delta)
       call timer%stop('points')
 

@@ -9,10 +9,12 @@ module pd_family_neighbours
   private
   public :: check_overlap
 
+  real(wp), parameter :: coincide = 1.0e-6_wp  !! distance of points that are one [spacings]
+
 contains
 
-  !> An error if two bodies overlap (centres closer than half a spacing) or two points coincide;
-  !> `isolated` is the number of points without any bond.
+  !> An error if two points coincide, of one body or of two; that lattices do not overlap has been
+  !> seen before (`pd_body_overlap`). `isolated` is the number of points without any bond.
   subroutine check_overlap(body, family, isolated, error)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
@@ -22,12 +24,11 @@ contains
     integer(i4), allocatable :: other(:)
     integer(i1), allocatable :: alone(:)
     integer :: k, i, j
-    real(wp) :: near
 
     isolated = 0
     allocate (other(body%n_slots), source=0_i4)
     allocate (alone(body%n_slots), source=0_i1)
-    !$omp parallel default(none) shared(body, family, other, alone) private(bonds, k, i, j, near)
+    !$omp parallel default(none) shared(body, family, other, alone) private(bonds, k, i, j)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
@@ -38,9 +39,7 @@ contains
       if (bonds%n == 0) alone(k) = 1_i1
       do i = 1, bonds%n
         j = bonds%j(i)
-        near = 1.0e-6_wp
-        if (body%body(j) /= body%body(k)) near = 0.5_wp
-        if (bonds%length(i) < near*(body%spacing(k) + body%spacing(j))/2) other(k) = int(j, i4)
+        if (bonds%length(i) < coincide*(body%spacing(k) + body%spacing(j))/2) other(k) = int(j, i4)
       end do
     end do
     !$omp end parallel
@@ -52,10 +51,9 @@ contains
     if (k == 0) return
     j = other(k)
     if (body%body(k) /= body%body(j)) then
-      call fail(error, 'bodies '//to_text(int(body%body(k)))//' and '// &
-        & to_text(int(body%body(j)))// &
-        & ' overlap: their points '//at(k)//' and '//at(j)//' are closer than half a spacing', &
-        & group='body', number=max(int(body%body(k)), int(body%body(j))))
+      call fail(error, 'points of bodies '//to_text(int(body%body(k)))//' and '// &
+        & to_text(int(body%body(j)))//' coincide: '//at(k)//' and '//at(j), group='body', &
+        & number=max(int(body%body(k)), int(body%body(j))))
     else
       call fail(error, 'two points of body '//to_text(int(body%body(k)))//' coincide: '//at(k)// &
         & ' and '//at(j), group='body', number=int(body%body(k)))

@@ -1,0 +1,388 @@
+!> Layers: the rows of points that `&boundary side` adds outside a side (doc/theory.md, 10).
+!>
+!> A layer continues the lattice of its body, column by column. Seen from the side, a column's layer
+!> starts outside the outermost cell that is left of it, if that cell lies within the horizon of the
+!> outermost cell of all columns.
+module pd_body_layers
+  use pd_base_kinds, only: wp, i2, i8
+  use pd_base_error, only: error_type
+  use pd_base_lookup, only: lookup_type, mix
+  use pd_base_text, only: to_text, with_unit
+  use pd_scene_rules, only: scene_fault
+  use pd_scene_types, only: scene_type
+  use pd_body_body, only: body_type, grid_type, allocate_points, append_points
+  use pd_body_lattices, only: lattice_grid, points_of_cells, cell_of
+  implicit none (type, external)
+  private
+  public :: add_layers, layer_rows, layer_count_type, layer_count_text
+
+  real(wp), parameter :: same_place = 1.0e-6_wp  !! of faces [spacings]
+
+  !> How many columns of a side have the layer and why the others have none. Bodies without a column
+  !> that has it are not counted.
+  type :: layer_count_type
+    integer :: boundary = 0     !! number of the `&boundary` group
+    integer :: columns = 0      !! columns that have the layer
+    integer :: farther_in = 0   !! columns that begin farther in than the horizon: no layer
+    integer :: empty = 0        !! columns of which nothing is left: no layer
+    integer :: covered = 0      !! columns with another body before them: no layer
+    integer :: shared = 0       !! points left out, because an earlier layer has their cell
+  end type layer_count_type
+
+  !> The side of one lattice body: what is left of each column. Levels are numbers of cells along
+  !> the axis, counted so that they grow outwards.
+  type :: side_type
+    type(grid_type) :: grid
+    integer(i2) :: number = 0_i2       !! of the grid; 0: nothing is left of the body
+    integer(i2) :: material = 0_i2     !! number of its material
+    integer :: body = 0                !! number of the body
+    integer :: rows = 0                !! of the layer
+    integer, allocatable :: top(:, :)  !! level of each column's outermost cell, or `nothing`
+    logical, allocatable :: has(:, :)  !! whether the column gets the layer
+  end type side_type
+
+  integer, parameter :: nothing = -huge(0)  !! level of a column of which nothing is left
+
+contains
+
+  !> Rows of a layer: 3 at a ratio of 3.015; 0 if the horizon is shorter than the spacing.
+  pure integer function layer_rows(delta, spacing) result(rows)
+    real(wp), intent(in) :: delta    !! horizon [m]
+    real(wp), intent(in) :: spacing  !! [m]
+    rows = floor(delta/spacing*(1 + 1.0e-9_wp))
+  end function layer_rows
+
+  !> Add the layers of all `&boundary side`, in the order of the groups. An error, with its place,
+  !> for a layer without a point.
+  subroutine add_layers(scene, delta, depth, body, counts, error)
+    type(scene_type), intent(in) :: scene
+    real(wp), intent(in) :: delta            !! horizon [m]
+    real(wp), intent(in) :: depth            !! what makes dx^dim a volume: thickness, area or 1
+    type(body_type), intent(inout) :: body   !! in point order, without layers
+    type(layer_count_type), allocatable, intent(out) :: counts(:)
+    type(error_type), allocatable, intent(out) :: error
+    type(lookup_type) :: claimed
+    integer(i2), allocatable :: owner(:)
+    type(body_type) :: layer
+    integer :: i, n_body
+
+    allocate (counts(count(scene%boundaries%side /= '')), owner(0))
+    n_body = body%n_points
+    counts%boundary = pack([(i, i=1, size(scene%boundaries))], scene%boundaries%side /= '')
+    do i = 1, size(counts)
+      call make_layer(scene, delta, depth, body, n_body, claimed, owner, counts(i), layer, error)
+      if (allocated(error)) return
+      call append_points(body, layer)
+    end do
+  end subroutine add_layers
+
+  !> The layer of one boundary.
+  subroutine make_layer(scene, delta, depth, body, n_body, claimed, owner, tally, layer, error)
+    type(scene_type), intent(in) :: scene
+    real(wp), intent(in) :: delta, depth
+    type(body_type), intent(in) :: body           !! its first `n_body` points are no layer
+    integer, intent(in) :: n_body
+    type(lookup_type), intent(inout) :: claimed   !! cells that layers have
+    integer(i2), allocatable, intent(inout) :: owner(:)  !! the boundary of each of these
+    type(layer_count_type), intent(inout) :: tally
+    type(body_type), intent(out) :: layer
+    type(error_type), allocatable, intent(out) :: error
+    type(side_type), allocatable :: sides(:)
+    type(body_type) :: part
+    integer, allocatable :: cells(:, :)
+    integer :: axis, outward, i, n
+
+    associate (boundary => scene%boundaries(tally%boundary))
+      axis = index('xyz', boundary%side(1:1))
+      outward = merge(-1, 1, boundary%side(3:5) == 'min')
+      call find_sides(scene, boundary%body, body, n_body, axis, outward, delta, sides)
+      call choose_columns(body%dim, axis, outward, delta, sides, tally)
+      call allocate_points(layer, body%dim, 0)
+      do i = 1, size(sides)
+        call cells_of_layer(sides(i), axis, outward, cells)
+        n = size(cells, 2)
+        call claim_cells(scene, tally%boundary, body, sides(i), claimed, owner, cells)
+        tally%shared = tally%shared + n - size(cells, 2)
+        call points_of_cells(body%dim, sides(i)%grid, cells, depth, part)
+        part%grid = sides(i)%number
+        part%body = int(sides(i)%body, i2)
+        part%material = sides(i)%material
+        part%layer = int(tally%boundary, i2)
+        call append_points(layer, part)
+      end do
+      if (layer%n_points > 0) return
+      call scene_fault(error, scene, 'boundary', tally%boundary, 'side', 'the layer at side '''// &
+        & trim(boundary%side)//''' joins no point', why_empty())
+    end associate
+
+  contains
+
+    !> What is wrong with a layer without points.
+    function why_empty() result(text)
+      character(:), allocatable :: text
+
+      if (size(sides) == 0) then
+        text = 'every point of the body was removed'
+      else if (all(sides%rows == 0)) then
+        text = 'the horizon of '//with_unit(delta, 'm')//' is shorter than the spacing of '// &
+          & with_unit(sides(1)%grid%spacing, 'm')
+      else
+        text = 'all its cells belong to the layers of earlier &boundary groups'
+      end if
+    end function why_empty
+  end subroutine make_layer
+
+  !> The sides of the bodies that a boundary names, or of all lattice bodies: those of which
+  !> something is left.
+  subroutine find_sides(scene, name, body, n_body, axis, outward, delta, sides)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: name       !! of the body, '' for all
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: n_body
+    integer, intent(in) :: axis, outward   !! 1, 2, 3; 1 or -1
+    real(wp), intent(in) :: delta
+    type(side_type), allocatable, intent(out) :: sides(:)
+    type(side_type) :: all_sides(size(scene%bodies))
+    integer :: b, c(2), k, cell(3), points(3)
+
+    c = across(axis)
+    do k = 1, n_body
+      b = body%body(k)
+      if (body%grid(k) == 0) cycle
+      if (name /= '' .and. scene%bodies(b)%name /= name) cycle
+      associate (side => all_sides(b))
+        if (side%number == 0_i2) then
+          side%number = body%grid(k)
+          side%material = body%material(k)
+          side%body = b
+          side%grid = lattice_grid(scene%bodies(b), body%dim)
+          side%rows = layer_rows(delta, side%grid%spacing)
+          points = 1
+          points(:body%dim) = scene%bodies(b)%points(:body%dim)
+          allocate (side%top(points(c(1)), points(c(2))), source=nothing)
+          allocate (side%has(points(c(1)), points(c(2))), source=.false.)
+        end if
+        cell = cell_of(side%grid, body%x(k, :))
+        side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), outward*cell(axis))
+      end associate
+    end do
+    sides = pack(all_sides, all_sides%number /= 0_i2)
+  end subroutine find_sides
+
+  !> The axes across an axis, in ascending order.
+  pure function across(axis)
+    integer, intent(in) :: axis
+    integer :: across(2)
+    across = pack([1, 2, 3], [1, 2, 3] /= axis)
+  end function across
+
+  !> Mark the columns that get the layer, and count.
+  subroutine choose_columns(dim, axis, outward, delta, sides, tally)
+    integer, intent(in) :: dim, axis, outward
+    real(wp), intent(in) :: delta
+    type(side_type), intent(inout) :: sides(:)
+    type(layer_count_type), intent(inout) :: tally
+    logical, allocatable :: hidden(:, :)
+    real(wp) :: outer(size(sides)), outermost
+    integer :: i, j
+
+    do i = 1, size(sides)
+      outer(i) = face_of(sides(i), axis, outward, maxval(sides(i)%top))
+    end do
+    outermost = maxval(outer)
+    do i = 1, size(sides)
+      associate (side => sides(i), h => sides(i)%grid%spacing)
+        allocate (hidden(size(side%top, 1), size(side%top, 2)), source=.false.)
+        do j = 1, size(sides)
+          if (j == i .or. outermost - outer(i) > delta + same_place*h) cycle
+          ! flat sides at one level, the usual case, hide nothing of each other
+          if (outer(j) <= face_of(side, axis, outward, minval(side%top, &
+            & mask=side%top /= nothing)) + same_place*h) cycle
+          call hide(side, sides(j), dim, axis, outward, hidden)
+        end do
+        call mark(side, hidden)
+        deallocate (hidden)
+      end associate
+    end do
+  contains
+
+    !> Mark the columns of one side that get the layer, and count.
+    subroutine mark(side, hidden)
+      type(side_type), intent(inout) :: side
+      logical, intent(in) :: hidden(:, :)
+      integer :: m, n, farther, empty, covered
+
+      farther = 0
+      empty = 0
+      covered = 0
+      do n = 1, size(side%top, 2)
+        do m = 1, size(side%top, 1)
+          if (side%top(m, n) == nothing) then
+            empty = empty + 1
+          else if (hidden(m, n)) then
+            covered = covered + 1
+          else if (outermost - face_of(side, axis, outward, side%top(m, n)) &
+            & > delta + same_place*side%grid%spacing) then
+            farther = farther + 1
+          else
+            side%has(m, n) = .true.
+          end if
+        end do
+      end do
+      if (.not. any(side%has)) return
+      tally%columns = tally%columns + count(side%has)
+      tally%farther_in = tally%farther_in + farther
+      tally%empty = tally%empty + empty
+      tally%covered = tally%covered + covered
+    end subroutine mark
+  end subroutine choose_columns
+
+  !> How far out the outer face of a level lies [m].
+  pure real(wp) function face_of(side, axis, outward, level) result(face)
+    type(side_type), intent(in) :: side
+    integer, intent(in) :: axis, outward, level
+    face = outward*side%grid%origin(axis) + (level + merge(1, 0, outward < 0)) &
+      & *side%grid%spacing
+  end function face_of
+
+  !> Mark the columns of a side before which cells of `other` stand, seen from outside.
+  subroutine hide(side, other, dim, axis, outward, hidden)
+    type(side_type), intent(in) :: side, other
+    integer, intent(in) :: dim, axis, outward
+    logical, intent(inout) :: hidden(:, :)
+    real(wp) :: edge, face
+    integer :: c(2), m, n, i, low(2), high(2)
+
+    c = across(axis)
+    do n = 1, size(other%top, 2)
+      do m = 1, size(other%top, 1)
+        if (other%top(m, n) == nothing) cycle
+        ! the columns that this one overlaps by more than rounding
+        low = 1
+        high = 1
+        do i = 1, 2
+          if (c(i) > dim) cycle
+          edge = (other%grid%origin(c(i)) - side%grid%origin(c(i)) &
+            & + (merge(m, n, i == 1) - 1)*other%grid%spacing)/side%grid%spacing
+          low(i) = floor(max(-1.0_wp, min(edge, size(side%top, i) + 1.0_wp)) + same_place) + 1
+          edge = edge + other%grid%spacing/side%grid%spacing
+          high(i) = ceiling(max(-1.0_wp, min(edge, size(side%top, i) + 1.0_wp)) - same_place)
+        end do
+        low = max(low, 1)
+        high = min(high, shape(side%top))
+        face = face_of(other, axis, outward, other%top(m, n))
+        do i = low(2), high(2)
+          hidden(low(1):high(1), i) = hidden(low(1):high(1), i) .or. &
+            & ends_below(side%top(low(1):high(1), i), face)
+        end do
+      end do
+    end do
+
+  contains
+
+    !> Whether columns with these levels end further in than `face`.
+    elemental logical function ends_below(level, face) result(is_below)
+      integer, intent(in) :: level
+      real(wp), intent(in) :: face
+      is_below = .false.
+      if (level /= nothing) is_below = face_of(side, axis, outward, level) &
+        & < face - same_place*side%grid%spacing
+    end function ends_below
+  end subroutine hide
+
+  !> The cells (3, n) of the layer at one side, x fastest, then y, then z.
+  pure subroutine cells_of_layer(side, axis, outward, cells)
+    type(side_type), intent(in) :: side
+    integer, intent(in) :: axis, outward
+    integer, allocatable, intent(out) :: cells(:, :)
+    integer :: low(3), high(3), c(2), i, j, k, n, level, pass, at(3)
+
+    c = across(axis)
+    low = 1
+    high(c) = shape(side%top)
+    allocate (cells(3, 0))
+    if (.not. any(side%has)) return
+    low(axis) = minval(side%top, mask=side%has) + 1
+    high(axis) = maxval(side%top, mask=side%has) + side%rows
+    if (outward < 0) then
+      level = low(axis)
+      low(axis) = -high(axis)
+      high(axis) = -level
+    end if
+    do pass = 1, 2
+      n = 0
+      do k = low(3), high(3)
+        do j = low(2), high(2)
+          do i = low(1), high(1)
+            at = [i, j, k]
+            associate (top => side%top(at(c(1)), at(c(2))))
+              level = outward*at(axis)
+              if (level <= top .or. level > top + side%rows) cycle
+              if (.not. side%has(at(c(1)), at(c(2)))) cycle
+            end associate
+            n = n + 1
+            if (pass == 2) cells(:, n) = at
+          end do
+        end do
+      end do
+      if (pass == 1) then
+        deallocate (cells)
+        allocate (cells(3, n))
+      end if
+    end do
+  end subroutine cells_of_layer
+
+  !> Where the corner between two sides is cut or round, both layers reach for the same cells: the
+  !> earlier one has them. Two layers at one side, or of different bodies, must not meet like that;
+  !> there the cells remain, and are found to overlap.
+  subroutine claim_cells(scene, boundary, body, side, claimed, owner, cells)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: boundary
+    type(body_type), intent(in) :: body
+    type(side_type), intent(in) :: side
+    type(lookup_type), intent(inout) :: claimed
+    integer(i2), allocatable, intent(inout) :: owner(:)
+    integer, allocatable, intent(inout) :: cells(:, :)
+    logical :: mine(size(cells, 2)), is_new
+    integer :: n, number, shift(3)
+    integer(i8) :: key
+
+    ! the numbers of cells count from the body's corner, bodies of one grid from different ones
+    shift = nint((side%grid%origin - body%grids(side%number)%origin)/side%grid%spacing)
+    mine = .true.
+    do n = 1, size(cells, 2)
+      key = mix(mix(mix(int(side%number, i8), int(cells(1, n) + shift(1), i8)), &
+        & int(cells(2, n) + shift(2), i8)), int(cells(3, n) + shift(3), i8))
+      call claimed%number_of(key, number, is_new)
+      if (is_new) then
+        if (number > size(owner)) owner = [owner, spread(0_i2, 1, max(1024, number))]
+        owner(number) = int(boundary, i2)
+      else
+        associate (earlier => scene%boundaries(owner(number)), this => scene%boundaries(boundary))
+          mine(n) = earlier%body /= this%body .or. earlier%side(1:1) == this%side(1:1)
+        end associate
+      end if
+    end do
+    cells = reshape(pack(cells, spread(mine, 1, 3)), [3, count(mine)])
+  end subroutine claim_cells
+
+  !> What the user reads of a layer that does not cover its side; '' if it does.
+  function layer_count_text(scene, tally) result(text)
+    type(scene_type), intent(in) :: scene
+    type(layer_count_type), intent(in) :: tally
+    character(:), allocatable :: text
+
+    text = ''
+    if (tally%farther_in + tally%empty + tally%covered + tally%shared == 0) return
+    text = 'the layer of &boundary number '//to_text(tally%boundary)//' ('// &
+      & trim(scene%boundaries(tally%boundary)%side)//') stands on '//to_text(tally%columns)// &
+      & ' of '//to_text(tally%columns + tally%farther_in + tally%empty + tally%covered)//' columns'
+    if (tally%farther_in > 0) text = text//'; '//to_text(tally%farther_in)// &
+      & ' begin farther in than the horizon'
+    if (tally%empty > 0) text = text//'; '//to_text(tally%empty)//' hold no point'
+    if (tally%covered > 0) text = text//'; '//to_text(tally%covered)//' lie behind another body'
+    if (tally%shared > 0) text = text//'; an earlier layer has '//to_text(tally%shared)// &
+      & ' of its points'
+  end function layer_count_text
+
+end module pd_body_layers

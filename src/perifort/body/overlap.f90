@@ -1,0 +1,243 @@
+!> Bodies and layers that overlap: found by the arithmetic of their grids, in time linear in the
+!> number of points.
+module pd_body_overlap
+  use pd_base_kinds, only: wp, i4
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text
+  use pd_scene_rules, only: scene_fault
+  use pd_scene_types, only: scene_type
+  use pd_body_body, only: body_type, grid_type
+  use pd_body_lattices, only: lattice_grid, cell_of
+  implicit none (type, external)
+  private
+  public :: check_lattices
+
+  real(wp), parameter :: tolerance = 1.0e-6_wp  !! depth that a point may have in another body
+                                                !! [spacings]
+
+  !> The cells of one lattice body and its layers.
+  type :: cells_type
+    type(grid_type) :: grid
+    integer :: n = 0                             !! points of the body, a cloud's too
+    integer :: low(3) = huge(0)                  !! the box of cells around them
+    integer :: high(3) = -huge(0)
+    integer(i4), allocatable :: point(:, :, :)   !! the point in each cell of the box, 0 for none
+  end type cells_type
+
+contains
+
+  !> An error if a point of one lattice body or of its layers lies in another one by more than
+  !> `tolerance`, if two layers of one body share a cell, or if a point of a cloud lies in a cell of
+  !> a layer. A body is the union of the cells that are left of it: a point on the face between two
+  !> of its cells lies in it, a point on its surface does not.
+  subroutine check_lattices(scene, body, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body          !! in point order
+    type(error_type), allocatable, intent(out) :: error
+    type(cells_type), allocatable :: bodies(:)
+    integer, allocatable :: first(:), order(:)
+    logical, allocatable :: layered(:)
+    integer :: a, b, k
+
+    if (size(scene%bodies) == 1 .and. count(scene%boundaries%side /= '') < 2) return
+    allocate (bodies(size(scene%bodies)), layered(size(scene%bodies)))
+    layered = .false.
+    do b = 1, size(bodies)
+      if (scene%bodies(b)%file == '') bodies(b)%grid = lattice_grid(scene%bodies(b), body%dim)
+    end do
+    do k = 1, body%n_points
+      associate (one => bodies(body%body(k)))
+        one%n = one%n + 1
+        if (body%layer(k) > 0) layered(body%body(k)) = .true.
+        if (body%grid(k) == 0) cycle
+        one%low = min(one%low, cell_of(one%grid, body%x(k, :)))
+        one%high = max(one%high, cell_of(one%grid, body%x(k, :)))
+      end associate
+    end do
+    call sort_by_body(body, bodies%n, first, order)
+    do b = 1, size(bodies)
+      if (any(bodies(b)%low > bodies(b)%high)) cycle
+      do a = 1, size(bodies)
+        if (a == b .and. .not. layered(b)) cycle
+        if (bodies(a)%n == 0 .or. .not. meet(a, b)) cycle
+        if (.not. allocated(bodies(b)%point)) call place_points(scene, body, &
+          & order(first(b):first(b + 1) - 1), bodies(b), error)
+        if (allocated(error)) return
+        if (a /= b) call look_for_points(scene, body, order(first(a):first(a + 1) - 1), bodies(b), &
+          & error)
+        if (allocated(error)) return
+      end do
+      if (allocated(bodies(b)%point)) deallocate (bodies(b)%point)
+    end do
+
+  contains
+
+    !> Whether points of body `a` may lie in the box around body `b`.
+    pure logical function meet(a, b)
+      integer, intent(in) :: a, b
+      integer :: c
+
+      meet = .true.
+      ! clouds matter to layers only
+      if (scene%bodies(a)%file /= '') then
+        meet = layered(b)
+        return
+      end if
+      associate (one => bodies(a), other => bodies(b))
+        do c = 1, body%dim
+          meet = meet .and. centre(one%grid, c, one%low(c)) < centre(other%grid, c, &
+            & other%high(c) + 1) .and. centre(one%grid, c, one%high(c)) > centre(other%grid, c, &
+            & other%low(c) - 1)
+        end do
+      end associate
+    end function meet
+
+    !> Where a cell lies along axis `c` [m].
+    pure real(wp) function centre(grid, c, cell)
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: c, cell
+      centre = grid%origin(c) + (cell - 0.5_wp)*grid%spacing
+    end function centre
+  end subroutine check_lattices
+
+  !> The points of each body, layers included: `order(first(b):first(b + 1) - 1)`.
+  pure subroutine sort_by_body(body, number, first, order)
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: number(:)                 !! points of each body
+    integer, allocatable, intent(out) :: first(:), order(:)
+    integer :: next(size(number)), b, k
+
+    allocate (first(size(number) + 1), order(body%n_points))
+    first(1) = 1
+    do b = 1, size(number)
+      first(b + 1) = first(b) + number(b)
+    end do
+    next = first(:size(number))
+    do k = 1, body%n_points
+      b = body%body(k)
+      order(next(b)) = k
+      next(b) = next(b) + 1
+    end do
+  end subroutine sort_by_body
+
+  !> Put the points of one body into its cells; an error if two of them share one.
+  subroutine place_points(scene, body, points, cells, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: points(:)
+    type(cells_type), intent(inout) :: cells
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i, at(3)
+
+    associate (low => cells%low, high => cells%high)
+      allocate (cells%point(low(1):high(1), low(2):high(2), low(3):high(3)), source=0_i4)
+    end associate
+    do i = 1, size(points)
+      at = cell_of(cells%grid, body%x(points(i), :))
+      associate (there => cells%point(at(1), at(2), at(3)))
+        if (there > 0_i4) then
+          call report(scene, body, int(there), points(i), error)
+          return
+        end if
+        there = int(points(i), i4)
+      end associate
+    end do
+  end subroutine place_points
+
+  !> An error if one of these points of another body lies in the cells; points of clouds must not
+  !> lie in those of layers.
+  subroutine look_for_points(scene, body, points, cells, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: points(:)
+    type(cells_type), intent(in) :: cells
+    type(error_type), allocatable, intent(out) :: error
+    real(wp) :: place
+    integer :: i, c, low(3), high(3), inside, corners, other, x, y, z
+
+    low = 1
+    high = 1
+    do i = 1, size(points)
+      do c = 1, body%dim
+        place = (body%x(points(i), c) - cells%grid%origin(c))/cells%grid%spacing
+        if (place < cells%low(c) - 1.0_wp .or. place > cells%high(c)) exit
+        low(c) = floor(place - tolerance) + 1
+        high(c) = floor(place + tolerance) + 1
+        if (low(c) < cells%low(c) .or. high(c) > cells%high(c)) exit
+      end do
+      if (c <= body%dim) cycle
+      ! of the cells around the point, one or, where it lies on their faces, several, more than half
+      ! must be there: a point on the surface has half of them
+      inside = 0
+      corners = 0
+      other = 0
+      do z = low(3), high(3)
+        do y = low(2), high(2)
+          do x = low(1), high(1)
+            corners = corners + 1
+            if (cells%point(x, y, z) == 0_i4) cycle
+            if (body%grid(points(i)) == 0) then
+              if (body%layer(cells%point(x, y, z)) == 0) cycle
+            end if
+            inside = inside + 1
+            other = cells%point(x, y, z)
+          end do
+        end do
+      end do
+      if (2*inside <= corners) cycle
+      call report(scene, body, other, points(i), error)
+      return
+    end do
+  end subroutine look_for_points
+
+  !> Two points whose bodies or layers overlap.
+  subroutine report(scene, body, k, j, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: k                         !! the point whose cell it is
+    integer, intent(in) :: j                         !! the point that lies in it
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: group
+    integer :: number
+
+    if (body%layer(k) > 0 .or. body%layer(j) > 0) then
+      group = 'boundary'
+      number = max(int(body%layer(k)), int(body%layer(j)))
+    else
+      group = 'body'
+      number = max(int(body%body(k)), int(body%body(j)))
+    end if
+    call scene_fault(error, scene, group, number, merge('side ', 'lower', group == 'boundary'), &
+      & owner(k)//' and '//owner(j)//' overlap', 'point '//at(j)//' of the second lies in the '// &
+      & 'cell of point '//at(k)//' of the first')
+
+  contains
+
+    !> The body or layer that a point belongs to.
+    function owner(s) result(text)
+      integer, intent(in) :: s
+      character(:), allocatable :: text
+
+      associate (b => int(body%body(s)))
+        text = 'body '//to_text(b)
+        if (scene%bodies(b)%name /= '') text = text//" '"//trim(scene%bodies(b)%name)//"'"
+      end associate
+      if (body%layer(s) > 0) text = 'the layer of &boundary number '// &
+        & to_text(int(body%layer(s)))//' ('//trim(scene%boundaries(body%layer(s))%side)// &
+        & ') at '//text
+    end function owner
+
+    !> A point's number and position.
+    pure function at(s) result(text)
+      integer, intent(in) :: s
+      character(:), allocatable :: text
+      integer :: c
+      text = to_text(s)//' ('//to_text(body%x(s, 1))
+      do c = 2, body%dim
+        text = text//', '//to_text(body%x(s, c))
+      end do
+      text = text//')'
+    end function at
+  end subroutine report
+
+end module pd_body_overlap
