@@ -507,8 +507,8 @@ contains
     call expect_true(error, .not. file_exists(kept), 'warnings of an earlier run')
   end subroutine test_warnings
 
-  !> A plate that flies and turns by 20 degrees in a course of 12 steps: told once with the projected
-  !> dilatation, and not with the other one, without a dilatation, or of a plate that is stretched.
+  !> A plate that flies and turns by 20 degrees in 12 steps: told once with the projected form,
+  !> and not with the other one, without a dilatation, or of a plate that is stretched.
   subroutine test_rotation(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: kept = here//'/rotation/warnings.txt'

@@ -195,9 +195,10 @@ contains
   !> -dE/du = V f with Lambda = 1 (unprojected). Central differences of step h have an error of h^2
   !> times the third derivative and eps/h times the energy: 1e-7 of the largest force at
   !> h = 1e-5 spacings. Surface factors and several materials included, breaking not. Strains of up
-  !> to some 8 % with temperatures, which take the general formulas, and without, where the two ranges
-  !> of the fast ones and the general ones serve some bonds each; and of up to 1 %, for the narrow
-  !> range. In single precision a force is off by 1e-7 of that of a bond, some 1e-6 of the largest.
+  !> to some 8 % with temperatures, which take the general formulas, and without, where the two
+  !> ranges of the fast ones and the general ones serve some bonds each; and of up to 1 %, for the
+  !> narrow range. In single precision a force is off by 1e-7 of that of a bond, some 1e-6 of the
+  !> largest.
   subroutine test_gradient(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject

@@ -149,10 +149,10 @@ contains
     end do
   end subroutine test_projected
 
-  !> Bodies that are strained by 1e-5 and lie elsewhere by up to ten lengths of the body, against the
-  !> theory point by point in double precision. A bond's stretch is off by some roundings of 6e-8 of
-  !> itself, and by 2^-46 (|u_k| + |u_j|)/|xi|: at 110 spacings 3e-12, 3e-7 of the strain. Net forces
-  !> are sums of up to 120 bonds, of either sign.
+  !> Bodies that are strained by 1e-5 and moved by up to ten lengths of the body, against the theory
+  !> point by point in double precision. A bond is off by some roundings of 6e-8 of its stretch,
+  !> and by 2^-46 (|u_k| + |u_j|)/|xi|: at 110 spacings 3e-12, 3e-7 of the strain. Net forces are
+  !> sums of up to 120 bonds, of either sign.
   subroutine test_moved(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: lengths(*) = [0.0_wp, 1.0_wp, -1.0_wp, 10.0_wp]
@@ -194,8 +194,8 @@ contains
   end subroutine test_moved
 
   !> A body with a large dilatational stiffness that vibrates and turns three times as a whole. With
-  !> Lambda = 1 the force is the gradient of the energy, which then swings with the step and does not
-  !> drift: the means of the first and the last quarter differ by what a beat of some vibrations
+  !> Lambda = 1 the force is the gradient of the energy, which then swings with the step and does
+  !> not drift: the means of the first and the last quarter differ by what a beat of some vibrations
   !> leaves of the swing. The projected dilatation takes and gives energy at every turn.
   subroutine test_spinning(error)
     type(error_type), allocatable, intent(out) :: error

@@ -226,8 +226,9 @@ contains
     end do
   end subroutine test_continuous
 
-  !> A deformed body's tangent is a difference of forces, for which bonds in single precision have too
-  !> few digits. In mixed precision it is that of double precision, but for weights rounded to 6e-8.
+  !> A deformed body's tangent is a difference of forces, for which bonds in single precision have
+  !> too few digits. In mixed precision it is that of double precision, but for weights rounded to
+  !> 6e-8.
   subroutine test_mixed(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -264,7 +265,8 @@ contains
     end do
   end subroutine test_mixed
 
-  !> Values of slots, point by point: blocks in mixed precision are longer, and so are rows of slots.
+  !> Values of slots, point by point: blocks in mixed precision are longer, and rows of slots with
+  !> them.
   pure function in_point_order(system, values) result(ordered)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: values(:, :)

@@ -10,7 +10,7 @@ module pd_force_fast
   use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &
     & w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, k0, k1, k2, k3, k4, k5, &
-    & g0, g1, g2, g3, g4, g5, g6, g7, v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10, &
+    & g0, g1, g2, g3, g4, g5, g6, g7, v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10, v11, &
     & s0, s1, s2, s3, s4, s5
   use pd_force_singles, only: unit
   implicit none (type, external)

@@ -18,7 +18,7 @@ module pd_force_polynomial
   public :: w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11
   public :: k0, k1, k2, k3, k4, k5
   public :: g0, g1, g2, g3, g4, g5, g6, g7
-  public :: v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10
+  public :: v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10, v11
   public :: s0, s1, s2, s3, s4, s5
 
   !> Ranges of e: the first is tried first; what is strained more gets more terms.
@@ -44,13 +44,13 @@ module pd_force_polynomial
 
   !> |e| <= 0.02, relative error 2e-17.
   real(wp), parameter :: g0 = 0.5_wp, g1 = -0.125_wp, g2 = 0.06250000000002183_wp, &
-    & g3 = -0.039062500000018555_wp, g4 = 0.027343749017680315_wp, g5 = -0.02050781166501785_wp, &
+    & g3 = -0.039062500000018555_wp, g4 = 0.027343749017680316_wp, g5 = -0.02050781166501785_wp, &
     & g6 = 0.016119829433608308_wp, g7 = -0.013097607025781758_wp
-  !> |e| <= 0.1, relative error 6e-16.
-  real(wp), parameter :: v0 = 0.5_wp, v1 = -0.125_wp, v2 = 0.0625_wp, &
-    & v3 = -0.039062499997491983_wp, v4 = 0.027343749997780681_wp, v5 = -0.020507815842040824_wp, &
-    & v6 = 0.016113284207307587_wp, v7 = -0.013090839808530029_wp, v8 = 0.010908971284196539_wp, &
-    & v9 = -0.0094330929113227606_wp, v10 = 0.0081501388225913871_wp
+  !> |e| <= 0.1, relative error 3e-17.
+  real(wp), parameter :: v0 = 0.5_wp, v1 = -0.125_wp, v2 = 0.06250000000000124_wp, &
+    & v3 = -0.0390625000000011_wp, v4 = 0.027343749993823777_wp, v5 = -0.02050781249448386_wp, &
+    & v6 = 0.016113286186807907_wp, v7 = -0.013092045424756286_wp, v8 = 0.010908654452264042_wp, &
+    & v9 = -0.009272296833520361_wp, v10 = 0.008165984417340112_wp, v11 = -0.007148068075048751_wp
   !> |e| <= 0.1 in single precision, relative error 4e-9 before rounding.
   real(sp), parameter :: s0 = 0.5_sp, s1 = -0.125_sp, s2 = 0.06249979721_sp, &
     & s3 = -0.03906233518_sp, s4 = 0.02750584349_sp, s5 = -0.02063954964_sp
