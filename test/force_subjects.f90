@@ -46,6 +46,7 @@ module force_subjects
     logical :: crack = .false.
     logical :: breaking = .false.
     integer :: rule = volume_linear
+    integer(i8) :: key_bits = not(0_i8)      !! lattices: bits of keys that count
     type(body_type) :: body
     class(family_type), allocatable :: family
     type(model_type) :: model
@@ -54,11 +55,12 @@ module force_subjects
 contains
 
   !> The one place that knows the kinds of families.
-  subroutine build_family(kind, body, rule, breakable, family)
+  subroutine build_family(kind, body, rule, breakable, key_bits, family)
     character(*), intent(in) :: kind
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
     logical, intent(in) :: breakable
+    integer(i8), intent(in) :: key_bits
     class(family_type), allocatable, intent(out) :: family
     type(list_family_type), allocatable :: list
     type(lattice_family_type), allocatable :: lattice
@@ -71,7 +73,7 @@ contains
       call move_alloc(list, family)
     case default
       allocate (lattice)
-      call new_lattice_family(body, rule, breakable, kind == 'mixed', lattice, fault)
+      call new_lattice_family(body, rule, breakable, kind == 'mixed', lattice, fault, key_bits)
       call move_alloc(lattice, family)
     end select
   end subroutine build_family
@@ -153,7 +155,7 @@ contains
         call keep_points(body, keep)
       end if
       call build_family(subject%kind, body, volume_rule_type(subject%rule, delta), &
-        & subject%crack .or. subject%breaking, subject%family)
+        & subject%crack .or. subject%breaking, subject%key_bits, subject%family)
       allocate (temperature_change(body%n_slots), source=0.0_wp)
       if (subject%thermal) then
         do i = 1, body%n_slots
@@ -195,21 +197,22 @@ contains
     if (dim == 1) depth = 3.0e-4_wp
   end function depth
 
-  !> The subjects: every dimension with every term alone and with all of them, and a bar with energy
-  !> of dilatation. `number` counts on until `there` is false.
+  !> The subjects: every dimension with every term alone and with all of them, and bars with energy
+  !> of dilatation, of both kinds. `number` counts on until `there` is false.
   subroutine subject_number(kind, number, subject, there)
     character(*), intent(in) :: kind
     integer, intent(in) :: number
     type(subject_type), intent(out) :: subject
     logical, intent(out) :: there
-    integer, parameter :: variants = 14
+    integer, parameter :: variants = 16
 
-    there = number <= 3*variants + 1
+    there = number <= 3*variants + 2
     if (.not. there) return
     subject%kind = kind
     if (number > 3*variants) then
       subject%dim = 1
       subject%dilatant = .true.
+      subject%projected = number == 3*variants + 1
       call build(subject)
       return
     end if
@@ -243,6 +246,17 @@ contains
       subject%two_materials = .true.
       subject%crack = .true.
       subject%hole = .true.
+      subject%breaking = .true.
+    case (14)
+      subject%projected = .false.
+      subject%poissons_ratio = 0.4_wp
+      subject%surface = .true.
+      subject%two_materials = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+    case (15)
+      subject%projected = .false.
+      subject%surface = .true.
       subject%breaking = .true.
     case default
       subject%surface = .true.
@@ -301,7 +315,7 @@ contains
     subject%body%grid = 1_i2
     subject%body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
     call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
-      & .false., subject%family)
+      & .false., subject%key_bits, subject%family)
     call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
       & depth(2), &
       & depth(1), 2*spacing, subject%bond_based)], subject%projected, &

@@ -37,6 +37,7 @@ contains
       & new_unittest('warnings are counted and kept', test_warnings), &
       & new_unittest('dissipated energy that is hardly known is warned of', test_dissipation), &
       & new_unittest('a body that is unstable before any load is warned of', test_unstable_body), &
+      & new_unittest('rotations are told where they matter', test_rotation), &
       & new_unittest('results cannot leave their folder', test_inside), &
       & new_unittest('a scene that cannot be leaves no files', test_impossible), &
       & new_unittest('checking a scene leaves no files', test_check), &
@@ -605,6 +606,46 @@ contains
       end do
     end subroutine expect_warning
   end subroutine test_unstable_body
+
+  !> A plate that flies and turns by 20 degrees in 12 steps: told once with the projected form,
+  !> and not with the other one, without a dilatation, or of a plate that is stretched.
+  subroutine test_rotation(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: kept = here//'/rotation/warnings.txt'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    type(line_type), allocatable :: lines(:)
+    real(wp) :: spin
+    integer :: way
+
+    do way = 1, 4
+      call flight('plate', scene)
+      if (way /= 2) scene%horizon%dilatation = 'projected'
+      if (way == 3) scene%materials(1)%model = 'bond_based'
+      if (way == 3) scene%materials(1)%poissons_ratio = 1.0_wp/3
+      spin = 20*acos(-1.0_wp)/180/(scene%time%steps*scene%time%step)
+      scene%initial(1)%velocity_gradient(1, 2) = -spin
+      scene%initial(1)%velocity_gradient(2, 1) = spin
+      if (way == 4) then
+        scene%initial(1)%velocity_gradient = 0.0_wp
+        scene%initial(1)%displacement_gradient(1, 1) = 0.2_wp
+        scene%initial(1)%displacement_gradient(1, 2) = 0.1_wp
+        scene%initial(1)%displacement_gradient(2, 1) = 0.1_wp
+      end if
+      call run(scene, 'rotation', fault)
+      call accept(error, fault)
+      if (allocated(error)) return
+      if (way == 1) then
+        call lines_of(kept, lines, error)
+        if (allocated(error)) return
+        call expect_true(error, count_filled(lines) == 1 .and. index(lines(1)%text, '1 at t = ') &
+          & == 1 .and. index(lines(1)%text, 'turned by more than 10 degrees') > 0, lines(1)%text)
+      else
+        call expect_true(error, .not. file_exists(kept), 'a warning without a reason, way '// &
+          & to_text(way))
+      end if
+    end do
+  end subroutine test_rotation
 
   !> Names of a scene file that mean another folder do not lead there.
   subroutine test_inside(error)

@@ -25,7 +25,8 @@ contains
       & new_unittest('undeformed: the linearised theory, bond by bond', test_undeformed), &
       & new_unittest('deformed: the curvature of the energy', test_curvature), &
       & new_unittest('deformed: symmetric in the inner product of volumes', test_symmetry), &
-      & new_unittest('continuous where the deformation vanishes', test_continuous)]
+      & new_unittest('continuous where the deformation vanishes', test_continuous), &
+      & new_unittest('deformed: the same in mixed precision', test_mixed)]
   end subroutine collect_motion_tangent
 
   !> A bar, a plate and a block with a dilatation, with surface factors, in both families.
@@ -44,6 +45,8 @@ contains
     case default; call box_scene([6, 5, 5], spacing, 0.1_wp, scene)
     end select
     scene%horizon%surface_correction = 'energy'
+    ! the tangent takes the other one
+    scene%horizon%dilatation = 'projected'
     scene%horizon%family = families(mod(number, 2) + 1)
     if (present(warm)) then
       scene%materials%thermal_expansion = 1.0e-5_wp
@@ -222,5 +225,54 @@ contains
       deallocate (u, w, here, there)
     end do
   end subroutine test_continuous
+
+  !> A deformed body's tangent is a difference of forces, for which bonds in single precision have
+  !> too few digits. In mixed precision it is that of double precision, but for weights rounded to
+  !> 6e-8.
+  subroutine test_mixed(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: u(:, :), w(:, :), kw(:, :), expected(:)
+    real(wp) :: poissons_ratio
+    integer :: dim, way, precision
+
+    do dim = 2, 3
+      do way = 1, 3
+        do precision = 1, 2
+          ! a = 0; a dilatation of either kind
+          poissons_ratio = merge(merge(0.25_wp, 1.0_wp/3, dim == 3), 0.4_wp, way == 1)
+          call box_scene(spread(6, 1, dim), spacing, poissons_ratio, scene)
+          scene%header%precision = merge('mixed ', 'double', precision == 2)
+          if (way == 2) scene%horizon%dilatation = 'projected'
+          call ready(scene, set_up, error)
+          if (allocated(error)) return
+          if (allocated(u)) deallocate (u, w, kw)
+          allocate (u, w, kw, mold=set_up%system%state%u)
+          call shake(set_up%system%body, reshape([1.0_wp, 0.3_wp, 0.2_wp, -0.4_wp, 0.5_wp, 0.1_wp, &
+            & 0.6_wp, -0.7_wp, 0.8_wp], [3, 3])*1.0e-3_wp, 1.0e-4_wp*spacing, 91, u)
+          call shake(set_up%system%body, no_gradient, 1.0_wp, 92, w)
+          call apply_tangent(set_up%system, u, w, kw)
+          if (precision == 1) then
+            expected = in_point_order(set_up%system, kw)
+          else
+            call expect(error, maxval(abs(in_point_order(set_up%system, kw) - expected)) &
+              & /maxval(abs(expected)), 0.0_wp, 1.0e-6_wp, text_of(real(dim, wp))// &
+              & ' dimensions, way '//text_of(real(way, wp)))
+          end if
+        end do
+      end do
+    end do
+  end subroutine test_mixed
+
+  !> Values of slots, point by point: blocks in mixed precision are longer, and rows of slots with
+  !> them.
+  pure function in_point_order(system, values) result(ordered)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: values(:, :)
+    real(wp), allocatable :: ordered(:)
+
+    ordered = reshape(values(system%body%slot, :), [system%body%n_points*size(values, 2)])
+  end function in_point_order
 
 end module test_motion_tangent

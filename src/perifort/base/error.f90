@@ -1,10 +1,11 @@
 !> One error type for the whole program. Procedures that can fail take
 !> `type(error_type), allocatable, intent(out) :: error` as their last argument, set it and return;
-!> callers return at once if it is allocated. Only the main program stops.
+!> callers return at once if it is allocated. Only the main program stops, and `internal_fault`.
 module pd_base_error
   implicit none (type, external)
   private
-  public :: error_type, fail, status_input, status_usage, status_no_answer, status_interrupted
+  public :: error_type, fail, internal_fault, status_input, status_usage, status_no_answer, &
+    & status_interrupted
 
   integer, parameter :: status_input = 1        !! the input or the environment is at fault
   integer, parameter :: status_usage = 2        !! wrong command line
@@ -35,5 +36,12 @@ contains
     if (present(group)) error%group = group
     if (present(number)) error%number = number
   end subroutine fail
+
+  !> Stop where the program contradicts itself, as in a choice between things of which one is not
+  !> known: no input leads there, and an answer would be wrong without a sign of it.
+  pure subroutine internal_fault(what)
+    character(*), intent(in) :: what  !! what was asked for and is not there
+    error stop 'perifort: internal fault: '//what
+  end subroutine internal_fault
 
 end module pd_base_error

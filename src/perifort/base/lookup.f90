@@ -1,5 +1,7 @@
 !> A table from 64-bit keys to numbers 1, 2, 3, ... in the order of their first appearance, and the
-!> mixing of values into such keys.
+!> mixing of values into such keys. Different values may have the same key, if hardly ever: who asks
+!> compares the values with those that had the key first, and takes a number of their own if they
+!> differ.
 module pd_base_lookup
   use pd_base_kinds, only: i4, i8
   implicit none (type, external)
@@ -12,6 +14,7 @@ module pd_base_lookup
     integer(i4), allocatable :: numbers(:)  !! 0: the place is empty
   contains
     procedure :: number_of
+    procedure :: own_number
   end type lookup_type
 
 contains
@@ -52,6 +55,14 @@ contains
     end if
     number = table%numbers(at)
   end subroutine number_of
+
+  !> The next number, for values whose key belongs to others: no key leads to it.
+  subroutine own_number(table, number)
+    class(lookup_type), intent(inout) :: table
+    integer, intent(out) :: number
+    table%count = table%count + 1
+    number = table%count
+  end subroutine own_number
 
   !> Where `key` stands or would stand.
   pure integer function place(table, key) result(at)

@@ -13,11 +13,11 @@ module pd_family_lattice
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_error, only: error_type, fail
-  use pd_base_lookup, only: lookup_type, mix
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
   use pd_body_body, only: body_type, arrange
   use pd_family_cells, only: cells_type, sort_into_cells, joins_labels
+  use pd_family_classes, only: find_classes
   use pd_family_family, only: family_type, bonds_type
   use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, first_cell, &
     & whole_blocks, both_ends, lanes, word_bits
@@ -49,7 +49,7 @@ module pd_family_lattice
   !> What the loops in mixed precision work on.
   type :: singles_type
     real(wp) :: volume = 1.0_wp                !! unit of volume, a power of 2 [m3]
-    real(sp), allocatable :: high(:, :)        !! leading digits of u (n_slots, dim)
+    real(sp), allocatable :: high(:, :)        !! leading digits of u (n_slots, dim), scaled
     real(sp), allocatable :: low(:, :)         !! the digits that follow
     real(sp), allocatable :: p(:)              !! p times the unit of volume (n_slots)
     real(sp), allocatable :: sums(:, :)        !! what is added to both ends (n_slots, dim), 3D
@@ -61,6 +61,7 @@ module pd_family_lattice
     logical :: mixed = .false.                 !! bonds are computed in single precision
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
+    integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
     integer(i4), allocatable :: first_of(:)    !! the first slot of each class
     integer(i8), allocatable :: broken(:, :)   !! 1-bits: broken bonds (n_slots, words), if any can
@@ -161,16 +162,18 @@ contains
 
   !> Families of a body that `lattice_suits`; the body is arranged in slots. `breakable`: bonds may
   !> break or be cut, so each gets a bit. `mixed`: bonds in single precision, which 1D has no loops
-  !> for.
-  subroutine new_lattice_family(body, rule, breakable, mixed, family, error)
+  !> for. `key_bits`: the bits of keys that count; with fewer, different surroundings get one key.
+  subroutine new_lattice_family(body, rule, breakable, mixed, family, error, key_bits)
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
     logical, intent(in) :: breakable
     logical, intent(in) :: mixed
     type(lattice_family_type), intent(out) :: family
     type(error_type), allocatable, intent(out) :: error
+    integer(i8), intent(in), optional :: key_bits
     integer :: g
 
+    if (present(key_bits)) family%key_bits = key_bits
     family%dim = body%dim
     family%mixed = mixed .and. body%dim > 1
     if (family%mixed) family%block_length = 2*lanes
@@ -183,7 +186,8 @@ contains
     family%words = (family%most_bonds + word_bits - 1)/word_bits
     call place_points(body, family, error)
     if (allocated(error)) return
-    call classify(body, family)
+    call find_classes(family%grids, family%alive, body%material, family%words, family%key_bits, &
+      & family%class_of, family%first_of, family%n_bonds)
     call find_blocks(family)
     if (breakable) call family%allow_breaking()
   end subroutine new_lattice_family
@@ -304,57 +308,6 @@ contains
       if (k <= family%grids(g)%last) exit
     end do
   end function grid_at
-
-  !> Number the kinds of surroundings: slots of the same grid and material with the same members are
-  !> alike. Counts the bonds on the way.
-  subroutine classify(body, family)
-    type(body_type), intent(in) :: body
-    type(lattice_family_type), intent(inout) :: family
-    type(lookup_type) :: classes
-    integer(i8), allocatable :: key(:)
-    integer(i4), allocatable :: first_of(:)
-    integer(i8) :: count, bits, k
-    integer :: o, w, g, number
-    logical :: is_new
-
-    allocate (key(family%n_slots))
-    count = 0_i8
-    do g = 1, size(family%grids)
-      associate (grid => family%grids(g), alive => family%alive)
-        !$omp parallel do schedule(static) default(none) shared(family, body, key, g) &
-        !$omp private(k, w, o, bits) reduction(+:count)
-        do k = grid%first, grid%last
-          if (alive(k) == 0_i1) cycle
-          key(k) = mix(int(g, i8), int(body%material(k), i8))
-          do w = 0, family%words - 1
-            bits = 0_i8
-            do o = 1, min(word_bits, grid%n - w*word_bits)
-              bits = ior(bits, ishft(int(alive(k + grid%shift(o + w*word_bits)), i8), o - 1))
-            end do
-            count = count + popcnt(bits)
-            key(k) = mix(key(k), bits)
-          end do
-        end do
-      end associate
-    end do
-    family%n_bonds = count
-    allocate (family%class_of(family%n_slots), first_of(1024), source=0_i4)
-    do k = 1, family%n_slots
-      if (family%alive(k) == 0_i1) cycle
-      if (k > 1) then
-        if (family%alive(k - 1) == 1_i1 .and. key(k) == key(k - 1)) then
-          family%class_of(k) = family%class_of(k - 1)
-          cycle
-        end if
-      end if
-      call classes%number_of(key(k), number, is_new)
-      family%class_of(k) = int(number, i4)
-      if (.not. is_new) cycle
-      if (number > size(first_of)) first_of = [first_of, first_of]
-      first_of(number) = int(k, i4)
-    end do
-    family%first_of = first_of(:classes%count)
-  end subroutine classify
 
   !> Cover the live slots with blocks. Rows begin at multiples of their length, and so do blocks.
   subroutine find_blocks(family)

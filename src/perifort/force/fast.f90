@@ -1,20 +1,21 @@
-!> The fast loops over the bonds of one block of a lattice, for small strain: one text for all
-!> dimensions and both precisions, and code of its own for each, because what is chosen must be
-!> constants where the loops are compiled. The polynomials are those of `pd_force_polynomial`.
-!>
-!> In single precision eta is the difference of the displacements' leading digits, which is exact or
-!> rounded relative to itself, plus that of the digits that follow: what is lost is 1e-7 of eta, not
-!> of u.
+!> The fast loops over the bonds of one block of a lattice, for small strain, in double precision:
+!> one text for all dimensions, ranges of strain and kinds of dilatation, and code of its own for
+!> each, because what is chosen must be constants where the loops are compiled. The polynomials are
+!> those of `pd_force_polynomial`; `pd_force_mixed` has the loops in single precision.
 module pd_force_fast
-  use pd_base_kinds, only: wp, sp, i8
+  use pd_base_error, only: internal_fault
+  use pd_base_kinds, only: wp, i8
   use pd_family_lattice, only: lanes
   use pd_force_general, only: crushed
+  use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &
-    & w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, k0, k1, k2, k3, k4, k5
+    & w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, k0, k1, k2, k3, k4, k5, &
+    & g0, g1, g2, g3, g4, g5, g6, g7, v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10, v11, &
+    & s0, s1, s2, s3, s4, s5
+  use pd_force_singles, only: unit
   implicit none (type, external)
   private
   public :: fast_dilatation, fast_force, fast_energy
-  public :: mixed_dilatation_2, mixed_dilatation_3, mixed_force_2, mixed_force_3
 
   !> Deformed length over the undeformed one below which a bond has no direction.
   real(wp), parameter :: least = sqrt(crushed)
@@ -22,223 +23,424 @@ module pd_force_fast
 contains
 
   !> Add theta, the sums of Gd s Lambda vc V, of the `n` first offsets' bonds of the block at slot
-  !> `first` (1D: set it) in double precision. `missed`: some bonds are strained beyond `limit`; in
-  !> 3D and 2D those were left out, and `left` has their weights, in 1D what was set is wrong.
-  !> Extents are explicit, here and below, since a call for few bonds would spend its time on
-  !> describing arrays.
-  subroutine fast_dilatation(dim, range, n, m, weight, shift, geometry, first, u, limit, theta, &
-    & left, missed)
-    integer, intent(in) :: dim, range, n
-    integer, intent(in) :: m  !! number of slots
+  !> `first` (1D: set it). `missed`: some bonds are strained beyond `limit`; in 3D and 2D those were
+  !> left out, and `left` has their weights, in 1D what was set is wrong. Extents are explicit, here
+  !> and below, since a call for few bonds would spend its time on describing arrays.
+  subroutine fast_dilatation(dim, range, kind, n, m, weight, shift, geometry, first, u, limit, &
+    & theta, left, missed)
+    integer, intent(in) :: dim
+    integer, intent(in) :: range  !! `narrow` or `wide`
+    integer, intent(in) :: kind   !! of the dilatation: `projected` or `unprojected`
+    integer, intent(in) :: n
+    integer, intent(in) :: m      !! number of slots
     real(wp), intent(in) :: weight(lanes, n), geometry(4, n), u(m, dim)
     integer(i8), intent(in) :: shift(n), first
     real(wp), intent(in) :: limit
     real(wp), intent(inout) :: theta(m), left(lanes, n)
     logical, intent(out) :: missed
 
-    select case (10*range + dim)
-    case (10*narrow + 3)
-      call fast_dilatation_3(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
-    case (10*narrow + 2)
-      call fast_dilatation_2(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
-    case (10*narrow + 1)
-      call fast_dilatation_1(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
-    case (10*wide + 3)
-      call wide_dilatation_3(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
-    case (10*wide + 2)
-      call wide_dilatation_2(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
+    missed = .true.
+    select case (choice(dim, range, kind))
+    case (3 + 10*narrow + 100*projected)
+      call narrow_theta_projected_3(n, weight, shift, geometry, first, m, u, u, limit, theta, &
+        & left, missed)
+    case (2 + 10*narrow + 100*projected)
+      call narrow_theta_projected_2(n, weight, shift, geometry, first, m, u, u, limit, theta, &
+        & left, missed)
+    case (1 + 10*narrow + 100*projected)
+      call narrow_theta_projected_1(n, weight, shift, geometry, first, m, u, u, limit, theta, &
+        & left, missed)
+    case (3 + 10*wide + 100*projected)
+      call wide_theta_projected_3(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (2 + 10*wide + 100*projected)
+      call wide_theta_projected_2(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (1 + 10*wide + 100*projected)
+      call wide_theta_projected_1(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (3 + 10*narrow + 100*unprojected)
+      call narrow_theta_plain_3(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (2 + 10*narrow + 100*unprojected)
+      call narrow_theta_plain_2(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (1 + 10*narrow + 100*unprojected)
+      call narrow_theta_plain_1(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (3 + 10*wide + 100*unprojected)
+      call wide_theta_plain_3(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (2 + 10*wide + 100*unprojected)
+      call wide_theta_plain_2(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
+    case (1 + 10*wide + 100*unprojected)
+      call wide_theta_plain_1(n, weight, shift, geometry, first, m, u, u, limit, theta, left, &
+        & missed)
     case default
-      call wide_dilatation_1(n, weight, shift, geometry, first, m, u, u, limit, theta, left, missed)
+      call internal_fault('a dilatation that no fast loop is there for')
     end select
   end subroutine fast_dilatation
 
-  !> The same for forces. With a `dilatation` the pass before has looked at the strain, `missed` is
-  !> false and `left` untouched.
-  subroutine fast_force(dim, range, dilatation, n, m, weight, stretch, shift, geometry, first, u, &
-    & p, limit, force, left, missed)
-    integer, intent(in) :: dim, range, n, m
-    logical, intent(in) :: dilatation
-    real(wp), intent(in) :: weight(lanes, merge(n, 0, dilatation)), stretch(lanes, n)
-    real(wp), intent(in) :: geometry(4, n), u(m, dim), p(merge(m, 0, dilatation))
+  !> The same for forces. With a dilatation its pass has looked at the strain, `missed` is false and
+  !> `left` untouched.
+  subroutine fast_force(dim, range, kind, n, m, weight, stretch, shift, geometry, first, u, p, &
+    & limit, force, left, missed)
+    integer, intent(in) :: dim, range
+    integer, intent(in) :: kind  !! of the dilatation, `no_dilatation` included
+    integer, intent(in) :: n, m
+    real(wp), intent(in) :: weight(lanes, merge(n, 0, kind /= no_dilatation)), stretch(lanes, n)
+    real(wp), intent(in) :: geometry(4, n), u(m, dim), p(merge(m, 0, kind /= no_dilatation))
     integer(i8), intent(in) :: shift(n), first
     real(wp), intent(in) :: limit
     real(wp), intent(inout) :: force(m, dim), left(lanes, n)
     logical, intent(out) :: missed
 
-    select case (10*range + dim)
-    case (10*narrow + 3)
-      call fast_force_3(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+    missed = .true.
+    select case (choice(dim, range, kind))
+    case (3 + 10*narrow + 100*no_dilatation)
+      call narrow_force_bonds_3(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
         & force, left, missed)
-    case (10*narrow + 2)
-      call fast_force_2(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+    case (2 + 10*narrow + 100*no_dilatation)
+      call narrow_force_bonds_2(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
         & force, left, missed)
-    case (10*narrow + 1)
-      call fast_force_1(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+    case (1 + 10*narrow + 100*no_dilatation)
+      call narrow_force_bonds_1(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
         & force, left, missed)
-    case (10*wide + 3)
-      call wide_force_3(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+    case (3 + 10*wide + 100*no_dilatation)
+      call wide_force_bonds_3(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
         & force, left, missed)
-    case (10*wide + 2)
-      call wide_force_2(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+    case (2 + 10*wide + 100*no_dilatation)
+      call wide_force_bonds_2(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (1 + 10*wide + 100*no_dilatation)
+      call wide_force_bonds_1(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (3 + 10*narrow + 100*projected)
+      call narrow_force_projected_3(n, weight, stretch, shift, geometry, first, m, u, u, p, &
+        & limit, force, left, missed)
+    case (2 + 10*narrow + 100*projected)
+      call narrow_force_projected_2(n, weight, stretch, shift, geometry, first, m, u, u, p, &
+        & limit, force, left, missed)
+    case (1 + 10*narrow + 100*projected)
+      call narrow_force_projected_1(n, weight, stretch, shift, geometry, first, m, u, u, p, &
+        & limit, force, left, missed)
+    case (3 + 10*wide + 100*projected)
+      call wide_force_projected_3(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (2 + 10*wide + 100*projected)
+      call wide_force_projected_2(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (1 + 10*wide + 100*projected)
+      call wide_force_projected_1(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (3 + 10*narrow + 100*unprojected)
+      call narrow_force_plain_3(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (2 + 10*narrow + 100*unprojected)
+      call narrow_force_plain_2(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (1 + 10*narrow + 100*unprojected)
+      call narrow_force_plain_1(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (3 + 10*wide + 100*unprojected)
+      call wide_force_plain_3(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (2 + 10*wide + 100*unprojected)
+      call wide_force_plain_2(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
+        & force, left, missed)
+    case (1 + 10*wide + 100*unprojected)
+      call wide_force_plain_1(n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
         & force, left, missed)
     case default
-      call wide_force_1(dilatation, n, weight, stretch, shift, geometry, first, m, u, u, p, limit, &
-        & force, left, missed)
+      call internal_fault('a force that no fast loop is there for')
     end select
   end subroutine fast_force
 
+  !> One number for what loops are compiled for.
+  pure integer function choice(dim, range, kind)
+    integer, intent(in) :: dim, range, kind
+    choice = dim + 10*range + 100*kind
+  end function choice
+
   !> Sums of the bonds of the block at slot `first`, for its energy: (q_k + q_j) Gb s^2 |xi| vc V
-  !> and, with a `dilatation`, Gd s Lambda vc V. For any strain, without temperature, projected.
-  subroutine fast_energy(dim, dilatation, n, m, weight, stretch, shift, geometry, first, u, &
+  !> and, with a dilatation of some `kind`, Gd s Lambda vc V. For any strain, without temperature.
+  subroutine fast_energy(dim, kind, n, m, weight, stretch, shift, geometry, first, u, &
     & stretches, theta)
-    integer, intent(in) :: dim, n, m
-    logical, intent(in) :: dilatation
-    real(wp), intent(in) :: weight(lanes, merge(n, 0, dilatation)), stretch(lanes, n)
+    integer, intent(in) :: dim, kind, n, m
+    real(wp), intent(in) :: weight(lanes, merge(n, 0, kind /= no_dilatation)), stretch(lanes, n)
     real(wp), intent(in) :: geometry(4, n), u(m, dim)
     integer(i8), intent(in) :: shift(n), first
     real(wp), intent(out) :: stretches(lanes), theta(lanes)
 
     select case (dim)
     case (3)
-      call fast_energy_3(dilatation, n, weight, stretch, shift, geometry, first, m, u, &
-        & stretches, theta)
+      call fast_energy_3(kind, n, weight, stretch, shift, geometry, first, m, u, stretches, theta)
     case (2)
-      call fast_energy_2(dilatation, n, weight, stretch, shift, geometry, first, m, u, &
-        & stretches, theta)
+      call fast_energy_2(kind, n, weight, stretch, shift, geometry, first, m, u, stretches, theta)
+    case (1)
+      call fast_energy_1(kind, n, weight, stretch, shift, geometry, first, m, u, stretches, theta)
     case default
-      call fast_energy_1(dilatation, n, weight, stretch, shift, geometry, first, m, u, &
-        & stretches, theta)
+      call internal_fault('an energy in a dimension that no fast loop is there for')
     end select
   end subroutine fast_energy
 
-  subroutine fast_dilatation_1(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+  subroutine narrow_theta_projected_1(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
-    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = projected
     logical, parameter :: both = .false.
     include 'fast_dilatation.inc'
-  end subroutine fast_dilatation_1
+  end subroutine narrow_theta_projected_1
 
-  subroutine fast_dilatation_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+  subroutine narrow_theta_projected_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
-    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = projected
     logical, parameter :: both = .true.
     include 'fast_dilatation.inc'
-  end subroutine fast_dilatation_2
+  end subroutine narrow_theta_projected_2
 
-  subroutine fast_dilatation_3(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+  subroutine narrow_theta_projected_3(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
-    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = projected
     logical, parameter :: both = .true.
     include 'fast_dilatation.inc'
-  end subroutine fast_dilatation_3
+  end subroutine narrow_theta_projected_3
 
-  subroutine fast_force_1(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp
-    logical, parameter :: both = .false.
-    include 'fast_force.inc'
-  end subroutine fast_force_1
-
-  subroutine fast_force_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp
-    logical, parameter :: both = .true.
-    include 'fast_force.inc'
-  end subroutine fast_force_2
-
-  subroutine fast_force_3(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp
-    logical, parameter :: both = .true.
-    include 'fast_force.inc'
-  end subroutine fast_force_3
-
-  subroutine wide_dilatation_1(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+  subroutine wide_theta_projected_1(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
-    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = projected
     logical, parameter :: both = .false.
     include 'fast_dilatation.inc'
-  end subroutine wide_dilatation_1
+  end subroutine wide_theta_projected_1
 
-  subroutine wide_dilatation_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+  subroutine wide_theta_projected_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
-    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = projected
     logical, parameter :: both = .true.
     include 'fast_dilatation.inc'
-  end subroutine wide_dilatation_2
+  end subroutine wide_theta_projected_2
 
-  subroutine wide_dilatation_3(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+  subroutine wide_theta_projected_3(n, weight, shift, geometry, first, n_slots, u, low, limit, &
     & theta, left, missed)
-    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = projected
     logical, parameter :: both = .true.
     include 'fast_dilatation.inc'
-  end subroutine wide_dilatation_3
+  end subroutine wide_theta_projected_3
 
-  subroutine wide_force_1(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp
+  subroutine narrow_theta_plain_1(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+    & theta, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .false.
+    include 'fast_dilatation.inc'
+  end subroutine narrow_theta_plain_1
+
+  subroutine narrow_theta_plain_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+    & theta, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_dilatation.inc'
+  end subroutine narrow_theta_plain_2
+
+  subroutine narrow_theta_plain_3(n, weight, shift, geometry, first, n_slots, u, low, limit, &
+    & theta, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_dilatation.inc'
+  end subroutine narrow_theta_plain_3
+
+  subroutine wide_theta_plain_1(n, weight, shift, geometry, first, n_slots, u, low, limit, theta, &
+    & left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .false.
+    include 'fast_dilatation.inc'
+  end subroutine wide_theta_plain_1
+
+  subroutine wide_theta_plain_2(n, weight, shift, geometry, first, n_slots, u, low, limit, theta, &
+    & left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_dilatation.inc'
+  end subroutine wide_theta_plain_2
+
+  subroutine wide_theta_plain_3(n, weight, shift, geometry, first, n_slots, u, low, limit, theta, &
+    & left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_dilatation.inc'
+  end subroutine wide_theta_plain_3
+
+  subroutine narrow_force_bonds_1(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = no_dilatation
     logical, parameter :: both = .false.
     include 'fast_force.inc'
-  end subroutine wide_force_1
+  end subroutine narrow_force_bonds_1
 
-  subroutine wide_force_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp
+  subroutine narrow_force_bonds_2(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = no_dilatation
     logical, parameter :: both = .true.
     include 'fast_force.inc'
-  end subroutine wide_force_2
+  end subroutine narrow_force_bonds_2
 
-  subroutine wide_force_3(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp
+  subroutine narrow_force_bonds_3(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = no_dilatation
     logical, parameter :: both = .true.
     include 'fast_force.inc'
-  end subroutine wide_force_3
+  end subroutine narrow_force_bonds_3
 
-  subroutine fast_energy_1(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
+  subroutine wide_force_bonds_1(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = no_dilatation
+    logical, parameter :: both = .false.
+    include 'fast_force.inc'
+  end subroutine wide_force_bonds_1
+
+  subroutine wide_force_bonds_2(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = no_dilatation
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine wide_force_bonds_2
+
+  subroutine wide_force_bonds_3(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = no_dilatation
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine wide_force_bonds_3
+
+  subroutine narrow_force_projected_1(n, weight, stretch, shift, geometry, first, n_slots, u, &
+    & low, p, limit, force, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = projected
+    logical, parameter :: both = .false.
+    include 'fast_force.inc'
+  end subroutine narrow_force_projected_1
+
+  subroutine narrow_force_projected_2(n, weight, stretch, shift, geometry, first, n_slots, u, &
+    & low, p, limit, force, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = projected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine narrow_force_projected_2
+
+  subroutine narrow_force_projected_3(n, weight, stretch, shift, geometry, first, n_slots, u, &
+    & low, p, limit, force, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = projected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine narrow_force_projected_3
+
+  subroutine wide_force_projected_1(n, weight, stretch, shift, geometry, first, n_slots, u, low, &
+    & p, limit, force, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = projected
+    logical, parameter :: both = .false.
+    include 'fast_force.inc'
+  end subroutine wide_force_projected_1
+
+  subroutine wide_force_projected_2(n, weight, stretch, shift, geometry, first, n_slots, u, low, &
+    & p, limit, force, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = projected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine wide_force_projected_2
+
+  subroutine wide_force_projected_3(n, weight, stretch, shift, geometry, first, n_slots, u, low, &
+    & p, limit, force, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = projected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine wide_force_projected_3
+
+  subroutine narrow_force_plain_1(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .false.
+    include 'fast_force.inc'
+  end subroutine narrow_force_plain_1
+
+  subroutine narrow_force_plain_2(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine narrow_force_plain_2
+
+  subroutine narrow_force_plain_3(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = narrow, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine narrow_force_plain_3
+
+  subroutine wide_force_plain_1(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 1, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .false.
+    include 'fast_force.inc'
+  end subroutine wide_force_plain_1
+
+  subroutine wide_force_plain_2(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 2, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine wide_force_plain_2
+
+  subroutine wide_force_plain_3(n, weight, stretch, shift, geometry, first, n_slots, u, low, p, &
+    & limit, force, left, missed)
+    integer, parameter :: dim = 3, width = lanes, bond = wp, range = wide, sums_kind = wp, &
+      & kind = unprojected
+    logical, parameter :: both = .true.
+    include 'fast_force.inc'
+  end subroutine wide_force_plain_3
+
+  subroutine fast_energy_1(kind, n, weight, stretch, shift, geometry, first, n_slots, u, &
     & stretches, theta)
     integer, parameter :: dim = 1
     include 'fast_energy.inc'
   end subroutine fast_energy_1
 
-  subroutine fast_energy_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
+  subroutine fast_energy_2(kind, n, weight, stretch, shift, geometry, first, n_slots, u, &
     & stretches, theta)
     integer, parameter :: dim = 2
     include 'fast_energy.inc'
   end subroutine fast_energy_2
 
-  subroutine fast_energy_3(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
+  subroutine fast_energy_3(kind, n, weight, stretch, shift, geometry, first, n_slots, u, &
     & stretches, theta)
     integer, parameter :: dim = 3
     include 'fast_energy.inc'
   end subroutine fast_energy_3
-
-  subroutine mixed_dilatation_2(n, weight, shift, geometry, first, n_slots, u, low, limit, &
-    & theta, left, missed)
-    integer, parameter :: dim = 2, width = 2*lanes, bond = sp, range = single, sums_kind = wp
-    logical, parameter :: both = .false.
-    include 'fast_dilatation.inc'
-  end subroutine mixed_dilatation_2
-
-  subroutine mixed_dilatation_3(n, weight, shift, geometry, first, n_slots, u, low, limit, &
-    & theta, left, missed)
-    integer, parameter :: dim = 3, width = 2*lanes, bond = sp, range = single, sums_kind = sp
-    logical, parameter :: both = .true.
-    include 'fast_dilatation.inc'
-  end subroutine mixed_dilatation_3
-
-  subroutine mixed_force_2(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 2, width = 2*lanes, bond = sp, range = single, sums_kind = wp
-    logical, parameter :: both = .false.
-    include 'fast_force.inc'
-  end subroutine mixed_force_2
-
-  subroutine mixed_force_3(dilatation, n, weight, stretch, shift, geometry, first, n_slots, u, &
-    & low, p, limit, force, left, missed)
-    integer, parameter :: dim = 3, width = 2*lanes, bond = sp, range = single, sums_kind = sp
-    logical, parameter :: both = .true.
-    include 'fast_force.inc'
-  end subroutine mixed_force_3
 
 end module pd_force_fast

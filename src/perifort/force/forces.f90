@@ -1,5 +1,6 @@
 !> One call for the whole body, whatever its family: the class is looked at once per pass.
 module pd_force_forces
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
@@ -27,6 +28,8 @@ contains
       call list_dilatation(family, model, u, p, strained)
     type is (lattice_family_type)
       call lattice_dilatation(family, model, u, p, strained)
+    class default
+      call internal_fault('the dilatation of a family that has no loops')
     end select
   end subroutine dilatation_pass
 
@@ -44,6 +47,8 @@ contains
       call list_force(family, model, u, p, force, strained)
     type is (lattice_family_type)
       call lattice_force(family, model, u, p, force, strained)
+    class default
+      call internal_fault('the forces of a family that has no loops')
     end select
   end subroutine force_pass
 
@@ -59,6 +64,8 @@ contains
       call list_energy(family, model, u, energy)
     type is (lattice_family_type)
       call lattice_energy(family, model, u, energy)
+    class default
+      call internal_fault('the energy of a family that has no loops')
     end select
   end subroutine energy_pass
 

@@ -16,11 +16,11 @@ module pd_force_lattice
   use pd_base_kinds, only: wp, sp, i1, i8
   use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends, lanes, &
     & word_bits
-  use pd_force_fast, only: fast_dilatation, fast_force, fast_energy, mixed_dilatation_2, &
-    & mixed_dilatation_3, mixed_force_2, mixed_force_3
+  use pd_force_fast, only: fast_dilatation, fast_force, fast_energy
   use pd_force_general, only: general_dilatation, general_force, general_energy
-  use pd_force_model, only: model_type
-  use pd_force_polynomial, only: fast_limit, narrow, wide, single
+  use pd_force_mixed, only: mixed_dilatation, mixed_force
+  use pd_force_model, only: dilatation_of, model_type
+  use pd_force_polynomial, only: fast_limit, fast_terms, narrow, wide, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
   use pd_force_weights, only: weights_now, half_of
   implicit none (type, external)
@@ -176,7 +176,7 @@ contains
 
     limit = 0.0_wp
     if (family%mixed) then
-      limit(1) = fast_limit(model, single)
+      if (.not. model%for_differences) limit(1) = fast_limit(model, single)
       return
     end if
     limit(1) = fast_limit(model, narrow)
@@ -260,9 +260,10 @@ contains
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first, last
-    integer :: n, l, served
+    integer :: n, l, served, kind
     logical :: missed
 
+    kind = dilatation_of(model)
     first = family%block(b)
     last = first + family%block_length - 1
     n = weights%n
@@ -270,19 +271,20 @@ contains
     served = narrow
     missed = limit(1) <= 0.0_wp
     if (family%mixed) then
-      call mixed_dilatation(family, n, limit(1), weights, first, p, scratch%single_left, missed)
+      call mixed_dilatation(family, kind, n, limit(1), weights, first, p, scratch%single_left, &
+        & missed)
     else if (.not. missed) then
       associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
-        call fast_dilatation(dim, narrow, n, m, w%dilatation, w%shift, w%geometry, first, u, &
-          & limit(1), p, left(:, :, 1), missed)
+        call fast_dilatation(dim, narrow, kind, n, m, w%dilatation, w%shift, w%geometry, first, &
+          & u, limit(1), p, left(:, :, 1), missed)
         if (missed .and. limit(2) > 0.0_wp) then
           served = wide
           if (both) then
-            call fast_dilatation(dim, wide, n, m, left(:, :, 1), w%shift, w%geometry, first, u, &
-              & limit(2), p, left(:, :, 2), missed)
+            call fast_dilatation(dim, wide, kind, n, m, left(:, :, 1), w%shift, w%geometry, first, &
+              & u, limit(2), p, left(:, :, 2), missed)
           else
-            call fast_dilatation(dim, wide, n, m, w%dilatation, w%shift, w%geometry, first, u, &
-              & limit(2), p, left(:, :, 2), missed)
+            call fast_dilatation(dim, wide, kind, n, m, w%dilatation, w%shift, w%geometry, first, &
+              & u, limit(2), p, left(:, :, 2), missed)
           end if
         end if
       end associate
@@ -311,34 +313,6 @@ contains
     end do
   end subroutine dilatation_of_block
 
-  !> theta of one block by the loops in mixed precision: in 3D added to the sums, in 2D into `theta`
-  !> (n_slots).
-  subroutine mixed_dilatation(family, n, limit, weights, first, theta, left, missed)
-    type(lattice_family_type), intent(inout) :: family
-    integer, intent(in) :: n
-    real(wp), intent(in) :: limit
-    type(weights_type), intent(in) :: weights
-    integer(i8), intent(in) :: first
-    real(wp), intent(inout), contiguous :: theta(:)
-    real(sp), intent(inout), contiguous :: left(:, :)
-    logical, intent(out) :: missed
-    integer(i8) :: last
-
-    associate (singles => family%singles)
-      if (both_ends(family%dim, family%mixed)) then
-        call mixed_dilatation_3(n, weights%single_dilatation, weights%shift, &
-          & weights%single_geometry, first, family%n_slots, singles%high, singles%low, &
-          & real(limit, sp), singles%sums(:, 1), left, missed)
-      else
-        call mixed_dilatation_2(n, weights%single_dilatation, weights%shift, &
-          & weights%single_geometry, first, family%n_slots, singles%high, singles%low, &
-          & real(limit, sp), theta, left, missed)
-        last = first + family%block_length - 1
-        theta(first:last) = singles%volume*theta(first:last)
-      end if
-    end associate
-  end subroutine mixed_dilatation
-
   !> Forces of one block's bonds, added to `force`.
   subroutine force_of_block(family, model, both, limit, b, weights, scratch, u, p, force, strained)
     type(lattice_family_type), intent(inout) :: family
@@ -352,9 +326,10 @@ contains
     real(wp), intent(in), contiguous :: u(:, :), p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first
-    integer :: n, l, served
+    integer :: n, l, served, kind
     logical :: fast, missed
 
+    kind = dilatation_of(model)
     first = family%block(b)
     n = weights%n
     if (both) n = weights%n_forward
@@ -366,19 +341,19 @@ contains
     end if
     missed = .not. fast
     if (fast .and. family%mixed) then
-      call mixed_force(family, model%dilatation, n, limit(1), weights, first, force, &
-        & scratch%single_left, missed)
+      call mixed_force(family, kind, n, limit(1), weights, first, force, scratch%single_left, &
+        & missed)
     else if (fast) then
       associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
-        call fast_force(dim, served, model%dilatation, n, m, w%dilatation, w%stretch, w%shift, &
-          & w%geometry, first, u, p, limit(1), force, left(:, :, 1), missed)
+        call fast_force(dim, served, kind, n, m, w%dilatation, w%stretch, w%shift, w%geometry, &
+          & first, u, p, limit(1), force, left(:, :, 1), missed)
         if (missed .and. limit(2) > 0.0_wp) then
           served = wide
           if (both) then
-            call fast_force(dim, wide, .false., n, m, w%dilatation, left(:, :, 1), w%shift, &
+            call fast_force(dim, wide, kind, n, m, w%dilatation, left(:, :, 1), w%shift, &
               & w%geometry, first, u, p, limit(2), force, left(:, :, 2), missed)
           else
-            call fast_force(dim, wide, .false., n, m, w%dilatation, w%stretch, w%shift, &
+            call fast_force(dim, wide, kind, n, m, w%dilatation, w%stretch, w%shift, &
               & w%geometry, first, u, p, limit(2), force, left(:, :, 2), missed)
           end if
         end if
@@ -400,32 +375,6 @@ contains
       call general_force(model, both, n, weights, weights%stretch, first, u, p, force, strained)
     end if
   end subroutine force_of_block
-
-  !> Forces of one block by the loops in mixed precision: in 3D added to the sums, in 2D into
-  !> `force` (n_slots, dim).
-  subroutine mixed_force(family, dilatation, n, limit, weights, first, force, left, missed)
-    type(lattice_family_type), intent(inout) :: family
-    logical, intent(in) :: dilatation
-    integer, intent(in) :: n
-    real(wp), intent(in) :: limit
-    type(weights_type), intent(in) :: weights
-    integer(i8), intent(in) :: first
-    real(wp), intent(inout), contiguous :: force(:, :)
-    real(sp), intent(inout), contiguous :: left(:, :)
-    logical, intent(out) :: missed
-
-    associate (singles => family%singles)
-      if (both_ends(family%dim, family%mixed)) then
-        call mixed_force_3(dilatation, n, weights%single_dilatation, weights%single_stretch, &
-          & weights%shift, weights%single_geometry, first, family%n_slots, singles%high, &
-          & singles%low, singles%p, real(limit, sp), singles%sums, left, missed)
-      else
-        call mixed_force_2(dilatation, n, weights%single_dilatation, weights%single_stretch, &
-          & weights%shift, weights%single_geometry, first, family%n_slots, singles%high, &
-          & singles%low, singles%p, real(limit, sp), force, left, missed)
-      end if
-    end associate
-  end subroutine mixed_force
 
   !> Strain energy density of one block; `half` is room for half of it, if it is long.
   subroutine energy_of_block(family, model, b, weights, half, u, energy)
@@ -458,11 +407,10 @@ contains
     real(wp) :: stretches(lanes), theta(lanes)
     integer :: l
 
-    if (size(model%materials) > 1 .or. model%thermal .or. &
-      & (model%dilatation .and. .not. model%projected)) then
+    if (size(model%materials) > 1 .or. .not. fast_terms(model)) then
       call general_energy(model, weights, first, u, stretches, theta)
     else
-      call fast_energy(model%dim, model%dilatation, weights%n, size(u, 1), &
+      call fast_energy(model%dim, dilatation_of(model), weights%n, size(u, 1), &
         & weights%dilatation, weights%stretch, weights%shift, weights%geometry, first, u, &
         & stretches, theta)
     end if

@@ -33,6 +33,7 @@ contains
     logical :: missed
 
     limit = fast_limit(model, narrow)
+    if (model%dilatation .and. .not. model%projected) limit = 0.0_wp
     call gather_state(family, u)
     !$omp parallel default(none) shared(family, model, p, strained, limit) &
     !$omp private(work, theta, c, k, l, missed)
@@ -81,6 +82,7 @@ contains
     logical :: missed
 
     limit = fast_limit(model, narrow)
+    if (model%dilatation .and. .not. model%projected) limit = 0.0_wp
     call gather_state(family, u, p)
     !$omp parallel default(none) shared(family, model, force, strained, limit) &
     !$omp private(work, f, c, d, missed)

@@ -6,9 +6,14 @@ module pd_force_model
   use pd_body_material, only: material_type, never
   implicit none (type, external)
   private
-  public :: model_type, new_model, no_fail, bond_limit
+  public :: model_type, new_model, no_fail, bond_limit, dilatation_of, no_dilatation, projected, &
+    & unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
+
+  !> Kinds of dilatation that loops are compiled for: the force has none; it has the factor Lambda
+  !> as printed; Lambda = 1.
+  integer, parameter :: no_dilatation = 1, projected = 2, unprojected = 3
 
   type :: model_type
     integer :: dim = 0
@@ -17,6 +22,8 @@ module pd_force_model
     logical :: surface = .false.      !! factors Gd and Gb differ from 1
     logical :: thermal = .false.      !! some temperature change
     logical :: breaking = .false.     !! some bond can fail
+    logical :: for_differences = .false. !! forces are for the differences of a tangent: bonds in
+                                         !! double precision, whatever the family has
     logical :: compression = .false.  !! some bonds break in compression too
     type(material_type), allocatable :: materials(:)
     integer(i2), allocatable :: material(:)  !! of each slot
@@ -32,10 +39,10 @@ contains
 
   !> The model of a body. `zone` marks slots in no-fail zones, `temperature_change` [K] is per slot.
   !> Surface factors are set by whoever computes them.
-  pure subroutine new_model(body, materials, projected, zone, temperature_change, model)
+  pure subroutine new_model(body, materials, with_lambda, zone, temperature_change, model)
     type(body_type), intent(in) :: body
     type(material_type), intent(in) :: materials(:)
-    logical, intent(in) :: projected
+    logical, intent(in) :: with_lambda  !! the dilatation is `projected`, as printed
     logical, intent(in) :: zone(:)
     real(wp), intent(in) :: temperature_change(:)
     type(model_type), intent(out) :: model
@@ -43,7 +50,7 @@ contains
     integer :: k
 
     model%dim = body%dim
-    model%projected = projected
+    model%projected = with_lambda
     allocate (model%materials, source=materials)
     allocate (model%material, source=body%material)
     used = .false.
@@ -66,6 +73,14 @@ contains
       model%compressed = merge(1_i1, 0_i1, materials(body%material)%break_in_compression)
     end if
   end subroutine new_model
+
+  !> The kind of dilatation of the model's force.
+  pure integer function dilatation_of(model) result(kind)
+    type(model_type), intent(in) :: model
+
+    kind = no_dilatation
+    if (model%dilatation) kind = merge(projected, unprojected, model%projected)
+  end function dilatation_of
 
   !> Limits of the mechanical stretch of the bond k-j: it breaks above `upper` or below `lower`.
   pure subroutine bond_limit(model, k, j, lower, upper)

@@ -5,15 +5,19 @@ module pd_force_singles
   use pd_family_lattice, only: lattice_family_type
   implicit none (type, external)
   private
-  public :: split_displacements, round_dilatation, clear_sums, add_sums
+  public :: split_displacements, round_dilatation, clear_sums, add_sums, unit
+
+  !> The leading digits of displacements are kept over this power of 2 (why: `pd_force_mixed`). Not
+  !> 2, which a compiler may take for a sum.
+  real(sp), parameter :: unit = 4096.0_sp
 
   !> Bits of a double real but those that a single one has no room for.
   integer(i8), parameter :: leading = not(2_i8**29 - 1_i8)
 
 contains
 
-  !> u = high + low, each in single precision, to 47 bits. The leading digits are cut out as bits:
-  !> a compiler that may simplify takes a difference from a rounded value for zero.
+  !> u = unit*high + low, each in single precision, to 47 bits. The leading digits are cut out as
+  !> bits: a compiler that may simplify takes a difference from a rounded value for zero.
   subroutine split_displacements(family, u)
     type(lattice_family_type), intent(inout) :: family
     real(wp), intent(in), contiguous :: u(:, :)
@@ -24,7 +28,7 @@ contains
       !$omp do simd schedule(static) private(high)
       do k = 1, size(u, 1)
         high = transfer(iand(transfer(u(k, c), 0_i8), leading), 0.0_wp)
-        family%singles%high(k, c) = real(high, sp)
+        family%singles%high(k, c) = real(high/unit, sp)
         family%singles%low(k, c) = real(u(k, c) - high, sp)
       end do
     end do

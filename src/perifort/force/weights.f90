@@ -25,7 +25,7 @@ contains
     type(model_type), intent(in) :: model
     type(lookup_type) :: kinds
     type(weights_type), allocatable :: table(:), longer(:)
-    integer(i8), allocatable :: column(:)
+    integer(i8), allocatable :: column(:), first(:), more(:)
     integer(i8) :: key, bytes
     integer :: b, g, i, number
     logical :: is_new
@@ -33,7 +33,7 @@ contains
     if (fast_limit(model, merge(single, narrow, family%mixed)) <= 0.0_wp) call use_double(family)
     if (family%mixed) call allocate_singles(family, model)
     call column_keys(family, column)
-    allocate (table(256))
+    allocate (table(256), first(256))
     bytes = 0_i8
     do b = 1, size(family%block)
       g = grid_at(family, family%block(b))
@@ -42,7 +42,7 @@ contains
         & + family%grids(g)%reach_cells
         key = mix(key, column(family%block(b) + i))
       end do
-      call kinds%number_of(key, number, is_new)
+      call kinds%number_of(iand(key, family%key_bits), number, is_new)
       family%weights(b) = int(number, i4)
       if (.not. is_new) cycle
       bytes = bytes + family%grids(g)%n*(16_i8*lanes + merge(60, 44, family%mixed))
@@ -51,7 +51,11 @@ contains
         allocate (longer(2*size(table)))
         longer(:size(table)) = table
         call move_alloc(longer, table)
+        allocate (more(size(table)))
+        more(:size(first)) = first
+        call move_alloc(more, first)
       end if
+      first(number) = family%block(b)
       call allocate_weights(family, model, table(number))
       call block_weights(family, model, family%block(b), table(number))
       call trim_weights(table(number))
@@ -61,8 +65,53 @@ contains
       family%weights(b:) = 0_i4
     end if
     family%table = table(:kinds%count)
+    call compare_surroundings(family, first)
     deallocate (family%class_of)  ! it has done its work
   end subroutine build_weights
+
+  !> A key of 64 bits hardly ever belongs to two kinds of blocks. Where it does, blocks that look
+  !> another way than the one that their table was made for, by its `first` slot, make their weights
+  !> in every pass.
+  subroutine compare_surroundings(family, first)
+    type(lattice_family_type), intent(inout) :: family
+    integer(i8), intent(in) :: first(:)
+    integer :: b
+
+    !$omp parallel do schedule(static) default(none) shared(family, first) private(b)
+    do b = 1, size(family%block)
+      if (family%weights(b) == 0_i4) cycle
+      if (.not. alike_blocks(family, family%block(b), first(family%weights(b)))) &
+        & family%weights(b) = 0_i4
+    end do
+  end subroutine compare_surroundings
+
+  !> Whether two blocks, by their first slots, and all slots within reach of them are of the same
+  !> classes, and so have the same weights.
+  pure logical function alike_blocks(family, one, other)
+    type(lattice_family_type), intent(in) :: family
+    integer(i8), intent(in) :: one, other
+    integer(i8) :: from, to
+    integer :: g, m, my, mz, j, k
+
+    alike_blocks = one == other
+    if (alike_blocks) return
+    g = grid_at(family, one)
+    if (grid_at(family, other) /= g) return
+    associate (grid => family%grids(g))
+      m = grid%reach_cells
+      my = merge(m, 0, family%dim > 1)
+      mz = merge(m, 0, family%dim > 2)
+      do k = -mz, mz
+        do j = -my, my
+          from = j*int(grid%stride(2), i8) + k*int(grid%stride(3), i8) - m
+          to = from + family%block_length - 1 + 2*m
+          if (any(family%class_of(one + from:one + to) &
+            & /= family%class_of(other + from:other + to))) return
+        end do
+      end do
+    end associate
+    alike_blocks = .true.
+  end function alike_blocks
 
   !> A key for each slot that says what its cross-section of rows looks like: a block's surroundings
   !> are the columns from its first slot less the reach to its last slot plus the reach.

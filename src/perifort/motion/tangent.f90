@@ -58,11 +58,13 @@ contains
     allocate (behind(size(w, 1), size(w, 2)))
     projected = system%model%projected
     system%model%projected = .false.
+    system%model%for_differences = .true.
     call displace(u, -step, w, moved)
     call forces_at(system, moved, behind)
     call displace(u, step, w, moved)
     call forces_at(system, moved, kw)
     system%model%projected = projected
+    system%model%for_differences = .false.
     call difference(-1/(2*step), kw, behind)
   end subroutine apply_tangent
 

@@ -5,6 +5,7 @@ module pd_output_recorder
   use pd_base_clock, only: duration_text, phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
+  use pd_base_numbers, only: pi
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, to_text
   use pd_family_family, only: bonds_type, allocate_bonds
@@ -16,6 +17,7 @@ module pd_output_recorder
   use pd_output_checkpoint, only: about_type, checkpoint_type
   use pd_output_contact, only: touching_points
   use pd_output_results, only: results_type
+  use pd_output_rotation, only: turned_part
   use pd_output_types, only: column_type, field_type
   implicit none (type, external)
   private
@@ -23,6 +25,11 @@ module pd_output_recorder
     & planned_outputs, planned_rows, probe_values, velocities_now
 
   character(*), parameter :: xyz(3) = ['x', 'y', 'z']
+
+  !> Rotations that the projected dilatation is told for: beyond 10 degrees it is off by 1.5 % and
+  !> more. So large a share of the points must have turned: a few may turn at the tip of a crack.
+  real(wp), parameter :: small_rotation = pi/18
+  real(wp), parameter :: least_turned = 0.02_wp
 
   !> When to write.
   type :: schedule_type
@@ -58,6 +65,7 @@ module pd_output_recorder
     integer :: gave_way = 0                  !! load steps left to dynamic relaxation
     integer :: gave_way_at = 0               !! the last of them
     type(warnings_type) :: warnings
+    logical :: turned = .false.              !! parts have turned, which was told
     logical :: quiet = .false.               !! warnings are kept, but not told
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
@@ -357,6 +365,7 @@ contains
     recorder%rows = recorder%rows + 1
     call recorder%results%add_row(history_row(system, recorder%probes, &
       & recorder%schedule%relaxation, instant, v, recorder%energies), error)
+    call warn_of_rotation(recorder, system, instant)
     if (.not. allocated(error)) call check_strain_energy(system, recorder%energies, instant%time, &
       & error)
   end subroutine write_row
@@ -522,5 +531,25 @@ contains
       & ', which share no intact bond, are closer than half a spacing: '// &
       & 'there is no contact, pieces pass through each other from here on')
   end subroutine warn_of_contact
+
+  !> Where the dilatation is projected, tell that parts of the body have turned.
+  subroutine warn_of_rotation(recorder, system, instant)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(in) :: system
+    type(instant_type), intent(in) :: instant
+    real(wp) :: share, largest
+
+    associate (model => system%model)
+      if (recorder%turned .or. .not. (model%dilatation .and. model%projected)) return
+    end associate
+    call turned_part(system%body, system%family, system%state%u, small_rotation, share, largest)
+    recorder%turned = share > least_turned
+    if (.not. recorder%turned) return
+    call recorder%warn('rotation', 'at t = '//to_text(instant%time)//' s '// &
+      & to_text(100*share, 2)//' % of the points are turned by more than 10 degrees, up to '// &
+      & to_text(largest*180/pi, 3)//': the projected dilatation shrinks by the cosine of a '// &
+      & "rotation, so forces and energies are off; &horizon dilatation = 'unprojected' has no "// &
+      & 'such error')
+  end subroutine warn_of_rotation
 
 end module pd_output_recorder

@@ -124,8 +124,6 @@ contains
       text = text//'1D'
     else if (system%model%thermal) then
       text = text//'thermal strain'
-    else if (system%model%dilatation .and. .not. system%model%projected) then
-      text = text//trim(scene%horizon%dilatation)//' dilatation'
     else
       text = text//'critical stretches this small'
     end if

@@ -279,9 +279,9 @@ contains
       & 'none'])
     call keys%key('surface_correction', group%surface_correction, 'correction of points with '// &
       & 'incomplete families (7.7)', allowed=[character(6) :: 'energy', 'none'])
-    call keys%key('dilatation', group%dilatation, 'stretch in the dilatation: projected '// &
-      & '(as in the book) or unprojected (Lambda = 1)', &
-      & allowed=[character(11) :: 'projected', 'unprojected'])
+    call keys%key('dilatation', group%dilatation, 'unprojected: Lambda = 1, whatever way parts '// &
+      & 'are turned; projected: Lambda as in the book, for small rotations', &
+      & allowed=[character(11) :: 'unprojected', 'projected'])
     call keys%key('family', group%family, &
       & 'how families are kept: a lattice where all points lie on grids, else lists; or one of '// &
       & 'them by force', &

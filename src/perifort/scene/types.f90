@@ -65,7 +65,7 @@ module pd_scene_types
     real(wp) :: length = unset                             !! delta [m], instead of ratio
     character(name_length) :: volume_correction = 'linear' !! 'linear_extended', 'exact', 'none'
     character(name_length) :: surface_correction = 'energy'!! 'none'
-    character(name_length) :: dilatation = 'projected'     !! 'unprojected': Lambda = 1
+    character(name_length) :: dilatation = 'unprojected'   !! 'projected': Lambda as printed
     character(name_length) :: family = 'automatic'         !! 'lattice', 'list'
   end type horizon_group
 

@@ -10,6 +10,7 @@ module pd_study_kernels
   use pd_family_family, only: family_type
   use pd_family_lattice, only: both_ends, lattice_family_type
   use pd_family_list, only: list_family_type
+  use pd_force_model, only: dilatation_of, no_dilatation, unprojected
   use pd_motion_explicit, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: evaluate, system_type
@@ -87,7 +88,7 @@ contains
         timing%bonds = system%family%n_bonds
         timing%bytes = memory_of(system)
         timing%build = set_up%timer%seconds('families') + set_up%timer%seconds('surface correction')
-        timing%flops = flops_of_bond(system%family, system%model%dilatation)*timing%bonds
+        timing%flops = flops_of_bond(system%family, dilatation_of(system%model))*timing%bonds
         timing%traffic = bytes_of_step(system)
         call start_moving(system, scene)
         call time_steps(system, set_up%plan%step, seconds, timing, error)
@@ -249,22 +250,27 @@ contains
   !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
   !> loops: xi and eta 2d, |xi|^2, x and e 3(2d - 1), the rest of them and the weight 9, polynomial
   !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more.
-  pure real(wp) function flops_of_bond(family, dilatation) result(flops)
+  !> Unprojected, the sum of the dilatation is 2 less, and what it adds to the force 3.
+  pure real(wp) function flops_of_bond(family, kind) result(flops)
     class(family_type), intent(in) :: family
-    logical, intent(in) :: dilatation      !! there is a pass for it
+    integer, intent(in) :: kind  !! of the dilatation, see `dilatation_of`
     integer :: d, geometry
+    logical :: dilatation
 
+    dilatation = kind /= no_dilatation
     d = family%dim
     select type (family)
     type is (list_family_type)
       geometry = 2*d + 3*(2*d - 1) + 9 + 15
       flops = geometry + 4 + 3*d
       if (dilatation) flops = flops + 9 + geometry + 4
+      if (kind == unprojected) flops = flops - 5
     type is (lattice_family_type)
       geometry = d + 2*(2*d - 1) + 3 + 15
       if (family%mixed) geometry = geometry + 2*d - 4
       flops = geometry + 1 + 4*d
       if (dilatation) flops = flops + 8 + geometry + 4
+      if (kind == unprojected) flops = flops - 5
       if (both_ends(d, family%mixed)) flops = (flops + merge(d + 1, d, dilatation))/2
     class default
       flops = 0.0_wp
