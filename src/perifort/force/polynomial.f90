@@ -14,6 +14,8 @@ module pd_force_polynomial
   public :: h0, h1, h2, h3, h4, h5, h6, h7
   public :: w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11
   public :: k0, k1, k2, k3, k4, k5
+  public :: g0, g1, g2, g3, g4, g5, g6, g7
+  public :: v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10, v11
 
   !> Ranges of e: the first is tried first; what is strained more gets more terms.
   integer, parameter :: narrow = 1, wide = 2, single = 3
@@ -32,12 +34,24 @@ module pd_force_polynomial
   real(sp), parameter :: k0 = 0.5_sp, k1 = -0.375_sp, k2 = 0.3124973582_sp, &
     & k3 = -0.273435023_sp, k4 = 0.2482048324_sp, k5 = -0.2275652827_sp
 
+  !> s = e g(e), the stretch itself, for |e| <= 0.02, relative error 3e-16.
+  real(wp), parameter :: g0 = 0.5_wp, g1 = -0.125_wp, g2 = 0.06250000000002183_wp, &
+    & g3 = -0.039062500000018555_wp, g4 = 0.027343749017680316_wp, g5 = -0.02050781166501785_wp, &
+    & g6 = 0.016119829433608308_wp, g7 = -0.013097607025781758_wp
+  !> The same for |e| <= 0.1.
+  real(wp), parameter :: v0 = 0.5_wp, v1 = -0.125_wp, v2 = 0.06250000000000124_wp, &
+    & v3 = -0.0390625000000011_wp, v4 = 0.027343749993823777_wp, v5 = -0.02050781249448386_wp, &
+    & v6 = 0.016113286186807907_wp, v7 = -0.013092045424756286_wp, v8 = 0.010908654452264042_wp, &
+    & v9 = -0.009272296833520361_wp, v10 = 0.008165984417340112_wp, v11 = -0.007148068075048751_wp
+
 contains
 
   !> Bonds with |e| below this are served by the fast formulas of a range; 0: none.
-  pure real(wp) function fast_limit(model, range) result(limit)
+  !> `unprojected`: the loops know Lambda = 1, too.
+  pure real(wp) function fast_limit(model, range, unprojected) result(limit)
     type(model_type), intent(in) :: model
     integer, intent(in) :: range
+    logical, intent(in), optional :: unprojected
     ! what single precision may miss of e: some roundings of eta/|xi| and of its square, both at
     ! most 2 or so where the length hardly changes
     real(wp), parameter :: roundings = 50*epsilon(1.0_sp)
@@ -48,7 +62,11 @@ contains
       limit = min(limit, model%least_critical*(2 - model%least_critical)*(1 - 1.0e-9_wp))
       if (range == single) limit = max(0.0_wp, limit - roundings)
     end if
-    if (model%thermal .or. (model%dilatation .and. .not. model%projected)) limit = 0.0_wp
+    if (model%thermal) limit = 0.0_wp
+    if (present(unprojected)) then
+      if (unprojected) return
+    end if
+    if (model%dilatation .and. .not. model%projected) limit = 0.0_wp
   end function fast_limit
 
 end module pd_force_polynomial

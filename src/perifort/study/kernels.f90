@@ -293,8 +293,8 @@ contains
     if (system%model%breaking) bytes = bytes + 2*points
     select type (family => system%family)
     type is (list_family_type)
-      bytes = bytes + passes*(6*real(size(family%member), wp) + points*8*3*8)
-      if (allocated(family%fraction)) bytes = bytes + passes*8*real(family%n_bonds, wp)
+      bytes = bytes + passes*(11*real(size(family%bits), wp) + points*8*3*8)
+      if (allocated(family%fraction)) bytes = bytes + passes*8*real(size(family%fraction), wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
       both = both_ends(d, family%mixed)
