@@ -33,9 +33,6 @@ module pd_force_list_fast
   !> The bits of the lanes; the last is the sign, which all bits of a wider kind repeat.
   integer(i8), parameter :: bit(lanes) = [1_i8, 2_i8, 4_i8, 8_i8, 16_i8, 32_i8, 64_i8, 128_i8]
 
-  !> Less half the bits of a real number, these are the bits of its reciprocal root, to 3.5 %.
-  integer(i8), parameter :: root_of_one = int(z'5FE6EB50C7B537A9', i8)
-
   !> What the loops must know beside the points.
   type :: task_type
     integer :: volume = no_correction
