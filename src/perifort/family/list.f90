@@ -32,12 +32,16 @@ module pd_family_list
     real(wp), allocatable :: spacing(:)        !! [m]
     logical :: one_spacing = .false.           !! all points have the same
     real(wp), allocatable :: fraction(:, :)    !! v_c of every lane (lanes, packs), only where it is
-                                               !! no simple formula
+                                               !! no simple formula, else of size 0
     real(wp), allocatable :: at(:, :)          !! of each slot, in one place: position, volume,
                                                !! displacement and p of the pass (8, n_slots)
     real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
     integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike: set by
                                                !! the first pass (`pd_force_list_points`)
+    integer(i8), allocatable :: stored(:)      !! place of the other clusters' first pack in
+    real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
+    real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs of those),
+                                               !! of all bonds, intact or not
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
@@ -87,7 +91,11 @@ contains
       family%at(at_volume, k) = body%volume(k)
     end do
     allocate (family%large(size(family%start) - 1), source=0_i1)
-    if (rule%kind == volume_exact) call store_fractions(family)
+    if (rule%kind == volume_exact) then
+      call store_fractions(family)
+    else
+      allocate (family%fraction(lanes, 0))
+    end if
   end subroutine new_list_family
 
   !> The number of bonds, and the most that one point and the most packs that one cluster has.
@@ -165,7 +173,7 @@ contains
       bonds%j(n) = other_end(family, e, l)
       bonds%intact(n) = iand(family%intact(e), lane_bit(l)) /= 0_i1
       bonds%weight(n) = family%at(at_volume, bonds%j(n))
-      if (allocated(family%fraction)) bonds%weight(n) = bonds%weight(n)*family%fraction(l, e)
+      if (size(family%fraction) > 0) bonds%weight(n) = bonds%weight(n)*family%fraction(l, e)
     end do
     bonds%n = n
     bonds%length(:n) = 0.0_wp
@@ -178,7 +186,7 @@ contains
     do i = 1, n
       bonds%length(i) = sqrt(bonds%length(i))
     end do
-    if (allocated(family%fraction) .or. family%rule%kind == volume_none) return
+    if (size(family%fraction) > 0 .or. family%rule%kind == volume_none) return
     do i = 1, n
       spacing = (family%spacing(k) + family%spacing(bonds%j(i)))/2
       bonds%weight(i) = bonds%weight(i) &
@@ -214,8 +222,10 @@ contains
     class(list_family_type), intent(in) :: family
     ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
     bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
-      & + 10_i8*size(family%large)
+      & + 18_i8*size(family%large)
     if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
+    if (allocated(family%weight_D)) bytes = bytes + 8*size(family%weight_D, kind=i8)
+    if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
   end function bytes
 
   function describe(family) result(text)
@@ -224,7 +234,7 @@ contains
     text = 'list: packs of the neighbours of every eight points, each with '//to_text( &
       & real(family%n_bonds, wp)/max(1, size(family%bits)), 2)//' bonds'
     if (allocated(family%reason)) text = text//' ('//family%reason//')'
-    if (allocated(family%fraction)) text = text//', with their volume fractions'
+    if (size(family%fraction) > 0) text = text//', with their volume fractions'
   end function describe
 
 end module pd_family_list

@@ -1,5 +1,5 @@
-!> The passes over the bonds of list families, cluster by cluster. Each takes the loops that just do:
-!> for points that are alike or for those that differ, for small strain or larger one; what no loop
+!> The passes over the bonds of list families, cluster by cluster. Each takes the loop that just does:
+!> for points that are alike or with stored weights, for small strain or larger one; what no loop
 !> serves (strains beyond 5 % or near breaking, temperature) is computed by the general formulas.
 module pd_force_list
   use pd_base_kinds, only: wp, i1, i8
@@ -8,13 +8,13 @@ module pd_force_list
   use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: choose_loop, for_energy, for_force, for_theta, pass_loop, task_type
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy
+    & general_energy, store_weights, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
   use pd_force_model, only: model_type
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
   private
-  public :: list_dilatation, list_force, list_energy
+  public :: prepare_list, list_dilatation, list_force, list_energy
 
   !> How far a cluster is strained (`large` of the family): within the narrow polynomial, within the
   !> wide one, beyond.
@@ -23,12 +23,23 @@ module pd_force_list
   !> The loops of a pass, and the strains that they serve.
   type :: loops_type
     procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters of points alike
-    procedure(pass_loop), pointer, nopass :: varied => null()
-    type(task_type) :: task                                    !! of the latter
+    procedure(pass_loop), pointer, nopass :: stored => null()  !! for those with stored weights
+    type(task_type) :: task                                    !! what is the same for all
     real(wp) :: narrow = 0.0_wp, wide = 0.0_wp                 !! limits of |e|, 0: none
   end type loops_type
 
 contains
+
+  !> Make what the family keeps of the model: which clusters have points alike, and the weights of
+  !> the others. The first pass does it if nobody has; afterwards the model must not change.
+  subroutine prepare_list(family, model)
+    type(list_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+
+    if (allocated(family%given)) return
+    call survey(family, model)
+    call store_weights(family, model)
+  end subroutine prepare_list
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
   !> intact bond beyond its limit.
@@ -44,7 +55,7 @@ contains
     integer(i1) :: strain
     integer :: c, k, l
 
-    call survey(family, model)
+    call prepare_list(family, model)
     call new_loops(family, model, for_theta, loops)
     call gather_state(family, u)
     !$omp parallel do schedule(dynamic, 32) default(none) &
@@ -56,7 +67,7 @@ contains
       call sum_up(family, model, loops, work, strain, sums)
       family%large(c) = strain
       if (strain == beyond) then
-        call fill_tables(family, model, .false., work)
+        call fill_tables(family, model, intact_of(family, c), .false., work)
         call general_theta(family, model, work, sums(:, 1))
         if (model%breaking) call mark(model, work, strained)
       end if
@@ -84,7 +95,7 @@ contains
     integer(i1) :: strain
     integer :: c, d
 
-    call survey(family, model)
+    call prepare_list(family, model)
     call new_loops(family, model, for_force, loops)
     call gather_state(family, u, p)
     !$omp parallel do schedule(dynamic, 32) default(none) &
@@ -96,7 +107,7 @@ contains
       strain = merge(family%large(c), little, model%dilatation)
       call sum_up(family, model, loops, work, strain, sums)
       if (strain == beyond) then
-        call fill_tables(family, model, .false., work)
+        call fill_tables(family, model, intact_of(family, c), .false., work)
         call general_force(family, model, work, sums)
         if (model%breaking) call mark(model, work, strained)
       end if
@@ -118,7 +129,7 @@ contains
     logical :: missed
     integer :: c, k, l
 
-    call survey(family, model)
+    call prepare_list(family, model)
     call new_loops(family, model, for_energy, loops)
     call gather_state(family, u)
     !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model, energy, loops) &
@@ -126,10 +137,10 @@ contains
     do c = 1, size(family%large)
       call take_up(family, c, work)
       if (model%thermal) then
-        call fill_tables(family, model, .true., work)
+        call fill_tables(family, model, intact_of(family, c), .true., work)
         call general_energy(family, model, work, sums(:, 1), sums(:, 2))
       else
-        call run_loop(family, work, loops%varied, loops%task, sums, missed)
+        call run_loop(family, work, loops%stored, loops%task, sums, missed)
       end if
       do l = 1, lanes
         k = work%first + l - 1
@@ -143,6 +154,14 @@ contains
 
   ! ---------------------------------------------------------------- one cluster
 
+  !> Bits of the intact bonds of cluster `c`.
+  pure function intact_of(family, c) result(bits)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in) :: c
+    integer(i1) :: bits(family%start(c + 1) - family%start(c))
+    bits = family%intact(family%start(c):family%start(c + 1) - 1)
+  end function intact_of
+
   !> The loops of a pass.
   subroutine new_loops(family, model, pass, loops)
     type(list_family_type), intent(in) :: family
@@ -151,7 +170,7 @@ contains
     type(loops_type), intent(out) :: loops
 
     call choose_loop(family%dim, pass, .false., model%dilatation, model%projected, loops%plain)
-    call choose_loop(family%dim, pass, .true., model%dilatation, model%projected, loops%varied)
+    call choose_loop(family%dim, pass, .true., model%dilatation, model%projected, loops%stored)
     call new_task(family, model, loops%task)
     loops%narrow = fast_limit(model, narrow, unprojected=.true.)
     loops%wide = fast_limit(model, wide, unprojected=.true.)
@@ -171,27 +190,38 @@ contains
     type(task_type) :: task
     logical :: missed
 
+    task = loops%task
+    if (family%plain(work%cluster) == 1_i1) call plain_task(family, model, work%cluster, task)
     if (strain == little .and. loops%narrow > 0.0_wp) then
-      task = loops%task
       task%limit = loops%narrow
-      if (family%plain(work%cluster) == 1_i1) then
-        call plain_task(family, model, work%cluster, task)
-        call run_loop(family, work, loops%plain, task, sums, missed)
-      else
-        call run_loop(family, work, loops%varied, task, sums, missed)
-      end if
+      call run_either(family, work, loops, task, sums, missed)
       if (.not. missed) return
     end if
     if (strain < beyond .and. loops%wide > 0.0_wp) then
-      task = loops%task
       task%limit = loops%wide
       task%wide = .true.
-      call run_loop(family, work, loops%varied, task, sums, missed)
+      call run_either(family, work, loops, task, sums, missed)
       strain = more
       if (.not. missed) return
     end if
     strain = beyond
   end subroutine sum_up
+
+  !> The loop that has the weights of the cluster.
+  subroutine run_either(family, work, loops, task, sums, missed)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(in) :: work
+    type(loops_type), intent(in) :: loops
+    type(task_type), intent(in) :: task
+    real(wp), intent(inout) :: sums(lanes, 3)
+    logical, intent(out) :: missed
+
+    if (family%plain(work%cluster) == 1_i1) then
+      call run_loop(family, work, loops%plain, task, sums, missed)
+    else
+      call run_loop(family, work, loops%stored, task, sums, missed)
+    end if
+  end subroutine run_either
 
   !> One loop over the packs of a cluster.
   subroutine run_loop(family, work, loop, task, sums, missed)
@@ -201,37 +231,18 @@ contains
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
-    real(wp) :: none(lanes, 1)
+    integer(i8) :: e, last, b, f, d
 
-    associate (e => family%start(work%cluster), n => work%n)
-      if (allocated(family%fraction)) then
-        call loop(n, family%member(:, e:e + n - 1), family%first(e:e + n - 1), &
-          & family%intact(e:e + n - 1), family%at, family%given, family%fraction(:, e:e + n - 1), &
-          & work%own, task, sums, missed)
-      else
-        call loop(n, family%member(:, e:e + n - 1), family%first(e:e + n - 1), &
-          & family%intact(e:e + n - 1), family%at, family%given, none, work%own, task, sums, missed)
-      end if
-    end associate
+    ! tables that are not there have no second element; loops that need them are not called then
+    e = family%start(work%cluster)
+    last = e + work%n - 1
+    b = family%stored(work%cluster)
+    f = merge(e, 1_i8, size(family%fraction) > 0)
+    d = merge(b, 1_i8, size(family%weight_D) > 0)
+    call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
+      & family%at, family%given, family%fraction(:, f:), family%weight_D(:, d:), &
+      & family%weight_S(:, b:), work%own, task, sums, missed)
   end subroutine run_loop
-
-  !> Turn to cluster `c`.
-  pure subroutine take_up(family, c, work)
-    type(list_family_type), intent(in) :: family
-    integer, intent(in) :: c
-    type(work_type), intent(inout) :: work
-    integer :: d, l
-
-    work%cluster = c
-    work%first = lanes*(c - 1) + 1
-    work%n = int(family%start(c + 1) - family%start(c))
-    do d = 1, at_p
-      do l = 1, lanes
-        work%own(l, d) = family%at(d, work%first + l - 1)
-        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
-      end do
-    end do
-  end subroutine take_up
 
   !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
   !> then stands in one place.

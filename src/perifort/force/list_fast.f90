@@ -40,14 +40,15 @@ module pd_force_list_fast
     logical :: wide = .false.         !! the polynomial of the wide range
     real(wp) :: edge = 0.0_wp         !! where vc vanishes; with `own_spacing` the horizon [m]
     real(wp) :: slope = 0.0_wp        !! of vc [1/m]
-    real(wp) :: q = 0.0_wp            !! of clusters that are not varied: (q_k + q_j) Gb/Gd,
+    real(wp) :: q = 0.0_wp            !! of plain clusters: (q_k + q_j) Gb/Gd,
     real(wp) :: factor = 1.0_wp       !! Gd, or (q_k + q_j) Gb without a dilatation
     real(wp) :: limit = 0.0_wp        !! of |e|
   end type task_type
 
   abstract interface
     !> Sums of one cluster's bonds, see bond_pass.inc.
-    subroutine pass_loop(n, member, first, intact, at, given, fraction, own, task, sums, missed)
+    subroutine pass_loop(n, member, first, intact, at, given, fraction, weight_D, weight_S, own, &
+      & task, sums, missed)
       import :: wp, i1, i4, lanes, task_type
       implicit none (type, external)
       integer, intent(in) :: n                    !! packs
@@ -59,6 +60,8 @@ module pd_force_list_fast
                                                   !! displacement, p
       real(wp), intent(in) :: given(8, *)         !! and q, half the spacing, factors D and S
       real(wp), intent(in) :: fraction(lanes, *)  !! vc, if stored
+      real(wp), intent(in) :: weight_D(lanes, *)  !! Gd vc V of each lane, if stored
+      real(wp), intent(in) :: weight_S(lanes, *)  !! (q_k + q_j) Gb vc V |xi|, if stored
       real(wp), intent(in) :: own(lanes, 16)      !! `at` and `given` of the lanes
       type(task_type), intent(in) :: task
       real(wp), intent(inout) :: sums(lanes, 3)
@@ -68,226 +71,226 @@ module pd_force_list_fast
 
 contains
 
-  !> The loop of a `pass` in `dim` dimensions. `varied`: points differ in more than their place and
-  !> volume; `state`: there is a dilatation, `projected` or not.
-  subroutine choose_loop(dim, pass, varied, state, projected, loop)
+  !> The loop of a `pass` in `dim` dimensions. `stored`: of theta and force, with stored weights;
+  !> `state`: there is a dilatation, `projected` or not.
+  subroutine choose_loop(dim, pass, stored, state, projected, loop)
     integer, intent(in) :: dim, pass
-    logical, intent(in) :: varied, state, projected
+    logical, intent(in) :: stored, state, projected
     procedure(pass_loop), pointer, intent(out) :: loop
 
     select case (pass)
     case (for_theta)
       if (projected) then
-        call choose_one(dim, varied, plain_projected_theta_2, plain_projected_theta_3, &
-          & varied_projected_theta_2, varied_projected_theta_3, loop)
+        call choose_one(dim, stored, plain_projected_theta_2, plain_projected_theta_3, &
+          & stored_projected_theta_2, stored_projected_theta_3, loop)
       else
-        call choose_one(dim, varied, plain_theta_2, plain_theta_3, varied_theta_2, varied_theta_3, &
+        call choose_one(dim, stored, plain_theta_2, plain_theta_3, stored_theta_2, stored_theta_3, &
           & loop)
       end if
     case (for_force)
       if (.not. state) then
-        call choose_one(dim, varied, plain_bond_force_2, plain_bond_force_3, varied_bond_force_2, &
-          & varied_bond_force_3, loop)
+        call choose_one(dim, stored, plain_bond_force_2, plain_bond_force_3, stored_bond_force_2, &
+          & stored_bond_force_3, loop)
       else if (projected) then
-        call choose_one(dim, varied, plain_projected_force_2, plain_projected_force_3, &
-          & varied_projected_force_2, varied_projected_force_3, loop)
+        call choose_one(dim, stored, plain_projected_force_2, plain_projected_force_3, &
+          & stored_projected_force_2, stored_projected_force_3, loop)
       else
-        call choose_one(dim, varied, plain_force_2, plain_force_3, varied_force_2, varied_force_3, &
+        call choose_one(dim, stored, plain_force_2, plain_force_3, stored_force_2, stored_force_3, &
           & loop)
       end if
     case default
-      ! for energies, which take points as they are, alike or not
+      ! for energies
       if (projected) then
-        call choose_one(dim, varied, varied_projected_energy_2, varied_projected_energy_3, &
-          & varied_projected_energy_2, varied_projected_energy_3, loop)
+        loop => projected_energy_2
+        if (dim == 3) loop => projected_energy_3
       else
-        call choose_one(dim, varied, varied_energy_2, varied_energy_3, varied_energy_2, &
-          & varied_energy_3, loop)
+        loop => energy_2
+        if (dim == 3) loop => energy_3
       end if
     end select
   end subroutine choose_loop
 
-  subroutine choose_one(dim, varied, plain_2, plain_3, varied_2, varied_3, loop)
+  subroutine choose_one(dim, stored, plain_2, plain_3, stored_2, stored_3, loop)
     integer, intent(in) :: dim
-    logical, intent(in) :: varied
-    procedure(pass_loop) :: plain_2, plain_3, varied_2, varied_3
+    logical, intent(in) :: stored
+    procedure(pass_loop) :: plain_2, plain_3, stored_2, stored_3
     procedure(pass_loop), pointer, intent(out) :: loop
 
-    if (varied) then
-      loop => varied_2
-      if (dim == 3) loop => varied_3
+    if (stored) then
+      loop => stored_2
+      if (dim == 3) loop => stored_3
     else
       loop => plain_2
       if (dim == 3) loop => plain_3
     end if
   end subroutine choose_one
 
-  subroutine plain_projected_theta_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_projected_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: varied = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_theta_2
 
-  subroutine plain_theta_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: varied = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_theta_2
 
-  subroutine plain_bond_force_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_bond_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: varied = .false., state = .false., projected = .true.
+    logical, parameter :: stored = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_bond_force_2
 
-  subroutine plain_projected_force_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_projected_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: varied = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_force_2
 
-  subroutine plain_force_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: varied = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_force_2
 
-  subroutine varied_projected_theta_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_projected_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: varied = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_projected_theta_2
+  end subroutine stored_projected_theta_2
 
-  subroutine varied_theta_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: varied = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
-  end subroutine varied_theta_2
+  end subroutine stored_theta_2
 
-  subroutine varied_bond_force_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_bond_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: varied = .true., state = .false., projected = .true.
+    logical, parameter :: stored = .true., state = .false., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_bond_force_2
+  end subroutine stored_bond_force_2
 
-  subroutine varied_projected_force_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_projected_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: varied = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_projected_force_2
+  end subroutine stored_projected_force_2
 
-  subroutine varied_force_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: varied = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
-  end subroutine varied_force_2
+  end subroutine stored_force_2
 
-  subroutine varied_projected_energy_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine projected_energy_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_energy
-    logical, parameter :: varied = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_projected_energy_2
+  end subroutine projected_energy_2
 
-  subroutine varied_energy_2(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine energy_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_energy
-    logical, parameter :: varied = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
-  end subroutine varied_energy_2
+  end subroutine energy_2
 
-  subroutine plain_projected_theta_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_projected_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: varied = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_theta_3
 
-  subroutine plain_theta_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: varied = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_theta_3
 
-  subroutine plain_bond_force_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_bond_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: varied = .false., state = .false., projected = .true.
+    logical, parameter :: stored = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_bond_force_3
 
-  subroutine plain_projected_force_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_projected_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: varied = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_force_3
 
-  subroutine plain_force_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine plain_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: varied = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_force_3
 
-  subroutine varied_projected_theta_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_projected_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: varied = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_projected_theta_3
+  end subroutine stored_projected_theta_3
 
-  subroutine varied_theta_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: varied = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
-  end subroutine varied_theta_3
+  end subroutine stored_theta_3
 
-  subroutine varied_bond_force_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_bond_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: varied = .true., state = .false., projected = .true.
+    logical, parameter :: stored = .true., state = .false., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_bond_force_3
+  end subroutine stored_bond_force_3
 
-  subroutine varied_projected_force_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_projected_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: varied = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_projected_force_3
+  end subroutine stored_projected_force_3
 
-  subroutine varied_force_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine stored_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: varied = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
-  end subroutine varied_force_3
+  end subroutine stored_force_3
 
-  subroutine varied_projected_energy_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine projected_energy_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_energy
-    logical, parameter :: varied = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
-  end subroutine varied_projected_energy_3
+  end subroutine projected_energy_3
 
-  subroutine varied_energy_3(n, member, first, intact, at, given, fraction, own, task, &
-    & sums, missed)
+  subroutine energy_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_energy
-    logical, parameter :: varied = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
-  end subroutine varied_energy_3
+  end subroutine energy_3
 
 end module pd_force_list_fast

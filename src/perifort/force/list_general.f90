@@ -12,7 +12,8 @@ module pd_force_list_general
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: work_type, allocate_tables, fill_tables, general_theta, general_force, general_energy
+  public :: work_type, fill_tables, general_theta, general_force, general_energy, store_weights
+  public :: take_up
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
@@ -31,6 +32,24 @@ module pd_force_list_general
 
 contains
 
+  !> Turn to cluster `c`.
+  pure subroutine take_up(family, c, work)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in) :: c
+    type(work_type), intent(inout) :: work
+    integer :: d, l
+
+    work%cluster = c
+    work%first = lanes*(c - 1) + 1
+    work%n = int(family%start(c + 1) - family%start(c))
+    do d = 1, at_p
+      do l = 1, lanes
+        work%own(l, d) = family%at(d, work%first + l - 1)
+        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
+      end do
+    end do
+  end subroutine take_up
+
   !> Room for the tables of any cluster.
   subroutine allocate_tables(family, work)
     type(list_family_type), intent(in) :: family
@@ -42,11 +61,12 @@ contains
     end associate
   end subroutine allocate_tables
 
-  !> Weights of a cluster's bonds, for any rule, material and surface factor. `own`: with 2 q_k in
-  !> place of q_k + q_j, as the energy needs them.
-  subroutine fill_tables(family, model, own, work)
+  !> Weights of a cluster's bonds, for any rule, material and surface factor: of those that `bits`
+  !> (packs of the cluster) has. `own`: with 2 q_k in place of q_k + q_j, as the energy needs them.
+  subroutine fill_tables(family, model, bits, own, work)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    integer(i1), intent(in) :: bits(:)
     logical, intent(in) :: own
     type(work_type), intent(inout) :: work
     real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c
@@ -60,7 +80,7 @@ contains
       j = family%member(1, e)
       m = family%member(2, e)
       from = iand(family%first(e), lane_bit) /= 0_i1
-      there = iand(family%intact(e), lane_bit) /= 0_i1
+      there = iand(bits(i), lane_bit) /= 0_i1
       x = merge(family%at(1, j), family%at(1, m), from) - work%own(:, 1)
       y = merge(family%at(2, j), family%at(2, m), from) - work%own(:, 2)
       z = merge(family%at(3, j), family%at(3, m), from) - work%own(:, 3)
@@ -101,6 +121,37 @@ contains
       end do
     end do
   end subroutine fill_tables
+
+  !> Store the weights of all clusters whose points are not alike.
+  subroutine store_weights(family, model)
+    type(list_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    type(work_type) :: work
+    integer(i8) :: n, b
+    integer :: c
+
+    allocate (family%stored(size(family%plain)), source=1_i8)
+    n = 0_i8
+    do c = 1, size(family%plain)
+      if (family%plain(c) == 1_i1) cycle
+      family%stored(c) = n + 1
+      n = n + family%start(c + 1) - family%start(c)
+    end do
+    allocate (family%weight_S(lanes, n))
+    allocate (family%weight_D(lanes, merge(n, 0_i8, model%dilatation)))
+    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model) private(work, b, c)
+    do c = 1, size(family%plain)
+      if (family%plain(c) == 1_i1) cycle
+      call take_up(family, c, work)
+      call fill_tables(family, model, family%bits(family%start(c):family%start(c + 1) - 1), &
+        & .false., work)
+      b = family%stored(c)
+      associate (n => work%n)
+        family%weight_S(:, b:b + n - 1) = work%stretch(:, :n)/work%geometry(:, :n)
+        if (model%dilatation) family%weight_D(:, b:b + n - 1) = work%dilatation(:, :n)
+      end associate
+    end do
+  end subroutine store_weights
 
   !> theta of the lanes.
   pure subroutine general_theta(family, model, work, theta)

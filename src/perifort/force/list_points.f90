@@ -23,13 +23,12 @@ module pd_force_list_points
 
 contains
 
-  !> Put what the model gives into the family, once: the model must not change afterwards.
+  !> Put what the model gives into the family, and find the clusters whose points are alike.
   subroutine survey(family, model)
     type(list_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
     integer :: k, c, d
 
-    if (allocated(family%given)) return
     ! without a factor the sum of both ends is 1, in directions that the body does not have, too
     allocate (family%given(8, family%n_slots), source=0.5_wp)
     allocate (family%plain(size(family%large)), source=0_i1)
@@ -86,7 +85,7 @@ contains
     end associate
   end function is_plain
 
-  !> What is the same for all clusters whose points differ.
+  !> What the loops for energies must know, and what is the same for all clusters.
   subroutine new_task(family, model, task)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
