@@ -173,36 +173,40 @@ contains
 
   !> Find for each member of a cluster another one with no lane in common: `partner` gets its place,
   !> 0 for members that stay single, and -1 for those that have become another's partner. Members
-  !> with many lanes choose first, and take the first that fits among those with the most lanes.
+  !> with many lanes choose first, and take one that waits, again with as many lanes as fit. Those
+  !> with the same lanes wait in one stack, so that a member looks at 255 stacks at most.
   pure subroutine choose_partners(bits, partner)
     integer(i1), intent(in) :: bits(:)
     integer(i4), intent(out) :: partner(:)
-    integer :: order(size(bits)), low(size(bits)), i, k, n, number, open
+    integer(i4), allocatable :: below(:)      ! of each member that waits: the next in its stack
+    integer(i4) :: top(0:255)                 ! of the stack of each set of lanes, 0: empty
+    integer :: sets(255)                      ! those that have or had a stack
+    integer :: i, k, n, number, lanes_of
 
     partner = 0_i4
+    allocate (below(size(bits)), source=0_i4)
+    top = 0_i4
     n = 0
-    do number = lanes, 1, -1
+    do number = lanes - 1, 1, -1
       do i = 1, size(bits)
         if (popcnt(bits(i)) /= number) cycle
-        n = n + 1
-        order(n) = i
+        lanes_of = iand(int(bits(i)), 255)
+        do k = 1, n
+          if (iand(sets(k), lanes_of) == 0 .and. top(sets(k)) > 0) exit
+        end do
+        if (k <= n) then
+          partner(top(sets(k))) = int(i, i4)
+          partner(i) = -1_i4
+          top(sets(k)) = below(top(sets(k)))
+        else
+          if (.not. any(sets(:n) == lanes_of)) then
+            n = n + 1
+            sets(n) = lanes_of
+          end if
+          below(i) = top(lanes_of)
+          top(lanes_of) = int(i, i4)
+        end if
       end do
-    end do
-    ! those that still wait for a partner, in that order
-    open = 0
-    do i = 1, n
-      do k = 1, open
-        if (iand(bits(low(k)), bits(order(i))) == 0_i1) exit
-      end do
-      if (k <= open) then
-        partner(low(k)) = int(order(i), i4)
-        partner(order(i)) = -1_i4
-        low(k:open - 1) = low(k + 1:open)
-        open = open - 1
-      else if (popcnt(bits(order(i))) < lanes) then
-        open = open + 1
-        low(open) = order(i)
-      end if
     end do
   end subroutine choose_partners
 

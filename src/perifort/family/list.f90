@@ -24,8 +24,8 @@ module pd_family_list
 
   type, extends(family_type) :: list_family_type
     integer(i8), allocatable :: start(:)       !! first pack of each cluster (clusters + 1)
-    integer(i4), allocatable :: member(:, :)   !! slots at the other ends of a pack's bonds (2, packs)
-    integer(i1), allocatable :: first(:)       !! the lanes whose bond goes to `member(1, :)` (packs)
+    integer(i4), allocatable :: member(:, :)   !! slots at the other ends (2, packs)
+    integer(i1), allocatable :: first(:)       !! lanes whose bond goes to `member(1, :)`
     integer(i1), allocatable :: bits(:)        !! the lanes that have a bond (packs)
     integer(i1), allocatable :: intact(:)      !! those of them whose bond is intact
     integer :: most_packs = 0                  !! largest number of packs of a cluster
@@ -40,7 +40,7 @@ module pd_family_list
                                                !! the first pass (`pd_force_list_points`)
     integer(i8), allocatable :: stored(:)      !! place of the other clusters' first pack in
     real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
-    real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs of those),
+    real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
                                                !! of all bonds, intact or not
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice

@@ -1,6 +1,6 @@
-!> The passes over the bonds of list families, cluster by cluster. Each takes the loop that just does:
-!> for points that are alike or with stored weights, for small strain or larger one; what no loop
-!> serves (strains beyond 5 % or near breaking, temperature) is computed by the general formulas.
+!> The passes over the bonds of list families, cluster by cluster. Each takes the loop that just
+!> does: for points that are alike or with stored weights, for small strain or larger one; what no
+!> loop serves (strains beyond 5 % or near breaking, temperature) is computed by the general formulas.
 module pd_force_list
   use pd_base_kinds, only: wp, i1, i8
   use pd_family_list, only: list_family_type, at_moved, at_p
@@ -67,7 +67,9 @@ contains
       call sum_up(family, model, loops, work, strain, sums)
       family%large(c) = strain
       if (strain == beyond) then
-        call fill_tables(family, model, intact_of(family, c), .false., work)
+        associate (e => family%start(c), n => work%n)
+          call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
+        end associate
         call general_theta(family, model, work, sums(:, 1))
         if (model%breaking) call mark(model, work, strained)
       end if
@@ -107,7 +109,9 @@ contains
       strain = merge(family%large(c), little, model%dilatation)
       call sum_up(family, model, loops, work, strain, sums)
       if (strain == beyond) then
-        call fill_tables(family, model, intact_of(family, c), .false., work)
+        associate (e => family%start(c), n => work%n)
+          call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
+        end associate
         call general_force(family, model, work, sums)
         if (model%breaking) call mark(model, work, strained)
       end if
@@ -137,7 +141,9 @@ contains
     do c = 1, size(family%large)
       call take_up(family, c, work)
       if (model%thermal) then
-        call fill_tables(family, model, intact_of(family, c), .true., work)
+        associate (e => family%start(c), n => work%n)
+          call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
+        end associate
         call general_energy(family, model, work, sums(:, 1), sums(:, 2))
       else
         call run_loop(family, work, loops%stored, loops%task, sums, missed)
@@ -153,14 +159,6 @@ contains
   end subroutine list_energy
 
   ! ---------------------------------------------------------------- one cluster
-
-  !> Bits of the intact bonds of cluster `c`.
-  pure function intact_of(family, c) result(bits)
-    type(list_family_type), intent(in) :: family
-    integer, intent(in) :: c
-    integer(i1) :: bits(family%start(c + 1) - family%start(c))
-    bits = family%intact(family%start(c):family%start(c + 1) - 1)
-  end function intact_of
 
   !> The loops of a pass.
   subroutine new_loops(family, model, pass, loops)
@@ -265,7 +263,7 @@ contains
   ! ---------------------------------------------------------------- breaking
 
   !> Mark the lanes with an intact bond within a relative 1e-9 of the smallest limit of all. The
-  !> margin covers rounding; `pd_force_breaking` evaluates the exact criterion for marked slots only.
+  !> margin covers rounding; `pd_force_breaking` evaluates the exact criterion for these slots only.
   pure subroutine mark(model, work, strained)
     type(model_type), intent(in) :: model
     type(work_type), intent(in) :: work

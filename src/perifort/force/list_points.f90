@@ -15,7 +15,8 @@ module pd_force_list_points
   public :: survey, new_task, plain_task
   public :: given_q, given_half, given_D, given_S
 
-  !> Where things stand in `given`: q, half the spacing, surface factors of dilatation and stretches.
+  !> Where things stand in `given`: q, half the spacing, surface factors of dilatation and of
+  !> stretches.
   integer, parameter :: given_q = 1, given_half = 2, given_D = 3, given_S = 6
 
   !> Surface factors that differ less are those of one surrounding, off by the order of its sums.
