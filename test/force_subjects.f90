@@ -220,17 +220,21 @@ contains
     type(subject_type), intent(out) :: subject
     logical, intent(out) :: there
     integer, parameter :: variants = 14
+    integer :: extra
 
-    there = number <= 3*variants + merge(7, 1, kind == 'list')
+    there = number <= 3*variants + merge(11, 1, kind == 'list')
     if (.not. there) return
     subject%kind = kind
     if (number > 3*variants + 1) then
-      ! clouds: every point has weights of its own
-      subject%cloud = .true.
+      extra = number - 3*variants - 1
       subject%surface = .true.
-      subject%dim = 2 + mod(number, 2)
-      subject%bond_based = number > 3*variants + 5
-      subject%projected = number > 3*variants + 3
+      subject%dim = 2 + mod(extra, 2)
+      ! clouds, where every point has weights of its own: Lambda = 1, as printed, no dilatation
+      subject%cloud = extra <= 6
+      subject%projected = extra >= 3 .and. extra <= 6
+      subject%bond_based = extra == 5 .or. extra == 6
+      ! the other rules with Lambda = 1
+      if (extra > 6) subject%rule = merge(volume_none, volume_exact, extra <= 8)
       subject%two_materials = .true.
       call build(subject)
       return

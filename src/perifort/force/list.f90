@@ -1,6 +1,6 @@
 !> The passes over the bonds of list families, cluster by cluster. Each takes the loop that just
 !> does: for points that are alike or with stored weights, for small strain or larger one; what no
-!> loop serves (strains beyond 5 % or near breaking, temperature) is computed by the general formulas.
+!> loop serves (strains beyond 5 % or near breaking, temperature) is done by general formulas.
 module pd_force_list
   use pd_base_kinds, only: wp, i1, i8
   use pd_family_list, only: list_family_type, at_moved, at_p

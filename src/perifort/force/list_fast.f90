@@ -2,7 +2,6 @@
 !> and that for energies: one text, and code of its own for each choice, because what is chosen must
 !> be constants where the loops are compiled. In 1D they work with a second component that is zero.
 module pd_force_list_fast
-  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_family_offsets, only: lanes
   use pd_force_general, only: crushed

@@ -103,8 +103,9 @@ contains
     case (volume_exact)
       task%volume = stored_fraction
     case default
-      task%volume = -1
-      task%limit = ieee_value(1.0_wp, ieee_quiet_nan)
+      ! a rule that the loops do not know must not look like an answer
+      task%volume = one_spacing
+      task%slope = ieee_value(1.0_wp, ieee_quiet_nan)
     end select
   end subroutine new_task
 
