@@ -18,7 +18,7 @@ module force_subjects
   use pd_force_model, only: model_type, new_model
   use pd_force_weights, only: build_weights
   use pd_scene_types, only: crack_group
-  use bodies, only: youngs_modulus
+  use bodies, only: noise, youngs_modulus
   implicit none (type, external)
   private
   public :: subject_type, kinds, tolerance, spacing, build, build_pair, subject_number, &
@@ -45,6 +45,7 @@ module force_subjects
     logical :: hole = .false.
     logical :: crack = .false.
     logical :: breaking = .false.
+    logical :: cloud = .false.               !! lists: points off the lattice, spacings that differ
     integer :: rule = volume_linear
     integer(i8) :: key_bits = not(0_i8)      !! lattices: bits of keys that count
     type(body_type) :: body
@@ -125,8 +126,9 @@ contains
           end do
         end do
       end do
-      body%volume = spacing**subject%dim*depth(subject%dim)
       body%spacing = spacing
+      if (subject%cloud) call scatter(body)
+      body%volume = body%spacing**subject%dim*depth(subject%dim)
       body%body = 1_i2
       body%grid = 1_i2
       body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
@@ -181,6 +183,20 @@ contains
     end associate
   end subroutine build
 
+  !> Move points off the lattice by up to a fifth of a spacing, and give them spacings of their own.
+  subroutine scatter(body)
+    type(body_type), intent(inout) :: body
+    integer :: i, c, state
+
+    state = 17
+    do i = 1, body%n_points
+      do c = 1, body%dim
+        body%x(i, c) = body%x(i, c) + 0.2_wp*spacing*noise(state)
+      end do
+      body%spacing(i) = spacing*(1 + 0.2_wp*noise(state))
+    end do
+  end subroutine scatter
+
   !> Classical constants leave no energy of dilatation in 1D; the force knows it (doc/theory.md, 2).
   pure subroutine give_dilatation(delta, material)
     real(wp), intent(in) :: delta
@@ -197,18 +213,34 @@ contains
     if (dim == 1) depth = 3.0e-4_wp
   end function depth
 
-  !> The subjects: every dimension with every term alone and with all of them, and bars with energy
-  !> of dilatation, of both kinds. `number` counts on until `there` is false.
+  !> The subjects: every dimension with every term alone and with all of them, bars with energy
+  !> of dilatation, of both kinds, and clouds where the family takes them. `number` counts on until `there` is
+  !> false.
   subroutine subject_number(kind, number, subject, there)
     character(*), intent(in) :: kind
     integer, intent(in) :: number
     type(subject_type), intent(out) :: subject
     logical, intent(out) :: there
     integer, parameter :: variants = 16
+    integer :: extra
 
-    there = number <= 3*variants + 2
+    there = number <= 3*variants + merge(12, 2, kind == 'list')
     if (.not. there) return
     subject%kind = kind
+    if (number > 3*variants + 2) then
+      extra = number - 3*variants - 2
+      subject%surface = .true.
+      subject%dim = 2 + mod(extra, 2)
+      ! clouds, where every point has weights of its own: Lambda = 1, as printed, no dilatation
+      subject%cloud = extra <= 6
+      subject%projected = extra >= 3 .and. extra <= 6
+      subject%bond_based = extra == 5 .or. extra == 6
+      ! the other rules with Lambda = 1
+      if (extra > 6) subject%rule = merge(volume_none, volume_exact, extra <= 8)
+      subject%two_materials = .true.
+      call build(subject)
+      return
+    end if
     if (number > 3*variants) then
       subject%dim = 1
       subject%dilatant = .true.

@@ -27,6 +27,7 @@ module pd_driver
   use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
+  use pd_force_list, only: prepare_list
   use pd_force_weights, only: build_weights
   use pd_motion_bounds, only: check_bounds
   use pd_motion_explicit, only: run_explicit, begin_steps => begin_memory
@@ -353,12 +354,14 @@ contains
     end if
   end subroutine make_family
 
-  !> What a lattice keeps of the model: the weights of its blocks.
+  !> What a family keeps of the model: the weights of its bonds.
   subroutine finish_family(system)
     type(system_type), intent(inout) :: system
     select type (family => system%family)
     type is (lattice_family_type)
       call build_weights(family, system%model)
+    type is (list_family_type)
+      call prepare_list(family, system%model)
     end select
   end subroutine finish_family
 

@@ -7,7 +7,7 @@ module pd_family_clusters
   use pd_family_offsets, only: lanes
   implicit none (type, external)
   private
-  public :: rows_type, order_in_rows, collect_members, lane_bit
+  public :: rows_type, order_in_rows, collect_members, pair_members, lane_bit
 
   !> The bit by which a lane is marked.
   integer(i1), parameter :: lane_bit(lanes) = int([1, 2, 4, 8, 16, 32, 64, -128], i1)
@@ -118,6 +118,97 @@ contains
         & bits(start(c):start(c + 1) - 1))
     end do
   end subroutine collect_members
+
+  !> Packs of all clusters: a pack is one member, or two that share no lane, so that one pass over
+  !> eight lanes serves both. From the members as `collect_members` finds them; on return those of
+  !> cluster c are the packs from `start(c)` to `start(c+1) - 1`: `pair` (2, packs) has their slots
+  !> (twice the same for a single one), `bits` the lanes with a bond, and `first` the lanes whose
+  !> bond goes to `pair(1, :)`.
+  subroutine pair_members(start, member, bits, pair, first)
+    integer(i8), intent(inout) :: start(:)
+    integer(i4), intent(in) :: member(:)
+    integer(i1), allocatable, intent(inout) :: bits(:)
+    integer(i4), allocatable, intent(out) :: pair(:, :)
+    integer(i1), allocatable, intent(out) :: first(:)
+    integer(i8), allocatable :: begin(:)
+    integer(i4), allocatable :: partner(:)
+    integer(i1), allocatable :: both(:)
+    integer(i8) :: e, n
+    integer :: c
+
+    allocate (partner(size(member)), begin(size(start)))
+    begin(1) = 1_i8
+    !$omp parallel do schedule(dynamic, 64) default(none) private(c) &
+    !$omp shared(start, bits, partner, begin)
+    do c = 1, size(start) - 1
+      associate (here => partner(start(c):start(c + 1) - 1))
+        call choose_partners(bits(start(c):start(c + 1) - 1), here)
+        begin(c + 1) = count(here >= 0)
+      end associate
+    end do
+    do c = 1, size(start) - 1
+      begin(c + 1) = begin(c) + begin(c + 1)
+    end do
+    n = begin(size(begin)) - 1
+    allocate (pair(2, n), first(n), both(n))
+    !$omp parallel do schedule(dynamic, 64) default(none) private(c, e, n) &
+    !$omp shared(start, member, bits, partner, begin, pair, first, both)
+    do c = 1, size(start) - 1
+      n = begin(c)
+      do e = start(c), start(c + 1) - 1
+        if (partner(e) < 0) cycle
+        pair(:, n) = member(e)
+        first(n) = bits(e)
+        both(n) = bits(e)
+        if (partner(e) > 0) then
+          pair(2, n) = member(start(c) + partner(e) - 1)
+          both(n) = ior(bits(e), bits(start(c) + partner(e) - 1))
+        end if
+        n = n + 1
+      end do
+    end do
+    start = begin
+    call move_alloc(both, bits)
+  end subroutine pair_members
+
+  !> Find for each member of a cluster another one with no lane in common: `partner` gets its place,
+  !> 0 for members that stay single, and -1 for those that have become another's partner. Members
+  !> with many lanes choose first, and take one that waits, again with as many lanes as fit. Those
+  !> with the same lanes wait in one stack, so that a member looks at 255 stacks at most.
+  pure subroutine choose_partners(bits, partner)
+    integer(i1), intent(in) :: bits(:)
+    integer(i4), intent(out) :: partner(:)
+    integer(i4), allocatable :: below(:)      ! of each member that waits: the next in its stack
+    integer(i4) :: top(0:255)                 ! of the stack of each set of lanes, 0: empty
+    integer :: sets(255)                      ! those that have or had a stack
+    integer :: i, k, n, number, lanes_of
+
+    partner = 0_i4
+    allocate (below(size(bits)), source=0_i4)
+    top = 0_i4
+    n = 0
+    do number = lanes - 1, 1, -1
+      do i = 1, size(bits)
+        if (popcnt(bits(i)) /= number) cycle
+        lanes_of = iand(int(bits(i)), 255)
+        do k = 1, n
+          if (iand(sets(k), lanes_of) == 0 .and. top(sets(k)) > 0) exit
+        end do
+        if (k <= n) then
+          partner(top(sets(k))) = int(i, i4)
+          partner(i) = -1_i4
+          top(sets(k)) = below(top(sets(k)))
+        else
+          if (.not. any(sets(:n) == lanes_of)) then
+            n = n + 1
+            sets(n) = lanes_of
+          end if
+          below(i) = top(lanes_of)
+          top(lanes_of) = int(i, i4)
+        end if
+      end do
+    end do
+  end subroutine choose_partners
 
   !> Look through the cells around cluster `c`: the number of its members, and as many of them as
   !> there is room for.

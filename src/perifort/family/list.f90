@@ -1,15 +1,15 @@
 !> List families for any cloud of points. Points are sorted so that eight that follow each other lie
 !> close together: a cluster, whose families have most of their members in common. What is stored
-!> are each cluster's members, with a bit for every lane whose family it is in. The loops take the
-!> eight bonds to one member at a time.
+!> are packs of each cluster's members: one, or two that no lane has both in its family, with a bit
+!> for every lane that has a bond. The loops take the eight lanes of one pack at a time.
 !>
-!> Nothing else is stored: xi, |xi| and v_c come from the points.
+!> Nothing else is stored: xi, |xi| and v_c come from the points, but for exact volumes.
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type, arrange
-  use pd_family_clusters, only: rows_type, order_in_rows, collect_members, lane_bit
+  use pd_family_clusters, only: rows_type, order_in_rows, collect_members, pair_members, lane_bit
   use pd_family_family, only: family_type, bonds_type
   use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact, &
@@ -23,18 +23,26 @@ module pd_family_list
   integer, parameter :: at_volume = 4, at_moved = 4, at_p = 8
 
   type, extends(family_type) :: list_family_type
-    integer(i8), allocatable :: start(:)       !! first member of each cluster (clusters + 1)
-    integer(i4), allocatable :: member(:)      !! slots at the other ends, ascending
-    integer(i1), allocatable :: bits(:)        !! the lanes in whose family a member is
+    integer(i8), allocatable :: start(:)       !! first pack of each cluster (clusters + 1)
+    integer(i4), allocatable :: member(:, :)   !! slots at the other ends (2, packs)
+    integer(i1), allocatable :: first(:)       !! lanes whose bond goes to `member(1, :)`
+    integer(i1), allocatable :: bits(:)        !! the lanes that have a bond (packs)
     integer(i1), allocatable :: intact(:)      !! those of them whose bond is intact
-    integer :: most_members = 0                !! largest number of members of a cluster
+    integer :: most_packs = 0                  !! largest number of packs of a cluster
     real(wp), allocatable :: spacing(:)        !! [m]
     logical :: one_spacing = .false.           !! all points have the same
-    integer(i8), allocatable :: first_bond(:)  !! of each cluster in `fraction` (clusters)
-    real(wp), allocatable :: fraction(:)       !! v_c per bond, only where it is no simple formula
+    real(wp), allocatable :: fraction(:, :)    !! v_c of every lane (lanes, packs), only where it is
+                                               !! no simple formula, else of size 0
     real(wp), allocatable :: at(:, :)          !! of each slot, in one place: position, volume,
                                                !! displacement and p of the pass (8, n_slots)
-    integer(i1), allocatable :: large(:)       !! 1 for clusters strained beyond the fast formulas
+    real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
+    integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike: set by
+                                               !! the first pass (`pd_force_list_points`)
+    integer(i8), allocatable :: stored(:)      !! place of the other clusters' first pack in
+    real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
+    real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
+                                               !! of all bonds, intact or not
+    integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
@@ -54,7 +62,7 @@ contains
     type(list_family_type), intent(out) :: family
     type(rows_type) :: rows
     real(wp), allocatable :: half_reach(:)
-    integer(i4), allocatable :: order(:), point(:)
+    integer(i4), allocatable :: order(:), point(:), member(:)
     integer :: k, n, edges
 
     n = body%n_points
@@ -71,7 +79,8 @@ contains
     do k = 1, n
       half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
     end do
-    call collect_members(body%x(:n, :), half_reach, rows, family%start, family%member, family%bits)
+    call collect_members(body%x(:n, :), half_reach, rows, family%start, member, family%bits)
+    call pair_members(family%start, member, family%bits, family%member, family%first)
     allocate (family%intact, source=family%bits)
     call count_bonds(family)
     family%spacing = body%spacing
@@ -82,20 +91,24 @@ contains
       family%at(at_volume, k) = body%volume(k)
     end do
     allocate (family%large(size(family%start) - 1), source=0_i1)
-    if (rule%kind == volume_exact) call store_fractions(family)
+    if (rule%kind == volume_exact) then
+      call store_fractions(family)
+    else
+      allocate (family%fraction(lanes, 0))
+    end if
   end subroutine new_list_family
 
-  !> The number of bonds, and the most that one point and the most members that one cluster has.
+  !> The number of bonds, and the most that one point and the most packs that one cluster has.
   subroutine count_bonds(family)
     type(list_family_type), intent(inout) :: family
     integer(i8) :: e, n_bonds
-    integer :: number(lanes), c, most_bonds, most_members
+    integer :: number(lanes), c, most_bonds, most_packs
 
     n_bonds = 0_i8
     most_bonds = 0
-    most_members = 0
+    most_packs = 0
     !$omp parallel do schedule(static) default(none) shared(family) private(c, e, number) &
-    !$omp reduction(+:n_bonds) reduction(max:most_bonds, most_members)
+    !$omp reduction(+:n_bonds) reduction(max:most_bonds, most_packs)
     do c = 1, size(family%start) - 1
       number = 0
       do e = family%start(c), family%start(c + 1) - 1
@@ -103,55 +116,53 @@ contains
       end do
       n_bonds = n_bonds + sum(number)
       most_bonds = max(most_bonds, maxval(number))
-      most_members = max(most_members, int(family%start(c + 1) - family%start(c)))
+      most_packs = max(most_packs, int(family%start(c + 1) - family%start(c)))
     end do
     family%n_bonds = n_bonds
     family%most_bonds = most_bonds
-    family%most_members = most_members
+    family%most_packs = most_packs
   end subroutine count_bonds
 
-  !> Keep the covered part of each cell: it is too dear to compute in every step. Bonds stand member
-  !> by member, and lane by lane for each.
+  !> Keep the covered part of each cell: it is too dear to compute in every step.
   subroutine store_fractions(family)
     type(list_family_type), intent(inout) :: family
     real(wp) :: xi(family%dim)
-    integer(i8) :: b, e
+    integer(i8) :: e
     integer :: c, l, k, j
 
-    allocate (family%fraction(family%n_bonds), family%first_bond(size(family%start) - 1))
-    b = 1_i8
-    do c = 1, size(family%first_bond)
-      family%first_bond(c) = b
-      do e = family%start(c), family%start(c + 1) - 1
-        b = b + popcnt(family%bits(e))
-      end do
-    end do
+    allocate (family%fraction(lanes, size(family%bits)))
     !$omp parallel do schedule(dynamic, 32) default(none) shared(family) &
-    !$omp private(c, l, k, j, b, e, xi)
-    do c = 1, size(family%first_bond)
-      b = family%first_bond(c)
+    !$omp private(c, l, k, j, e, xi)
+    do c = 1, size(family%start) - 1
       do e = family%start(c), family%start(c + 1) - 1
-        j = family%member(e)
         do l = 1, lanes
+          family%fraction(l, e) = 0.0_wp
           if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
           k = lanes*(c - 1) + l
+          j = other_end(family, e, l)
           xi = family%at(:family%dim, j) - family%at(:family%dim, k)
-          family%fraction(b) = volume_correction(family%rule, xi, norm2(xi), &
+          family%fraction(l, e) = volume_correction(family%rule, xi, norm2(xi), &
             & (family%spacing(k) + family%spacing(j))/2)
-          b = b + 1
         end do
       end do
     end do
   end subroutine store_fractions
+
+  !> The slot at the other end of lane `l`'s bond in pack `e`.
+  pure integer function other_end(family, e, l) result(j)
+    class(list_family_type), intent(in) :: family
+    integer(i8), intent(in) :: e
+    integer, intent(in) :: l
+    j = family%member(merge(1, 2, iand(family%first(e), lane_bit(l)) /= 0_i1), e)
+  end function other_end
 
   pure subroutine bonds_of(family, k, bonds)
     class(list_family_type), intent(in) :: family
     integer, intent(in) :: k
     type(bonds_type), intent(inout) :: bonds
     real(wp) :: spacing
-    integer(i8) :: e, b
+    integer(i8) :: e
     integer :: i, n, c, l, d
-    integer(i1) :: below
 
     c = (k - 1)/lanes + 1
     l = k - lanes*(c - 1)
@@ -159,8 +170,10 @@ contains
     do e = family%start(c), family%start(c + 1) - 1
       if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
       n = n + 1
-      bonds%j(n) = family%member(e)
+      bonds%j(n) = other_end(family, e, l)
       bonds%intact(n) = iand(family%intact(e), lane_bit(l)) /= 0_i1
+      bonds%weight(n) = family%at(at_volume, bonds%j(n))
+      if (size(family%fraction) > 0) bonds%weight(n) = bonds%weight(n)*family%fraction(l, e)
     end do
     bonds%n = n
     bonds%length(:n) = 0.0_wp
@@ -172,27 +185,12 @@ contains
     end do
     do i = 1, n
       bonds%length(i) = sqrt(bonds%length(i))
-      bonds%weight(i) = family%at(at_volume, bonds%j(i))
     end do
-    if (.not. allocated(family%fraction)) then
-      if (family%rule%kind == volume_none) return
-      do i = 1, n
-        spacing = (family%spacing(k) + family%spacing(bonds%j(i)))/2
-        bonds%weight(i) = bonds%weight(i) &
-          & *max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - bonds%length(i))/spacing))
-      end do
-      return
-    end if
-    ! the lanes before this one, whose fractions stand before its own
-    below = int(2**(l - 1) - 1, i1)
-    b = family%first_bond(c)
-    i = 0
-    do e = family%start(c), family%start(c + 1) - 1
-      if (iand(family%bits(e), lane_bit(l)) /= 0_i1) then
-        i = i + 1
-        bonds%weight(i) = bonds%weight(i)*family%fraction(b + popcnt(iand(family%bits(e), below)))
-      end if
-      b = b + popcnt(family%bits(e))
+    if (size(family%fraction) > 0 .or. family%rule%kind == volume_none) return
+    do i = 1, n
+      spacing = (family%spacing(k) + family%spacing(bonds%j(i)))/2
+      bonds%weight(i) = bonds%weight(i) &
+        & *max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - bonds%length(i))/spacing))
     end do
   end subroutine bonds_of
 
@@ -222,18 +220,21 @@ contains
 
   pure integer(i8) function bytes(family)
     class(list_family_type), intent(in) :: family
-    bytes = 6_i8*size(family%member, kind=i8) + int(family%n_slots, i8)*8*9 &
-      & + 9_i8*size(family%large)
-    if (allocated(family%fraction)) bytes = bytes + 8*family%n_bonds + 8_i8*size(family%first_bond)
+    ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
+    bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
+      & + 18_i8*size(family%large)
+    if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
+    if (allocated(family%weight_D)) bytes = bytes + 8*size(family%weight_D, kind=i8)
+    if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
   end function bytes
 
   function describe(family) result(text)
     class(list_family_type), intent(in) :: family
     character(:), allocatable :: text
-    text = 'list: the neighbours of every eight points, each with '//to_text( &
-      & real(family%n_bonds, wp)/max(1, size(family%member)), 2)//' bonds'
+    text = 'list: packs of the neighbours of every eight points, each with '//to_text( &
+      & real(family%n_bonds, wp)/max(1, size(family%bits)), 2)//' bonds'
     if (allocated(family%reason)) text = text//' ('//family%reason//')'
-    if (allocated(family%fraction)) text = text//', with their volume fractions'
+    if (size(family%fraction) > 0) text = text//', with their volume fractions'
   end function describe
 
 end module pd_family_list

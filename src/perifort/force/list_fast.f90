@@ -1,175 +1,295 @@
-!> The fast loops over the bonds of one cluster of a list, for small strain (`pd_force_polynomial`):
-!> one text, and code of its own for each choice, because what is chosen must be constants where the
-!> loops are compiled. In 1D they work with a second component that is zero.
+!> The fast loops over the packs of one cluster of a list, for small strain (`pd_force_polynomial`),
+!> and that for energies: one text, and code of its own for each choice, because what is chosen must
+!> be constants where the loops are compiled. In 1D they work with a second component that is zero.
 module pd_force_list_fast
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_family_offsets, only: lanes
-  use pd_force_polynomial, only: h0, h1, h2, h3, h4, h5, h6, h7
+  use pd_force_general, only: crushed
+  use pd_force_polynomial, only: g0, g1, g2, g3, g4, g5, g6, g7, &
+    & h0_narrow => h0, h1_narrow => h1, h2_narrow => h2, h3_narrow => h3, h4_narrow => h4, &
+    & h5_narrow => h5, h6_narrow => h6, h7_narrow => h7, &
+    & h0_wide => w0, h1_wide => w1, h2_wide => w2, h3_wide => w3, h4_wide => w4, h5_wide => w5, &
+    & h6_wide => w6, h7_wide => w7, h8_wide => w8, h9_wide => w9, h10_wide => w10, &
+    & h11_wide => w11, &
+    & v0_wide => v0, v1_wide => v1, v2_wide => v2, v3_wide => v3, v4_wide => v4, v5_wide => v5, &
+    & v6_wide => v6, v7_wide => v7, v8_wide => v8, v9_wide => v9, v10_wide => v10, &
+    & v11_wide => v11
   implicit none (type, external)
   private
-  public :: theta_loop, force_loop, choose_theta, choose_force
+  public :: pass_loop, task_type, choose_loop, for_theta, for_force, for_energy
+  public :: no_correction, one_spacing, own_spacing, stored_fraction, least
+
+  !> What a pass sums up.
+  integer, parameter :: for_theta = 1, for_force = 2, for_energy = 3
+
+  !> Where a loop has the volume correction from: nowhere, the spacing of all points, those of both
+  !> ends, a table.
+  integer, parameter :: no_correction = 0, one_spacing = 1, own_spacing = 2, stored_fraction = 3
+
+  !> Deformed length over the undeformed one below which a bond has no direction: it pulls nowhere.
+  real(wp), parameter :: least = sqrt(crushed)
 
   !> The bits of the lanes; the last is the sign, which all bits of a wider kind repeat.
   integer(i8), parameter :: bit(lanes) = [1_i8, 2_i8, 4_i8, 8_i8, 16_i8, 32_i8, 64_i8, 128_i8]
 
-  abstract interface
-    !> theta of the lanes of one cluster, see bond_dilatation.inc.
-    subroutine theta_loop(n, member, intact, at, own, weight, geometry, edge, per_spacing, limit, &
-      & theta, missed)
-      import :: wp, i1, i4, lanes
-      implicit none (type, external)
-      integer, intent(in) :: n                    !! members
-      integer(i4), intent(in) :: member(n)        !! their slots
-      integer(i1), intent(in) :: intact(n)        !! bits of the lanes with an intact bond
-      ! allow(C071): the loops know the members, not how many slots there are.
-      real(wp), intent(in) :: at(8, *)            !! what slots have, member by member
-      real(wp), intent(in) :: own(lanes, 8)       !! the same of the lanes
-      real(wp), intent(in) :: weight(lanes, n)    !! Gd vc V_j, if tabled
-      real(wp), intent(in) :: geometry(lanes, n)  !! 1/|xi|^2, if tabled
-      real(wp), intent(in) :: edge, per_spacing   !! where vc vanishes [m], its slope [1/m]
-      real(wp), intent(in) :: limit               !! of |e|
-      real(wp), intent(inout) :: theta(lanes)
-      logical, intent(out) :: missed              !! some bond is strained beyond the limit
-    end subroutine theta_loop
+  !> What the loops must know beside the points.
+  type :: task_type
+    integer :: volume = no_correction
+    logical :: surface = .false.      !! points have surface factors
+    logical :: wide = .false.         !! the polynomial of the wide range
+    real(wp) :: edge = 0.0_wp         !! where vc vanishes; with `own_spacing` the horizon [m]
+    real(wp) :: slope = 0.0_wp        !! of vc [1/m]
+    real(wp) :: q = 0.0_wp            !! of plain clusters: (q_k + q_j) Gb/Gd,
+    real(wp) :: factor = 1.0_wp       !! Gd, or (q_k + q_j) Gb without a dilatation
+    real(wp) :: limit = 0.0_wp        !! of |e|
+  end type task_type
 
-    !> Force density of the lanes of one cluster [N/m3], see bond_force.inc.
-    subroutine force_loop(n, member, intact, at, own, stretch, weight, geometry, edge, &
-      & per_spacing, q, limit, force, missed)
-      import :: wp, i1, i4, lanes
+  abstract interface
+    !> Sums of one cluster's bonds, see bond_pass.inc.
+    subroutine pass_loop(n, member, first, intact, at, given, fraction, weight_D, weight_S, own, &
+      & task, sums, missed)
+      import :: wp, i1, i4, lanes, task_type
       implicit none (type, external)
-      integer, intent(in) :: n
-      integer(i4), intent(in) :: member(n)
-      integer(i1), intent(in) :: intact(n)
-      ! allow(C071): as above.
-      real(wp), intent(in) :: at(8, *), own(lanes, 8)
-      real(wp), intent(in) :: stretch(lanes, n)   !! (q_k + q_j) Gb vc V_j/|xi|, if tabled
-      real(wp), intent(in) :: weight(lanes, n), geometry(lanes, n)
-      real(wp), intent(in) :: edge, per_spacing, q, limit
-      real(wp), intent(inout) :: force(lanes, 3)
-      logical, intent(out) :: missed
-    end subroutine force_loop
+      integer, intent(in) :: n                    !! packs
+      integer(i4), intent(in) :: member(2, n)     !! slots of their members
+      integer(i1), intent(in) :: first(n)         !! the lanes that have the first
+      integer(i1), intent(in) :: intact(n)        !! the lanes with an intact bond
+      ! allow(C071): the loops know the members, not how many slots there are.
+      real(wp), intent(in) :: at(8, *)            !! what slots have: position, volume,
+                                                  !! displacement, p
+      real(wp), intent(in) :: given(8, *)         !! and q, half the spacing, factors D and S
+      real(wp), intent(in) :: fraction(lanes, *)  !! vc, if stored
+      real(wp), intent(in) :: weight_D(lanes, *)  !! Gd vc V of each lane, if stored
+      real(wp), intent(in) :: weight_S(lanes, *)  !! (q_k + q_j) Gb vc V |xi|, if stored
+      real(wp), intent(in) :: own(lanes, 16)      !! `at` and `given` of the lanes
+      type(task_type), intent(in) :: task
+      real(wp), intent(inout) :: sums(lanes, 3)
+      logical, intent(out) :: missed              !! some bond is strained beyond the limit
+    end subroutine pass_loop
   end interface
 
 contains
 
-  !> The loop for theta in `dim` dimensions, with or without tables.
-  subroutine choose_theta(dim, tabled, loop)
+  !> The loop of a `pass` in `dim` dimensions. `stored`: of theta and force, with stored weights;
+  !> `state`: there is a dilatation, `projected` or not.
+  subroutine choose_loop(dim, pass, stored, state, projected, loop)
+    integer, intent(in) :: dim, pass
+    logical, intent(in) :: stored, state, projected
+    procedure(pass_loop), pointer, intent(out) :: loop
+
+    select case (pass)
+    case (for_theta)
+      if (projected) then
+        call choose_one(dim, stored, plain_projected_theta_2, plain_projected_theta_3, &
+          & stored_projected_theta_2, stored_projected_theta_3, loop)
+      else
+        call choose_one(dim, stored, plain_theta_2, plain_theta_3, stored_theta_2, stored_theta_3, &
+          & loop)
+      end if
+    case (for_force)
+      if (.not. state) then
+        call choose_one(dim, stored, plain_bond_force_2, plain_bond_force_3, stored_bond_force_2, &
+          & stored_bond_force_3, loop)
+      else if (projected) then
+        call choose_one(dim, stored, plain_projected_force_2, plain_projected_force_3, &
+          & stored_projected_force_2, stored_projected_force_3, loop)
+      else
+        call choose_one(dim, stored, plain_force_2, plain_force_3, stored_force_2, stored_force_3, &
+          & loop)
+      end if
+    case default
+      ! for energies
+      if (projected) then
+        loop => projected_energy_2
+        if (dim == 3) loop => projected_energy_3
+      else
+        loop => energy_2
+        if (dim == 3) loop => energy_3
+      end if
+    end select
+  end subroutine choose_loop
+
+  subroutine choose_one(dim, stored, plain_2, plain_3, stored_2, stored_3, loop)
     integer, intent(in) :: dim
-    logical, intent(in) :: tabled
-    procedure(theta_loop), pointer, intent(out) :: loop
+    logical, intent(in) :: stored
+    procedure(pass_loop) :: plain_2, plain_3, stored_2, stored_3
+    procedure(pass_loop), pointer, intent(out) :: loop
 
-    if (dim == 3) then
-      loop => list_dilatation_3
-      if (tabled) loop => tabled_dilatation_3
+    if (stored) then
+      loop => stored_2
+      if (dim == 3) loop => stored_3
     else
-      loop => list_dilatation_2
-      if (tabled) loop => tabled_dilatation_2
+      loop => plain_2
+      if (dim == 3) loop => plain_3
     end if
-  end subroutine choose_theta
+  end subroutine choose_one
 
-  !> The loop for forces; `state`: there is a dilatation.
-  subroutine choose_force(dim, tabled, state, loop)
-    integer, intent(in) :: dim
-    logical, intent(in) :: tabled, state
-    procedure(force_loop), pointer, intent(out) :: loop
+  subroutine plain_projected_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_theta
+    logical, parameter :: stored = .false., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine plain_projected_theta_2
 
-    if (dim == 3 .and. state) then
-      loop => list_state_3
-      if (tabled) loop => tabled_state_3
-    else if (dim == 3) then
-      loop => list_bond_3
-      if (tabled) loop => tabled_bond_3
-    else if (state) then
-      loop => list_state_2
-      if (tabled) loop => tabled_state_2
-    else
-      loop => list_bond_2
-      if (tabled) loop => tabled_bond_2
-    end if
-  end subroutine choose_force
+  subroutine plain_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_theta
+    logical, parameter :: stored = .false., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine plain_theta_2
 
-  subroutine list_dilatation_2(n, member, intact, at, own, weight, geometry, edge, per_spacing, &
-    & limit, theta, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: tabled = .false.
-    include 'bond_dilatation.inc'
-  end subroutine list_dilatation_2
+  subroutine plain_bond_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .false., state = .false., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine plain_bond_force_2
 
-  subroutine list_dilatation_3(n, member, intact, at, own, weight, geometry, edge, per_spacing, &
-    & limit, theta, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: tabled = .false.
-    include 'bond_dilatation.inc'
-  end subroutine list_dilatation_3
+  subroutine plain_projected_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .false., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine plain_projected_force_2
 
-  subroutine tabled_dilatation_2(n, member, intact, at, own, weight, geometry, edge, per_spacing, &
-    & limit, theta, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: tabled = .true.
-    include 'bond_dilatation.inc'
-  end subroutine tabled_dilatation_2
+  subroutine plain_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .false., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine plain_force_2
 
-  subroutine tabled_dilatation_3(n, member, intact, at, own, weight, geometry, edge, per_spacing, &
-    & limit, theta, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: tabled = .true.
-    include 'bond_dilatation.inc'
-  end subroutine tabled_dilatation_3
+  subroutine stored_projected_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_theta
+    logical, parameter :: stored = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine stored_projected_theta_2
 
-  subroutine list_state_2(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: tabled = .false., dilatation = .true.
-    include 'bond_force.inc'
-  end subroutine list_state_2
+  subroutine stored_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_theta
+    logical, parameter :: stored = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine stored_theta_2
 
-  subroutine list_state_3(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: tabled = .false., dilatation = .true.
-    include 'bond_force.inc'
-  end subroutine list_state_3
+  subroutine stored_bond_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .true., state = .false., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine stored_bond_force_2
 
-  subroutine list_bond_2(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: tabled = .false., dilatation = .false.
-    include 'bond_force.inc'
-  end subroutine list_bond_2
+  subroutine stored_projected_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine stored_projected_force_2
 
-  subroutine list_bond_3(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: tabled = .false., dilatation = .false.
-    include 'bond_force.inc'
-  end subroutine list_bond_3
+  subroutine stored_force_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine stored_force_2
 
-  subroutine tabled_state_2(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: tabled = .true., dilatation = .true.
-    include 'bond_force.inc'
-  end subroutine tabled_state_2
+  subroutine projected_energy_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_energy
+    logical, parameter :: stored = .false., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine projected_energy_2
 
-  subroutine tabled_state_3(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: tabled = .true., dilatation = .true.
-    include 'bond_force.inc'
-  end subroutine tabled_state_3
+  subroutine energy_2(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_energy
+    logical, parameter :: stored = .false., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine energy_2
 
-  subroutine tabled_bond_2(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 2
-    logical, parameter :: tabled = .true., dilatation = .false.
-    include 'bond_force.inc'
-  end subroutine tabled_bond_2
+  subroutine plain_projected_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_theta
+    logical, parameter :: stored = .false., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine plain_projected_theta_3
 
-  subroutine tabled_bond_3(n, member, intact, at, own, stretch, weight, geometry, edge, &
-    & per_spacing, q, limit, force, missed)
-    integer, parameter :: dim = 3
-    logical, parameter :: tabled = .true., dilatation = .false.
-    include 'bond_force.inc'
-  end subroutine tabled_bond_3
+  subroutine plain_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_theta
+    logical, parameter :: stored = .false., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine plain_theta_3
+
+  subroutine plain_bond_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .false., state = .false., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine plain_bond_force_3
+
+  subroutine plain_projected_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .false., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine plain_projected_force_3
+
+  subroutine plain_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .false., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine plain_force_3
+
+  subroutine stored_projected_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_theta
+    logical, parameter :: stored = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine stored_projected_theta_3
+
+  subroutine stored_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_theta
+    logical, parameter :: stored = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine stored_theta_3
+
+  subroutine stored_bond_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .true., state = .false., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine stored_bond_force_3
+
+  subroutine stored_projected_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine stored_projected_force_3
+
+  subroutine stored_force_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine stored_force_3
+
+  subroutine projected_energy_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_energy
+    logical, parameter :: stored = .false., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine projected_energy_3
+
+  subroutine energy_3(n, member, first, intact, at, given, fraction, weight_D, &
+    & weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_energy
+    logical, parameter :: stored = .false., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine energy_3
 
 end module pd_force_list_fast

@@ -1,109 +1,215 @@
 !> The general formulas of list families, for the bonds of one cluster: any strain, temperature,
-!> either dilatation. They take weights from tables and always three components, those that a body
-!> does not have being zero.
+!> either dilatation, and the marks of strained slots. They take weights from tables, which are
+!> filled first, and always three components, those that a body does not have being zero.
 module pd_force_list_general
-  use pd_base_kinds, only: wp, i4
-  use pd_family_list, only: at_moved, at_p
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_family_clusters, only: lane_bit
+  use pd_family_list, only: list_family_type, at_volume, at_moved, at_p
   use pd_family_offsets, only: lanes
-  use pd_force_general, only: crushed
-  use pd_force_list_fast, only: theta_loop, force_loop
+  use pd_family_volume, only: volume_none, volume_exact
+  use pd_force_list_fast, only: least
+  use pd_force_list_points, only: given_q, given_half, given_D, given_S
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: work_type, general_theta, general_force, general_energy
+  public :: work_type, fill_tables, general_theta, general_force, general_energy, store_weights
+  public :: take_up
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
     integer :: cluster = 0
     integer :: first = 1                       !! its first slot
-    integer :: n = 0                           !! its members
-    logical :: tabled = .false.                !! its weights are in the tables
-    procedure(theta_loop), pointer, nopass :: theta => null()  !! the fast loops for them
-    procedure(force_loop), pointer, nopass :: force => null()
-    real(wp) :: own(lanes, at_p) = 0.0_wp      !! what `at` has of its own slots
+    integer :: n = 0                           !! its packs
+    real(wp) :: own(lanes, 16) = 0.0_wp        !! what `at` and `given` have of its own slots
     real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb vc V_j/|xi|, 0 where there is no
-                                               !! intact bond (lane, member)
+                                               !! intact bond (lane, pack)
     real(wp), allocatable :: dilatation(:, :)  !! Gd vc V_j
     real(wp), allocatable :: geometry(:, :)    !! 1/|xi|^2
-    real(wp) :: edge = 0.0_wp                  !! where vc reaches zero [m]
-    real(wp) :: per_spacing = 0.0_wp           !! slope of vc [1/m]
-    real(wp) :: q = 0.0_wp                     !! q_k + q_j
     real(wp) :: heat(lanes) = 0.0_wp           !! alpha dT of the lanes, halved
     real(wp) :: tension(lanes) = 0.0_wp        !! greatest stretch of each lane's intact bonds
     real(wp) :: compression(lanes) = 0.0_wp    !! and of its negative
   end type work_type
 
-  !> Deformed length over the undeformed one below which a bond has no direction: it pulls nowhere.
-  real(wp), parameter :: least = sqrt(crushed)
-
 contains
 
+  !> Turn to cluster `c`.
+  pure subroutine take_up(family, c, work)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in) :: c
+    type(work_type), intent(inout) :: work
+    integer :: d, l
+
+    work%cluster = c
+    work%first = lanes*(c - 1) + 1
+    work%n = int(family%start(c + 1) - family%start(c))
+    do d = 1, at_p
+      do l = 1, lanes
+        work%own(l, d) = family%at(d, work%first + l - 1)
+        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
+      end do
+    end do
+  end subroutine take_up
+
+  !> Room for the tables of any cluster.
+  subroutine allocate_tables(family, work)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(inout) :: work
+
+    if (allocated(work%stretch)) return
+    associate (n => family%most_packs)
+      allocate (work%stretch(lanes, n), work%dilatation(lanes, n), work%geometry(lanes, n))
+    end associate
+  end subroutine allocate_tables
+
+  !> Weights of a cluster's bonds, for any rule, material and surface factor: of those that `bits`
+  !> (packs of the cluster) has. `own`: with 2 q_k in place of q_k + q_j, as the energy needs them.
+  subroutine fill_tables(family, model, bits, own, work)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer(i1), intent(in) :: bits(:)
+    logical, intent(in) :: own
+    type(work_type), intent(inout) :: work
+    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c
+    logical :: there(lanes), from(lanes)
+    integer(i8) :: e
+    integer :: i, j, m, f
+
+    call allocate_tables(family, work)
+    do i = 1, work%n
+      e = family%start(work%cluster) + i - 1
+      j = family%member(1, e)
+      m = family%member(2, e)
+      from = iand(family%first(e), lane_bit) /= 0_i1
+      there = iand(bits(i), lane_bit) /= 0_i1
+      x = merge(family%at(1, j), family%at(1, m), from) - work%own(:, 1)
+      y = merge(family%at(2, j), family%at(2, m), from) - work%own(:, 2)
+      z = merge(family%at(3, j), family%at(3, m), from) - work%own(:, 3)
+      weight = merge(merge(family%at(at_volume, j), family%at(at_volume, m), from), 0.0_wp, there)
+      q = work%own(:, at_p + given_q)
+      if (.not. own) then
+        q = q + merge(family%given(given_q, j), family%given(given_q, m), from)
+      else
+        q = 2*q
+      end if
+      ! an empty lane may be the member itself
+      length = sqrt(merge(x**2 + y**2 + z**2, 1.0_wp, there))
+      select case (family%rule%kind)
+      case (volume_none)
+        continue
+      case (volume_exact)
+        weight = weight*family%fraction(:, e)
+      case default
+        spacing = work%own(:, at_p + given_half) &
+          & + merge(family%given(given_half, j), family%given(given_half, m), from)
+        weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
+      end select
+      work%geometry(:, i) = 1/length**2
+      work%dilatation(:, i) = weight
+      work%stretch(:, i) = q*weight/length
+      if (.not. model%surface) cycle
+      x = x/length
+      y = y/length
+      z = z/length
+      do f = given_D, given_S, given_S - given_D
+        a = work%own(:, at_p + f) + merge(family%given(f, j), family%given(f, m), from)
+        b = work%own(:, at_p + f + 1) + merge(family%given(f + 1, j), family%given(f + 1, m), from)
+        c = work%own(:, at_p + f + 2) + merge(family%given(f + 2, j), family%given(f + 2, m), from)
+        ! with a common denominator there is one division
+        a = 0.5_wp*a*b*c/sqrt(merge((x*b*c)**2 + (y*a*c)**2 + (z*a*b)**2, 1.0_wp, there))
+        if (f == given_D) work%dilatation(:, i) = weight*a
+        if (f == given_S) work%stretch(:, i) = work%stretch(:, i)*a
+      end do
+    end do
+  end subroutine fill_tables
+
+  !> Store the weights of all clusters whose points are not alike.
+  subroutine store_weights(family, model)
+    type(list_family_type), intent(inout) :: family
+    type(model_type), intent(in) :: model
+    type(work_type) :: work
+    integer(i8) :: n, b
+    integer :: c
+
+    allocate (family%stored(size(family%plain)), source=1_i8)
+    n = 0_i8
+    do c = 1, size(family%plain)
+      if (family%plain(c) == 1_i1) cycle
+      family%stored(c) = n + 1
+      n = n + family%start(c + 1) - family%start(c)
+    end do
+    allocate (family%weight_S(lanes, n))
+    allocate (family%weight_D(lanes, merge(n, 0_i8, model%dilatation)))
+    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model) private(work, b, c)
+    do c = 1, size(family%plain)
+      if (family%plain(c) == 1_i1) cycle
+      call take_up(family, c, work)
+      call fill_tables(family, model, family%bits(family%start(c):family%start(c + 1) - 1), &
+        & .false., work)
+      b = family%stored(c)
+      associate (n => work%n)
+        family%weight_S(:, b:b + n - 1) = work%stretch(:, :n)/work%geometry(:, :n)
+        if (model%dilatation) family%weight_D(:, b:b + n - 1) = work%dilatation(:, :n)
+      end associate
+    end do
+  end subroutine store_weights
+
   !> theta of the lanes.
-  pure subroutine general_theta(model, work, member, at, theta)
+  pure subroutine general_theta(family, model, work, theta)
+    type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(work_type), intent(inout) :: work
-    integer(i4), intent(in) :: member(:)
-    real(wp), intent(in), contiguous :: at(:, :)
     real(wp), intent(out) :: theta(lanes)
-    real(wp), dimension(lanes) :: s, lambda, r
+    real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
 
     call begin(model, work)
     theta = 0.0_wp
-    do i = 1, size(member)
-      call deform(model, work, i, int(member(i)), at, s, lambda, r, y)
+    do i = 1, work%n
+      call deform(family, model, work, i, s, lambda, r, y, p)
       theta = theta + work%dilatation(:, i)*s*lambda
     end do
   end subroutine general_theta
 
   !> Force density of the lanes (lanes, 3) [N/m3].
-  pure subroutine general_force(model, work, member, at, force)
+  pure subroutine general_force(family, model, work, force)
+    type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(work_type), intent(inout) :: work
-    integer(i4), intent(in) :: member(:)
-    real(wp), intent(in), contiguous :: at(:, :)
     real(wp), intent(out) :: force(lanes, 3)
-    real(wp), dimension(lanes) :: s, lambda, r
-    real(wp) :: y(lanes, 3), p
-    integer :: i, c, l
+    real(wp), dimension(lanes) :: s, lambda, r, p
+    real(wp) :: y(lanes, 3)
+    integer :: i, c
 
     call begin(model, work)
     force = 0.0_wp
-    do i = 1, size(member)
-      call deform(model, work, i, int(member(i)), at, s, lambda, r, y)
+    do i = 1, work%n
+      call deform(family, model, work, i, s, lambda, r, y, p)
       s = work%stretch(:, i)*s
-      if (model%dilatation) then
-        p = at(at_p, member(i))
-        do l = 1, lanes
-          s(l) = s(l) + (work%own(l, at_p) + p)*work%dilatation(l, i)*work%geometry(l, i)*lambda(l)
-        end do
-      end if
+      if (model%dilatation) &
+        & s = s + (work%own(:, at_p) + p)*work%dilatation(:, i)*work%geometry(:, i)*lambda
       do c = 1, 3
-        do l = 1, lanes
-          force(l, c) = force(l, c) + s(l)*r(l)*y(l, c)
-        end do
+        force(:, c) = force(:, c) + s*r*y(:, c)
       end do
     end do
   end subroutine general_force
 
   !> Strain energy density of the lanes' stretches [J/m3], from tables with each lane's own q twice,
   !> and theta.
-  pure subroutine general_energy(model, work, member, at, energy, theta)
+  pure subroutine general_energy(family, model, work, energy, theta)
+    type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(work_type), intent(inout) :: work
-    integer(i4), intent(in) :: member(:)
-    real(wp), intent(in), contiguous :: at(:, :)
     real(wp), intent(out) :: energy(lanes), theta(lanes)
-    real(wp), dimension(lanes) :: s, lambda, r
+    real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
 
     call begin(model, work)
     energy = 0.0_wp
     theta = 0.0_wp
-    do i = 1, size(member)
-      call deform(model, work, i, int(member(i)), at, s, lambda, r, y)
+    do i = 1, work%n
+      call deform(family, model, work, i, s, lambda, r, y, p)
       energy = energy + 0.25_wp*work%stretch(:, i)*s**2/work%geometry(:, i)
       if (model%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
     end do
@@ -118,37 +224,44 @@ contains
     if (model%thermal) work%heat = model%expansion(work%first:work%first + lanes - 1)/2
   end subroutine begin
 
-  !> State of a cluster's bonds to its `i`-th member in slot `j`: mechanical stretch, Lambda,
-  !> r = |xi|/|y| and the deformed bond y [m].
-  pure subroutine deform(model, work, i, j, at, s, lambda, r, y)
+  !> State of a cluster's bonds in its `i`-th pack: mechanical stretch, Lambda, r = |xi|/|y|, the
+  !> deformed bond y [m] and p of the other end.
+  pure subroutine deform(family, model, work, i, s, lambda, r, y, p)
+    type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(work_type), intent(inout) :: work
-    integer, intent(in) :: i, j
-    real(wp), intent(in), contiguous :: at(:, :)
-    real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), y(lanes, 3)
-    real(wp) :: there(at_p), x1, x2, x3, e1, e2, e3, x, e, length, heat, printed, plain
-    integer :: l
+    integer, intent(in) :: i
+    real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), y(lanes, 3), p(lanes)
+    real(wp) :: xi(lanes, 3), eta(lanes, 3), x, e, length, printed, plain
+    real(wp) :: heat(lanes)
+    logical :: from(lanes)
+    integer(i8) :: pack
+    integer :: l, c, j, m
 
-    there = at(:, j)
+    pack = family%start(work%cluster) + i - 1
+    j = family%member(1, pack)
+    m = family%member(2, pack)
+    from = iand(family%first(pack), lane_bit) /= 0_i1
+    do c = 1, 3
+      xi(:, c) = merge(family%at(c, j), family%at(c, m), from) - work%own(:, c)
+      eta(:, c) = merge(family%at(at_moved + c, j), family%at(at_moved + c, m), from) &
+        & - work%own(:, at_moved + c)
+    end do
+    p = merge(family%at(at_p, j), family%at(at_p, m), from)
     heat = 0.0_wp
-    if (model%thermal) heat = model%expansion(j)/2
+    if (model%thermal) heat = work%heat &
+      & + merge(model%expansion(j), model%expansion(m), from)/2
     printed = merge(1.0_wp, 0.0_wp, model%projected)
     plain = 1 - printed
-    !$omp simd private(x1, x2, x3, e1, e2, e3, x, e, length)
+    !$omp simd private(x, e, length)
     do l = 1, lanes
-      x1 = there(1) - work%own(l, 1)
-      x2 = there(2) - work%own(l, 2)
-      x3 = there(3) - work%own(l, 3)
-      e1 = there(at_moved + 1) - work%own(l, at_moved + 1)
-      e2 = there(at_moved + 2) - work%own(l, at_moved + 2)
-      e3 = there(at_moved + 3) - work%own(l, at_moved + 3)
-      y(l, 1) = x1 + e1
-      y(l, 2) = x2 + e2
-      y(l, 3) = x3 + e3
-      x = work%geometry(l, i)*(x1*e1 + x2*e2 + x3*e3)
-      e = 2*x + work%geometry(l, i)*(e1*e1 + e2*e2 + e3*e3)
+      y(l, 1) = xi(l, 1) + eta(l, 1)
+      y(l, 2) = xi(l, 2) + eta(l, 2)
+      y(l, 3) = xi(l, 3) + eta(l, 3)
+      x = work%geometry(l, i)*(xi(l, 1)*eta(l, 1) + xi(l, 2)*eta(l, 2) + xi(l, 3)*eta(l, 3))
+      e = 2*x + work%geometry(l, i)*(eta(l, 1)**2 + eta(l, 2)**2 + eta(l, 3)**2)
       length = sqrt(work%geometry(l, i)*(y(l, 1)**2 + y(l, 2)**2 + y(l, 3)**2))
-      s(l) = e/(1 + length) - work%heat(l) - heat
+      s(l) = e/(1 + length) - heat(l)
       r(l) = merge(1/max(length, least), 0.0_wp, length > least)
       lambda(l) = plain + printed*(1 + x)*r(l)
       x = merge(s(l), 0.0_wp, work%stretch(l, i) > 0.0_wp)

@@ -249,7 +249,8 @@ contains
   !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
   !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
   !> loops: xi and eta 2d, |xi|^2, x and e 3(2d - 1), the rest of them and the weight 9, polynomial
-  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more.
+  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more; stored
+  !> weights save 6 and are not counted.
   !> Unprojected, the sum of the dilatation is 2 less, and what it adds to the force 3.
   pure real(wp) function flops_of_bond(family, kind) result(flops)
     class(family_type), intent(in) :: family
@@ -299,8 +300,9 @@ contains
     if (system%model%breaking) bytes = bytes + 2*points
     select type (family => system%family)
     type is (list_family_type)
-      bytes = bytes + passes*(6*real(size(family%member), wp) + points*8*3*8)
-      if (allocated(family%fraction)) bytes = bytes + passes*8*real(family%n_bonds, wp)
+      bytes = bytes + passes*(11*real(size(family%bits), wp) + points*8*3*8)
+      if (allocated(family%weight_S)) bytes = bytes + 8*(real(size(family%weight_S), wp) &
+        & + 2*real(size(family%weight_D), wp))
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
       both = both_ends(d, family%mixed)
@@ -324,7 +326,10 @@ contains
 
     points = real(kernel%points, wp)**kernel%dimension
     bytes = 400*points
-    if (kernel%family == 'list') bytes = bytes + 3*bonds(kernel%dimension)*points
+    ! 5 bytes of a bond while it is searched; two stored weights where points differ
+    if (kernel%family == 'list') bytes = bytes + 5*bonds(kernel%dimension)*points
+    if (kernel%family == 'list' .and. kernel%surface) &
+      & bytes = bytes + 20*bonds(kernel%dimension)*points
   end function bytes_needed
 
 end module pd_study_kernels
