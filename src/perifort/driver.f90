@@ -7,6 +7,7 @@ module pd_driver
   use pd_base_clock, only: duration_text, phase_timer_type, wall_time
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: let_writes_fail, watch_for_interrupt
+  use pd_base_threads, only: is_worth_threads, team_type
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, printable, to_text, with_unit
   use pd_scene_rules, only: place_fault, scene_fault
@@ -59,12 +60,38 @@ module pd_driver
     integer(i8) :: cut = 0_i8                      !! bonds cut by cracks
     type(warnings_type) :: warnings                !! found before the first step
     type(phase_timer_type) :: timer
+    type(team_type) :: team                        !! threads; not begun: as the caller has them
   end type set_up_type
 
 contains
 
-  !> Compute a scene and write its results.
+  !> Compute a scene and write its results. The caller's number of threads is as it was thereafter.
   subroutine run_scene(scene, options, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options    !! how, where to, with how many threads
+    type(error_type), allocatable, intent(out) :: error
+    integer :: threads
+
+    threads = omp_get_max_threads()
+    call compute(scene, options, error)
+    call omp_set_num_threads(threads)
+  end subroutine run_scene
+
+  !> Read, validate, build points and families, and say what a run would do, without running. The
+  !> caller's number of threads is as it was thereafter.
+  subroutine check_scene(scene, options, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options    !! with how many threads
+    type(error_type), allocatable, intent(out) :: error
+    integer :: threads
+
+    threads = omp_get_max_threads()
+    call examine(scene, options, error)
+    call omp_set_num_threads(threads)
+  end subroutine check_scene
+
+  !> `run_scene` with threads of its own number.
+  subroutine compute(scene, options, error)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
@@ -90,10 +117,8 @@ contains
       call refuse_existing(directory, stem, options%overwrite, error)
       if (allocated(error)) return
     end if
-    if (options%threads > 0) call omp_set_num_threads(options%threads)
-    call prepare(scene, set_up, error)
+    call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       start = checksum_of_start(system)
       if (restart%found) call put_back(restart, scene, system, plan, error)
@@ -103,8 +128,9 @@ contains
         return
       end if
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
-        & set_up%warnings, omp_get_max_threads()))
+        & set_up%warnings, set_up%team%threads()))
       recorder%timer = set_up%timer
+      recorder%team = set_up%team
       recorder%probes = set_up%probes
       recorder%warnings = set_up%warnings
       call open_recorder(scene, options, system, plan, directory, stem, restart, recorder, error)
@@ -143,10 +169,10 @@ contains
       call mark_complete(directory, stem)
       call say(options, summary_after(system, recorder, directory))
     end associate
-  end subroutine run_scene
+  end subroutine compute
 
-  !> Read, validate, build points and families, and say what a run would do, without running.
-  subroutine check_scene(scene, options, error)
+  !> `check_scene` with threads of its own number.
+  subroutine examine(scene, options, error)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
@@ -154,13 +180,11 @@ contains
     real(wp) :: begin, seconds
     integer :: i
 
-    if (options%threads > 0) call omp_set_num_threads(options%threads)
-    call prepare(scene, set_up, error)
+    call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
-        & set_up%warnings, omp_get_max_threads()))
+        & set_up%warnings, set_up%team%threads()))
       ! the first evaluation touches the memory, the others are timed
       call evaluate(system, 0.0_wp, breaking=.false.)
       begin = wall_time()
@@ -179,7 +203,7 @@ contains
       end if
       call say(options, checkpoint_line(scene, bytes_of_checkpoint(scene, set_up)))
     end associate
-  end subroutine check_scene
+  end subroutine examine
 
   !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
   !> largest, without rows, whose number isn't known before.
@@ -207,11 +231,14 @@ contains
     end associate
   end function bytes_of_checkpoint
 
-  !> Points, families, corrections, cracks, conditions and the plan of a scene.
-  subroutine prepare(scene, set_up, error)
+  !> Points, families, corrections, cracks, conditions and the plan of a scene. With `threads` a
+  !> run's team begins, with so many threads or, if that is 0, with a number that suits the body;
+  !> without, threads are the caller's.
+  subroutine prepare(scene, set_up, error, threads)
     type(scene_type), intent(in) :: scene
     type(set_up_type), intent(out) :: set_up
     type(error_type), allocatable, intent(out) :: error
+    integer, intent(in), optional :: threads
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)
     real(wp) :: delta
@@ -220,6 +247,7 @@ contains
 
     call check_memory(scene, error)
     if (allocated(error)) return
+    if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
       call generate_body(scene, system%body, delta, error)
@@ -234,6 +262,7 @@ contains
       call check_overlap(system%body, system%family, lonely, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
+      if (present(threads)) call set_up%team%fit(system%family%n_bonds, threads)
       call timer%stop('families')
 
       call timer%start('conditions')
@@ -410,8 +439,7 @@ contains
   subroutine choose_threads(options, system)
     type(run_options_type), intent(in) :: options
     type(system_type), intent(in) :: system
-    integer(i8), parameter :: worth_a_thread = 40000_i8  ! bonds, about 20 us of work
-    if (options%threads == 0 .and. system%family%n_bonds < worth_a_thread) &
+    if (options%threads == 0 .and. .not. is_worth_threads(system%family%n_bonds)) &
       & call omp_set_num_threads(1)
   end subroutine choose_threads
 

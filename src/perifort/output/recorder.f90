@@ -5,6 +5,7 @@ module pd_output_recorder
   use pd_base_clock, only: duration_text, phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
+  use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, to_text
   use pd_family_family, only: bonds_type, allocate_bonds
@@ -47,6 +48,7 @@ module pd_output_recorder
     type(probe_type), allocatable :: probes(:)
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
+    type(team_type) :: team                  !! threads, whose number may change at any instant
     type(energies_type) :: energies          !! of the last row
     real(wp) :: supply = 0.0_wp              !! energy at the first row, with breaking at t = 0 [J]
     integer :: rows = 0
@@ -188,6 +190,7 @@ contains
       call write_rescued(observer, system, instant, error)
       return
     end if
+    call observer%team%look()
     associate (schedule => observer%schedule)
       observer%steps_done = instant%step
       observer%time = instant%time
@@ -220,6 +223,7 @@ contains
       call observer%timer%stop('energies and history')
       if (allocated(error)) return
     end if
+    if (output .or. keeping) call observer%team%pause()
     if (output) then
       call observer%timer%start('output')
       call write_output(observer, system, instant, v, error)

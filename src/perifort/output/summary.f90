@@ -170,6 +170,7 @@ contains
       & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
       & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
       & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
+    if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
     if (recorder%gave_way > 0) text = text//line('solver', to_text(recorder%gave_way)// &
       & ' load step(s) were left to dynamic relaxation by the conjugate gradient')
     associate (now => recorder%energies)
