@@ -125,7 +125,7 @@ contains
     watcher%quick = around < 0.0_wp
     associate (system => set_up%system, plan => set_up%plan)
       watcher%relaxation = plan%relaxes
-      watcher%every = history_interval(scene, plan)
+      watcher%every = history_interval(scene, plan, system%family%n_bonds)
       watcher%probes = set_up%probes
       if (.not. watcher%quick) then
         call choose_places(scene, system, around, watcher, error)
