@@ -53,6 +53,7 @@ contains
     type(warnings_type), intent(inout) :: warnings
     type(bonds_type) :: bonds
     logical, allocatable :: mine(:)
+    logical :: thin
     real(wp) :: height
     integer :: c, k
 
@@ -63,12 +64,15 @@ contains
     do c = 1, body%dim
       height = flat*minval(body%spacing, mask=mine)
       if (maxval(body%x(:, c), mask=mine) - minval(body%x(:, c), mask=mine) > height) cycle
+      thin = .false.  ! isolated points have another warning
       do k = 1, body%n_slots
         if (.not. mine(k)) cycle
         call family%bonds_of(k, bonds)
-        if (any(abs(bonds%xi(:bonds%n, c)) > height)) exit
+        if (bonds%n == 0) cycle
+        thin = .not. any(abs(bonds%xi(:bonds%n, c)) > height)
+        if (.not. thin) exit
       end do
-      if (k <= body%n_slots) cycle
+      if (.not. thin) cycle
       call warnings%add('thin body '//to_text(number)//' '//to_text(c), name// &
         & ' is one point thick in '//achar(iachar('x') + c - 1)//': its stiffness can be wrong '// &
         & 'by 21 %; use more points across it, or a scene of fewer dimensions', tell=.false.)
