@@ -151,8 +151,8 @@ contains
     if (allocated(fault)) call test_failed(error, fault%message)
   end subroutine cloud
 
-  !> Volumes twice too small leave each point's nearest one 1.4 roots of a volume away; volumes three
-  !> times too large sum up to three times the horizon's. 30 % off may be how a cloud was made.
+  !> Volumes twice too small leave each point's nearest one 1.4 roots of a volume away; volumes
+  !> three times too large sum up to three times the horizon's. 30 % off may be how a cloud was made.
   subroutine test_volumes(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: right(3) = [0.75_wp, 1.0_wp, 1.3_wp]
@@ -231,7 +231,8 @@ contains
     call expect_told(error, scene, 'has a density of', .false., 'steel')
   end subroutine test_density
 
-  !> A plate 8 cm square and 2 mm thick, E = 2e11 Pa: 2e11 Pa, 3.2e7 N and 2.5e12 N/m3 strain it by 1.
+  !> A plate 8 cm square and 2 mm thick, E = 2e11 Pa: 2e11 Pa, 3.2e7 N and 2.5e12 N/m3 strain it
+  !> by 1.
   subroutine test_loads(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

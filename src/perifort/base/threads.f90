@@ -3,9 +3,9 @@
 !> Threads meet at the end of every loop, and OpenMP's usual way is to wait there actively. On a
 !> machine where other programs run, the thread that all wait for may have no processor core, and a
 !> run on many threads then is many times slower than one on a single thread. So the team watches
-!> what share of its time it had cores. If cores were missing, it goes on with fewer threads, as many
-!> as meet without waiting for each other, and tries more again later. Answers do not depend on the
-!> number of threads, so that it may change at any instant. What the user has set (`--threads`,
+!> what share of its time it had cores. If cores were missing, it goes on with fewer threads, as
+!> many as meet without waiting for each other, and tries more again later. Answers do not depend on
+!> the number of threads, so that it may change at any instant. What the user has set (`--threads`,
 !> OMP_NUM_THREADS, a way to wait) is kept.
 module pd_base_threads
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads

@@ -9,7 +9,8 @@ module pd_body_waves
 contains
 
   !> Speed of longitudinal (P) waves [m/s]: sqrt((kappa + 4 mu/3)/rho) in 3D, in 2D those of plane
-  !> strain or of a plate in plane stress, sqrt((kappa + mu)/rho), in 1D those of a bar, sqrt(E/rho).
+  !> strain or of a plate in plane stress, sqrt((kappa + mu)/rho), in 1D those of a bar,
+  !> sqrt(E/rho).
   pure real(wp) function longitudinal_speed(m) result(speed)
     type(material_type), intent(in) :: m
     speed = sqrt(2*m%uniaxial_energy/m%density)

@@ -21,7 +21,7 @@ module pd_family_warnings
   real(wp), parameter :: most_distance = 1.25_wp
   !> Of the horizon's volume, that the volumes in it may sum up to: coarse families reach 1.67.
   real(wp), parameter :: most_filled = 2.0_wp
-  real(wp), parameter :: too_far = 0.5_wp, too_full = 0.1_wp  !! parts of the points that are off [-]
+  real(wp), parameter :: too_far = 0.5_wp, too_full = 0.1_wp  !! parts of the points [-]
 
 contains
 

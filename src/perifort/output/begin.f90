@@ -15,8 +15,8 @@ module pd_output_begin
   use pd_motion_system, only: system_type
   use pd_motion_time_step, only: evaluations
   use pd_output_checkpoint, only: checkpoint_path, new_about
-  use pd_output_recorder, only: recorder_type, schedule_type, field_of, check_fields, history_columns, &
-    & planned_outputs, planned_rows
+  use pd_output_recorder, only: recorder_type, schedule_type, field_of, check_fields, &
+    & history_columns, planned_outputs, planned_rows
   use pd_output_restart, only: restart_type
   use pd_output_types, only: kept_type
   implicit none (type, external)
@@ -130,16 +130,16 @@ contains
       & ' are allowed: history_every = '//to_text(schedule%steps/most_rows + 1))
   end subroutine check_schedule
 
-  !> Steps (iterations in relaxation) between rows of the history. Without the user's word these are
-  !> at most about 2000 rows, and so few that they take at most a twentieth of the time of the steps:
-  !> for the strain energy, a row takes as long as one to two passes over all `bonds` (ordered
+  !> Steps (iterations in relaxation) between rows of the history. Without the user's word there are
+  !> at most about 2000, and so few that they take a twentieth of the time of the steps at most: for
+  !> the strain energy, a row takes 1.4 to 2 evaluations of the forces over all `bonds` (ordered
   !> pairs). Rows that cost next to nothing, those of small bodies, may be more. The number follows
   !> from the scene alone and not from a clock, so that every run of it has the same rows.
   pure integer function history_interval(scene, plan, bonds) result(every)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
     integer(i8), intent(in) :: bonds
-    real(wp), parameter :: row = 2.0_wp           ! evaluations of the forces that a row takes
+    real(wp), parameter :: row = 2.5_wp           ! evaluations of the forces that a row takes
     real(wp), parameter :: share = 0.05_wp        ! of the time of the steps
     real(wp), parameter :: no_cost = 5.0e6_wp     ! bonds of all rows: some 0.02 s on one thread
     real(wp) :: affordable, free

@@ -36,7 +36,8 @@ module pd_output_estimate
 
 contains
 
-  !> Predict the time of a run from its first steps; the system is used up. Lines end with a newline.
+  !> Predict the time of a run from its first steps; the system is used up. Each line of `text` ends
+  !> with a newline.
   subroutine estimate(scene, system, plan, schedule, set_up, text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(inout) :: system

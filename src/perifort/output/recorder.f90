@@ -255,8 +255,9 @@ contains
     if (recorder%gave_way_at == instant%load_step) return
     recorder%gave_way_at = instant%load_step
     recorder%gave_way = recorder%gave_way + 1
-    call recorder%warn('conjugate gradient', 'the conjugate gradient finds no static equilibrium '// &
-      & 'in load step '//to_text(instant%load_step)//': dynamic relaxation goes on from where it stands')
+    call recorder%warn('conjugate gradient', 'the conjugate gradient finds no static '// &
+      & 'equilibrium in load step '//to_text(instant%load_step)//': dynamic relaxation goes on '// &
+      & 'from where it stands')
   end subroutine note_giving_way
 
   !> Whether the run has had the time that it was given.

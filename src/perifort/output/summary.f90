@@ -15,8 +15,8 @@ module pd_output_summary
 
 contains
 
-  !> The scene as it will be computed, a fact in each line: points, bonds, memory, forces, time step,
-  !> probes, and what is to be noted.
+  !> The scene as it will be computed, a fact in each line: points, bonds, memory, forces, time
+  !> step, probes, and what is to be noted.
   function summary_before(scene, system, plan, probes, cut, warnings, notes, threads) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system

@@ -38,13 +38,13 @@ contains
     call scan_source(scene%text, scene%file, source, ignored)
     if (allocated(ignored)) return
     associate (d => scene%header%dimension)
-      call warn_of_keys('scene', [character(20) :: 'plane', 'thickness'], d /= 2, 'in dimension '// &
-        & to_text(d))
+      call warn_of_keys('scene', [character(20) :: 'plane', 'thickness'], d /= 2, &
+        & 'in dimension '//to_text(d))
       call warn_of_keys('scene', [character(20) :: 'area'], d /= 1, 'in dimension '//to_text(d))
     end associate
     if (scene%time%method == 'relaxation') then
-      call warn_of_keys('time', [character(20) :: 'integrator', 'step', 'safety', 'steps', 'duration', &
-        & 'breaking'], .true., "with method = 'relaxation'; &relaxation has its settings")
+      call warn_of_keys('time', [character(20) :: 'integrator', 'step', 'safety', 'steps', &
+        & 'duration', 'breaking'], .true., "with method = 'relaxation'; &relaxation has its settings")
     else
       call warn_of_keys('relaxation', [character(20) :: 'density_matrix', 'safety', 'tolerance', &
         & 'maximum_iterations', 'load_steps'], .true., "with &time method = 'explicit'")
