@@ -258,8 +258,11 @@ contains
       call check_overlap(system%body, system%family, isolated, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
-      if (present(threads)) call set_up%team%fit(system%family%n_bonds, threads)
       call timer%stop('families')
+
+      call timer%start('threads')
+      if (present(threads)) call set_up%team%fit(system%family%n_bonds, threads)
+      call timer%stop('threads')
 
       call timer%start('conditions')
       call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &

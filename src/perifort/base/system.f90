@@ -63,7 +63,7 @@ contains
     cores = huge(cores)
     read (limit, *, iostat=status) quota, period
     if (status /= 0) return
-    if (.not. (quota > 0.0_wp .and. period > 0.0_wp .and. quota/period < huge(1)/2)) return
+    if (.not. (quota > 0.0_wp .and. period > 0.0_wp .and. quota/period < 1.0e9_wp)) return
     cores = max(1, ceiling(quota/period*(1 - 1.0e-9_wp)))
   end function whole_cores
 

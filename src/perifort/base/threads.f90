@@ -21,7 +21,7 @@ module pd_base_threads
   real(wp), parameter :: chunk = 0.05_wp            !! time of one measurement [s]
   real(wp), parameter :: look_interval = 0.005_wp   !! between looks at the clock [s]
   real(wp), parameter :: most_missing = 0.3_wp      !! of the time of one core, in a free team [-]
-  real(wp), parameter :: moment = 0.02_wp           !! of a trial, several turns of a scheduler [s]
+  real(wp), parameter :: moment = 0.01_wp           !! of a trial, some turns of a scheduler [s]
   real(wp), parameter :: standstill = 0.5e-3_wp     !! threads meet within this, if all run [s]
   real(wp), parameter :: most_standstill = 0.15_wp  !! of the time, in a free team [-]
   real(wp), parameter :: rarely = 60.0_wp           !! trials take at most 1/60 of the time

@@ -169,9 +169,10 @@ contains
     text = text//newline//'                   ('//to_text(limits%spectrum%evaluations)// &
       & ' evaluations of the forces; omega^2 to '// &
       & to_text(100*limits%spectrum%residual/limits%spectrum%squared, 1)//' %)'//newline
-    if (limits%lasting > 0.0_wp) text = text//'  whatever breaks  '// &
+    if (limits%lasting > 0.0_wp) text = text//'  bonds broken     '// &
       & with_unit(limits%lasting, 's', 6)//', '//to_text(limits%lasting/limits%equation, 4)// &
-      & " of 7.25 as used: what &time limit = 'spectral' takes here"//newline
+      & " of 7.25 as used, for any state of broken bonds: what &time limit = 'spectral'"// &
+      & ' takes here'//newline
     text = text//'Confirmed by the motion of a small disturbance at random:'
   end function text_of
 
