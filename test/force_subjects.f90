@@ -214,8 +214,8 @@ contains
   end function depth
 
   !> The subjects: every dimension with every term alone and with all of them, bars with energy
-  !> of dilatation, of both kinds, and clouds where the family takes them. `number` counts on until `there` is
-  !> false.
+  !> of dilatation, of both kinds, and clouds where the family takes them. `number` counts on until
+  !> `there` is false.
   subroutine subject_number(kind, number, subject, there)
     character(*), intent(in) :: kind
     integer, intent(in) :: number

@@ -15,13 +15,13 @@ program main
   use test_base_interrupt, only: collect_base_interrupt
   use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
+  use test_base_threads, only: collect_base_threads
   use test_base_version, only: collect_base_version
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
-  use test_body_layers, only: collect_body_layers
   use test_body_material, only: collect_body_material
   use test_body_overlap, only: collect_body_overlap
-  use test_body_overlap, only: collect_body_overlap
+  use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
   use test_driver, only: collect_driver
   use test_extremes_contrast, only: collect_extremes_contrast
@@ -31,7 +31,6 @@ program main
   use test_extremes_steps, only: collect_extremes_steps
   use test_family_cells, only: collect_family_cells
   use test_family_cracks, only: collect_family_cracks
-  use test_family_joints, only: collect_family_joints
   use test_family_joints, only: collect_family_joints
   use test_family_lattice, only: collect_family_lattice
   use test_family_slabs, only: collect_family_slabs
@@ -53,6 +52,7 @@ program main
   use test_motion_time_step, only: collect_motion_time_step
   use test_orders, only: collect_orders
   use test_output_base64, only: collect_output_base64
+  use test_output_begin, only: collect_output_begin
   use test_output_checkpoint, only: collect_output_checkpoint
   use test_output_contact, only: collect_output_contact
   use test_output_files, only: collect_output_files
@@ -80,6 +80,7 @@ program main
   use test_study_plan, only: collect_study_plan
   use test_study_predict, only: collect_study_predict
   use test_study_study, only: collect_study_study
+  use test_warnings, only: collect_warnings
   implicit none (type, external)
 
   type(testsuite_type) :: suites(100)
@@ -93,11 +94,13 @@ program main
   call register('base_interrupt', collect_base_interrupt)
   call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
+  call register('base_threads', collect_base_threads)
   call register('base_version', collect_base_version)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
   call register('body_material', collect_body_material)
   call register('body_overlap', collect_body_overlap)
+  call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)
   call register('driver', collect_driver)
   call register('extremes_contrast', collect_extremes_contrast)
@@ -128,6 +131,7 @@ program main
   call register('motion_time_step', collect_motion_time_step)
   call register('orders', collect_orders)
   call register('output_base64', collect_output_base64)
+  call register('output_begin', collect_output_begin)
   call register('output_checkpoint', collect_output_checkpoint)
   call register('output_contact', collect_output_contact)
   call register('output_files', collect_output_files)
@@ -155,6 +159,7 @@ program main
   call register('study_plan', collect_study_plan)
   call register('study_predict', collect_study_predict)
   call register('study_study', collect_study_study)
+  call register('warnings', collect_warnings)
 
   call read_arguments()
   call leave_out(except)

@@ -130,17 +130,17 @@ contains
   subroutine test_progress_text(error)
     type(error_type), allocatable, intent(out) :: error
     call check(error, progress_text(6500_i8, 26000_i8, 1.264e-3_wp, 12_i8, 13.0_wp), &
-      & ' 25.0 %  step 6500/26000  1.264 ms  broken 12  500 steps/s  left 39 s')
+      & ' 25.0 %  step 6500/26000  1.264 ms  broken bonds 12  500 steps/s  left 39 s')
     if (allocated(error)) return
     call check(error, progress_text(0_i8, 10_i8, 0.0_wp, 0_i8, 1.0_wp), &
-      & '  0.0 %  step 0/10  0 s  broken 0')
+      & '  0.0 %  step 0/10  0 s  broken bonds 0')
     if (allocated(error)) return
     call check(error, progress_text(10_i8, 10_i8, 1.0_wp, 0_i8, 4.0_wp), &
-      & '100.0 %  step 10/10  1 s  broken 0  2.5 steps/s  took 4 s')
+      & '100.0 %  step 10/10  1 s  broken bonds 0  2.5 steps/s  took 4 s')
     if (allocated(error)) return
     ! A run that goes on from step 90 counts only what it did itself.
     call check(error, progress_text(95_i8, 100_i8, 1.0_wp, 0_i8, 1.0_wp, 90_i8), &
-      & ' 95.0 %  step 95/100  1 s  broken 0  5 steps/s  left 1 s')
+      & ' 95.0 %  step 95/100  1 s  broken bonds 0  5 steps/s  left 1 s')
   end subroutine test_progress_text
 
   subroutine test_not_yet(error)

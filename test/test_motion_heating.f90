@@ -46,8 +46,8 @@ contains
   end subroutine held_bar
 
   !> The force across a section of the held bar at full heat [N]: nothing moves, so every bond
-  !> of length i spacings has the stretch -alpha dT, and i of them cross a section. With a horizon of
-  !> 3.015 spacings their linear volume corrections are 1, 1 and 0.515.
+  !> of length i spacings has the stretch -alpha dT, and i of them cross a section. With a horizon
+  !> of 3.015 spacings their linear volume corrections are 1, 1 and 0.515.
   pure real(wp) function exact_reaction(scene) result(force)
     type(scene_type), intent(in) :: scene
     real(wp), parameter :: ratio = 3.015_wp

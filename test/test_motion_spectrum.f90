@@ -260,8 +260,8 @@ contains
 
   !> The step of the bound over 7.25, computed elsewhere with sparse matrices and ARPACK, given to
   !> three decimals; the accuracy of the measurement may add 1e-3/2 to it, the rounding of the
-  !> shares take a quarter per cent from it. With one factor for all points, the largest, these are 1.347
-  !> and 0.837: the bound gives 1.3 and 2.5 times the step.
+  !> shares take a quarter per cent from it. With one factor for all points, the largest, these are
+  !> 1.347 and 0.837: the bound gives 1.3 and 2.5 times the step.
   subroutine test_two_materials(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

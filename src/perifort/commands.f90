@@ -1,7 +1,9 @@
 !> The commands of the program: each a few lines that call what does the work.
 module pd_commands
   use, intrinsic :: iso_fortran_env, only: output_unit
+  use omp_lib, only: omp_set_num_threads
   use pd_base_error, only: error_type
+  use pd_base_threads, only: default_threads
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
@@ -34,6 +36,7 @@ contains
       return
     end if
 
+    call omp_set_num_threads(default_threads())
     select case (line%command)
     case ('run', 'check', 'limits', 'study', 'choose')
       options%output_directory = line%output_directory

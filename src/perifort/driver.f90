@@ -4,11 +4,12 @@ module pd_driver
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i2, i8
-  use pd_base_clock, only: duration_text, phase_timer_type, wall_time
+  use pd_base_clock, only: phase_timer_type
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_interrupt, only: let_writes_fail, watch_for_interrupt
+  use pd_base_threads, only: is_worth_threads, team_type
   use pd_base_warnings, only: warnings_type
-  use pd_base_text, only: newline, printable, to_text, with_unit
+  use pd_base_text, only: newline, printable, to_text
   use pd_scene_rules, only: place_fault, scene_fault
   use pd_scene_types, only: scene_type, is_set, material_group
   use pd_scene_write, only: scene_text
@@ -18,7 +19,6 @@ module pd_driver
   use pd_body_layers, only: layer_count_type, layer_count_text
   use pd_body_memory, only: any_critical, check_memory
   use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
-  use pd_body_shapes, only: inside
   use pd_family_cracks, only: cut_bonds
   use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
@@ -31,21 +31,23 @@ module pd_driver
   use pd_force_weights, only: build_weights
   use pd_motion_bounds, only: check_bounds
   use pd_motion_explicit, only: run_explicit, begin_steps => begin_memory
-  use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, heating_of_scene, region_mask
+  use pd_motion_from_scene, only: motions_of_scene, loads_of_scene, heating_of_scene, &
+    & in_no_fail_zones
   use pd_motion_keep, only: checksum_of_start
   use pd_motion_plan, only: plan_type, make_plan, depth_of
   use pd_motion_relaxation, only: run_relaxation, fill_memory
-  use pd_motion_system, only: system_type, start_system, evaluate, account
-  use pd_motion_time_step, only: evaluations, horizon_volume
+  use pd_motion_system, only: system_type, start_system, account
   use pd_output_begin, only: run_options_type, open_recorder, keep_checkpoints, schedule_of, &
     & check_schedule, history_interval, output_directory, stem_of, command_of, text_of
   use pd_output_checkpoint, only: about_type, checkpoint_bytes, new_about
-  use pd_output_doubts, only: warn_before
   use pd_output_earlier, only: mark_complete, refuse_existing
+  use pd_output_estimate, only: estimate
+  use pd_output_overview, only: overview
   use pd_output_recorder, only: recorder_type, probe_type, field_of, history_columns, &
     & planned_outputs, planned_rows, schedule_type
   use pd_output_restart, only: find_restart, put_back, restart_type
   use pd_output_summary, only: checkpoint_line, summary_before, summary_after
+  use pd_output_warnings, only: note_before, warn_before
   implicit none (type, external)
   private
   public :: run_scene, check_scene, run_options_type, prepare, set_up_type, choose_threads, &
@@ -61,13 +63,40 @@ module pd_driver
     type(probe_type), allocatable :: probes(:)
     integer(i8) :: cut = 0_i8                      !! bonds cut by cracks
     type(warnings_type) :: warnings                !! found before the first step
+    type(warnings_type) :: notes                   !! what is right and may surprise
     type(phase_timer_type) :: timer
+    type(team_type) :: team                        !! threads; not begun: as the caller has them
   end type set_up_type
 
 contains
 
-  !> Compute a scene and write its results.
+  !> Compute a scene and write its results. The caller's number of threads is as it was thereafter.
   subroutine run_scene(scene, options, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options    !! how, where to, with how many threads
+    type(error_type), allocatable, intent(out) :: error
+    integer :: threads
+
+    threads = omp_get_max_threads()
+    call compute(scene, options, error)
+    call omp_set_num_threads(threads)
+  end subroutine run_scene
+
+  !> Read, validate, build points and families, and say what a run would do, without running. The
+  !> caller's number of threads is as it was thereafter.
+  subroutine check_scene(scene, options, error)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options    !! with how many threads
+    type(error_type), allocatable, intent(out) :: error
+    integer :: threads
+
+    threads = omp_get_max_threads()
+    call examine(scene, options, error)
+    call omp_set_num_threads(threads)
+  end subroutine check_scene
+
+  !> `run_scene` with threads of its own number.
+  subroutine compute(scene, options, error)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
@@ -93,10 +122,8 @@ contains
       call refuse_existing(directory, stem, options%overwrite, error)
       if (allocated(error)) return
     end if
-    if (options%threads > 0) call omp_set_num_threads(options%threads)
-    call prepare(scene, set_up, error)
+    call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       start = checksum_of_start(system)
       if (restart%found) call put_back(restart, scene, system, plan, error)
@@ -106,8 +133,9 @@ contains
         return
       end if
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
-        & set_up%warnings, omp_get_max_threads()))
+        & set_up%warnings, set_up%notes, set_up%team%threads()))
       recorder%timer = set_up%timer
+      recorder%team = set_up%team
       recorder%probes = set_up%probes
       recorder%warnings = set_up%warnings
       call open_recorder(scene, options, system, plan, directory, stem, restart, recorder, error)
@@ -144,7 +172,7 @@ contains
       call mark_complete(directory, stem)
       call say(options, summary_after(system, recorder, directory))
     end associate
-  end subroutine run_scene
+  end subroutine compute
 
   !> Warn if energy was gained or lost that nothing explains: much of what is in play, or, where
   !> bonds have broken, much of what they dissipated.
@@ -165,41 +193,34 @@ contains
     end if
   end subroutine warn_of_balance
 
-  !> Read, validate, build points and families, and say what a run would do, without running.
-  subroutine check_scene(scene, options, error)
+  !> `check_scene` with threads of its own number.
+  subroutine examine(scene, options, error)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
-    real(wp) :: begin, seconds
-    integer :: i
+    character(:), allocatable :: text
 
-    if (options%threads > 0) call omp_set_num_threads(options%threads)
-    call prepare(scene, set_up, error)
+    call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call choose_threads(options, set_up%system)
     associate (system => set_up%system, plan => set_up%plan)
       call say(options, summary_before(scene, system, plan, set_up%probes, set_up%cut, &
-        & set_up%warnings, omp_get_max_threads()))
-      ! the first evaluation touches the memory, the others are timed
-      call evaluate(system, 0.0_wp, breaking=.false.)
-      begin = wall_time()
-      do i = 1, 100
-        call evaluate(system, 0.0_wp, breaking=.false.)
-        seconds = (wall_time() - begin)/i
-        if (seconds*i > 0.5_wp) exit
-      end do
-      if (plan%relaxes) then
-        call say(options, '  run time        '//with_unit(seconds, 's', 3)// &
-          & ' an iteration (measured)')
-      else
-        call say(options, '  run time        about '//duration_text(seconds*plan%steps &
-          & *evaluations(plan%integrator))//' without output ('//with_unit(seconds, 's', 3)// &
-          & ' an evaluation of the forces, measured)')
-      end if
+        & set_up%warnings, set_up%notes, set_up%team%threads()))
+      call say_lines(overview(scene, system, .not. plan%relaxes))
+      call estimate(scene, system, plan, schedule_of(scene, plan, system%family%n_bonds), &
+        & set_up%timer%total(), text)
+      call say_lines(text)
       call say(options, checkpoint_line(scene, bytes_of_checkpoint(scene, set_up)))
     end associate
-  end subroutine check_scene
+
+  contains
+
+    !> Print lines that end with a newline.
+    subroutine say_lines(lines)
+      character(*), intent(in) :: lines
+      if (len(lines) > 0) call say(options, lines(:len(lines) - 1))
+    end subroutine say_lines
+  end subroutine examine
 
   !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
   !> largest, without rows, whose number isn't known before.
@@ -211,7 +232,7 @@ contains
     integer :: columns
 
     associate (system => set_up%system, plan => set_up%plan)
-      schedule = schedule_of(scene, plan)
+      schedule = schedule_of(scene, plan, system%family%n_bonds)
       about = new_about(scene_text(scene), 0_i8, plan%steps, plan%step)
       columns = size(history_columns(system, set_up%probes, plan%relaxes))
       allocate (about%kept%rows(columns, 0), about%kept%times(0))
@@ -227,21 +248,25 @@ contains
     end associate
   end function bytes_of_checkpoint
 
-  !> Points, families, corrections, cracks, conditions and the plan of a scene.
-  subroutine prepare(scene, set_up, error)
+  !> Points, families, corrections, cracks, conditions and the plan of a scene. With `threads` a
+  !> run's team begins, with so many threads or, if that is 0, with a number that suits the body;
+  !> without, threads are the caller's.
+  subroutine prepare(scene, set_up, error, threads)
     type(scene_type), intent(in) :: scene
     type(set_up_type), intent(out) :: set_up
     type(error_type), allocatable, intent(out) :: error
+    integer, intent(in), optional :: threads
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)
     integer(i2), allocatable :: heated_by(:)
     type(layer_count_type), allocatable :: layers(:)
     real(wp) :: delta
     integer(i8) :: cut
-    integer :: lonely, i
+    integer :: isolated, i
 
     call check_memory(scene, error)
     if (allocated(error)) return
+    if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
       call generate_body(scene, system%body, delta, error, layers)
@@ -257,17 +282,21 @@ contains
       call make_family(scene, volume_rule_type(volume_rule_number( &
         & trim(scene%horizon%volume_correction)), delta), system, error)
       if (allocated(error)) return
-      call check_overlap(system%body, system%family, lonely, error)
+      call check_overlap(system%body, system%family, isolated, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
       call timer%stop('families')
+
+      call timer%start('threads')
+      if (present(threads)) call set_up%team%fit(system%family%n_bonds, threads)
+      call timer%stop('threads')
 
       call timer%start('conditions')
       call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
         & heated_by, error)
       if (allocated(error)) return
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
-        & no_fail_zone(scene, system%body), temperature_change, system%model)
+        & in_no_fail_zones(scene, system%body), temperature_change, system%model)
       if (system%model%thermal) call heating_of_scene(scene, heated_by, system%model%expansion, &
         & system%heating)
       call motions_of_scene(scene, system%body, system%motions, error)
@@ -303,11 +332,12 @@ contains
       if (allocated(error)) return
       call check_bounds(scene, system, set_up%plan, error)
       if (allocated(error)) return
-      call check_schedule(scene, set_up%plan, error)
+      call check_schedule(scene, set_up%plan, system%family%n_bonds, error)
       if (allocated(error)) return
       call timer%stop('time step')
       call find_probes(scene, system%body, set_up%probes)
-      call warn_before(scene, system, set_up%plan, set_up%probes, lonely, set_up%warnings)
+      call warn_before(scene, system, set_up%plan, set_up%probes, isolated, set_up%warnings)
+      call note_before(scene, system, set_up%notes)
     end associate
   end subroutine prepare
 
@@ -391,24 +421,6 @@ contains
     end do
   end function materials_of_scene
 
-  !> Slots in the no-fail zones of a scene.
-  function no_fail_zone(scene, body) result(zone)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
-    logical, allocatable :: zone(:)
-    integer :: i
-
-    allocate (zone(body%n_slots), source=.false.)
-    do i = 1, size(scene%no_fail)
-      if (scene%no_fail(i)%region /= '') then
-        zone = zone .or. region_mask(scene, body, scene%no_fail(i)%region)
-      else
-        zone = zone .or. (inside(scene%no_fail(i), body%x, &
-          & touch*minval(body%spacing, mask=body%point > 0)) .and. body%point > 0)
-      end if
-    end do
-  end function no_fail_zone
-
   !> The nearest point of each probe; ties go to the lowest point number.
   subroutine find_probes(scene, body, probes)
     type(scene_type), intent(in) :: scene
@@ -440,8 +452,7 @@ contains
   subroutine choose_threads(options, system)
     type(run_options_type), intent(in) :: options
     type(system_type), intent(in) :: system
-    integer(i8), parameter :: worth_a_thread = 40000_i8  ! bonds, about 20 us of work
-    if (options%threads == 0 .and. system%family%n_bonds < worth_a_thread) &
+    if (options%threads == 0 .and. .not. is_worth_threads(system%family%n_bonds)) &
       & call omp_set_num_threads(1)
   end subroutine choose_threads
 

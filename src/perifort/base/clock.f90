@@ -325,7 +325,7 @@ contains
     ! Rounded down: 100 % is only said when all is done.
     write (percent, '(f5.1)') floor(1000.0_wp*real(step, wp)/real(max(total, 1_i8), wp))/10.0_wp
     text = trim(percent)//' %  step '//to_text(step)//'/'//to_text(total)//'  '// &
-      & clock//'  broken '//to_text(bonds_broken)
+      & clock//'  broken bonds '//to_text(bonds_broken)
     if (step <= begun .or. elapsed <= 0.0_wp) return
     rate = real(step - begun, wp)/elapsed
     text = text//'  '//to_text(rate, 3)//' steps/s'

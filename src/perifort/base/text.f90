@@ -4,7 +4,7 @@ module pd_base_text
   implicit none (type, external)
   private
   public :: to_text, lower_case, nearest_name, edit_distance, join, with_unit, newline
-  public :: is_control, printable
+  public :: is_control, printable, labelled_line
 
   character(*), parameter :: newline = new_line('a')
 
@@ -100,6 +100,16 @@ contains
     text = real_to_text(value/10.0_wp**(3*step), digits)//' '//trim(prefixes(step))//unit
     if (step == 0) text = real_to_text(value, digits)//' '//unit
   end function with_unit
+
+  !> A line of a summary: a label, its content in a column of its own, a newline.
+  pure function labelled_line(label, content) result(text)
+    character(*), intent(in) :: label     !! at most 15 characters, which leave a blank
+    character(*), intent(in) :: content
+    character(:), allocatable :: text
+    character(18) :: column
+    column = '  '//label
+    text = column//content//newline
+  end function labelled_line
 
   !> ASCII letters in lower case.
   pure function lower_case(text) result(lower)

@@ -22,6 +22,7 @@ module pd_base_warnings
     integer :: number = 0
   contains
     procedure :: add
+    procedure :: has
     procedure :: count => count_warnings
     procedure :: line
     procedure :: text => all_lines
@@ -49,6 +50,18 @@ contains
     self%number = self%number + 1
     self%list(self%number) = warning_type(subject, text, 1)
   end subroutine add
+
+  !> Whether there is a warning of this subject.
+  pure logical function has(self, subject)
+    class(warnings_type), intent(in) :: self
+    character(*), intent(in) :: subject
+    integer :: i
+
+    has = .false.
+    do i = 1, self%number
+      if (self%list(i)%subject == subject) has = .true.
+    end do
+  end function has
 
   !> Different warnings so far.
   pure integer function count_warnings(self)

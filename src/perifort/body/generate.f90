@@ -109,8 +109,8 @@ contains
     if (is_set(scene%horizon%length)) delta = scene%horizon%length
   end function horizon_of
 
-  !> Points of a cloud file: columns x y z volume. Coordinates that the dimension doesn't use must be
-  !> the same for all points.
+  !> Points of a cloud file: columns x y z volume. Coordinates that the dimension doesn't use must
+  !> be the same for all points.
   subroutine cloud_points(scene, i, depth, body, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: i

@@ -4,7 +4,8 @@ module pd_body_material
   use pd_base_numbers, only: pi
   implicit none (type, external)
   private
-  public :: material_type, new_material, special_poissons_ratio, critical_stretch_from_energy, never
+  public :: material_type, new_material, special_poissons_ratio, critical_stretch_from_energy, &
+    & energy_from_critical_stretch, never
 
   real(wp), parameter :: never = huge(1.0_wp)  !! critical stretch of a material that cannot fail
 
@@ -105,5 +106,14 @@ contains
       end select
     end associate
   end function critical_stretch_from_energy
+
+  !> The critical energy release rate Gc [J/m2] of a material's critical stretch: the inverse of
+  !> `critical_stretch_from_energy`, where s_c grows with the root of Gc.
+  pure real(wp) function energy_from_critical_stretch(m, dim, delta) result(Gc)
+    type(material_type), intent(in) :: m
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: delta  !! horizon [m]
+    Gc = (m%critical_stretch/critical_stretch_from_energy(m, 1.0_wp, dim, delta))**2
+  end function energy_from_critical_stretch
 
 end module pd_body_material

@@ -10,7 +10,7 @@ module pd_family_cracks
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private
-  public :: cut_bonds, crosses, crack_type, new_crack
+  public :: cut_bonds, crosses, crack_type, new_crack, points_on, extents_of
 
   integer, parameter :: segment = 1, parallelogram = 2, disc = 3
   real(wp), parameter :: on_plane = 1.0e-6_wp  !! [spacings]
@@ -114,16 +114,59 @@ contains
     crosses = .false.
     if ((ha >= -tolerance) .eqv. (hb >= -tolerance)) return
     r = ra + (rb - ra)*(ha/(ha - hb))
+    crosses = in_bounds(crack, r, tolerance)
+  end function crosses
+
+  !> Whether `r`, on the plane of the crack and from its origin [m], lies within its rim.
+  pure logical function in_bounds(crack, r, tolerance)
+    type(crack_type), intent(in) :: crack
+    real(wp), intent(in) :: r(3)
+    real(wp), intent(in) :: tolerance
+
     select case (crack%kind)
     case (disc)
-      crosses = norm2(r - crack%normal*dot_product(r, crack%normal)) <= crack%radius + tolerance
+      in_bounds = norm2(r - crack%normal*dot_product(r, crack%normal)) <= crack%radius + tolerance
     case (segment)
-      crosses = within(dot_product(r, crack%edge_1), dot_product(crack%edge_1, crack%edge_1), &
+      in_bounds = within(dot_product(r, crack%edge_1), dot_product(crack%edge_1, crack%edge_1), &
         & tolerance)
     case default
-      crosses = in_parallelogram(crack, r, tolerance)
+      in_bounds = in_parallelogram(crack, r, tolerance)
     end select
-  end function crosses
+  end function in_bounds
+
+  !> Number of the points of a body through which a crack runs.
+  pure integer function points_on(group, body) result(number)
+    type(crack_group), intent(in) :: group   !! the crack
+    type(body_type), intent(in) :: body
+    type(crack_type) :: crack
+    real(wp) :: r(3)
+    integer :: k
+
+    crack = new_crack(group, body%dim)
+    number = 0
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      r = -crack%origin
+      r(:body%dim) = r(:body%dim) + body%x(k, :)
+      if (abs(dot_product(r, crack%normal)) > on_plane*body%spacing(k)) cycle
+      if (in_bounds(crack, r, on_plane*body%spacing(k))) number = number + 1
+    end do
+  end function points_on
+
+  !> How large a crack is [m]: a segment's length; a parallelogram's two edges; a disc's diameter.
+  pure function extents_of(group, dim) result(extents)
+    type(crack_group), intent(in) :: group   !! the crack
+    integer, intent(in) :: dim               !! of the scene
+    real(wp), allocatable :: extents(:)
+    type(crack_type) :: crack
+
+    crack = new_crack(group, dim)
+    select case (crack%kind)
+    case (disc); extents = [2*crack%radius]
+    case (segment); extents = [norm2(crack%edge_1)]
+    case default; extents = [norm2(crack%edge_1), norm2(crack%edge_2)]
+    end select
+  end function extents_of
 
   !> Whether `r`, on the plane of the crack and from its corner, lies between its edges.
   pure logical function in_parallelogram(crack, r, tolerance)

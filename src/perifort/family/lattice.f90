@@ -426,9 +426,8 @@ contains
       if (g > 1) text = text//', '
       text = text//with_unit(family%grids(g)%spacing, 'm')
     end do
-    text = text//'; '//to_text(family%most_bonds)//' offsets'
     if (allocated(family%table)) then
-      text = text//', '//to_text(size(family%table))//' tables of weights'
+      text = text//'; points have '//to_text(size(family%table))//' different surroundings'
     end if
   end function describe
 

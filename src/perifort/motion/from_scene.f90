@@ -12,7 +12,8 @@ module pd_motion_from_scene
   use pd_motion_heating, only: heating_type, new_heating
   implicit none (type, external)
   private
-  public :: motions_of_scene, loads_of_scene, heating_of_scene, region_mask
+  public :: motions_of_scene, loads_of_scene, heating_of_scene, region_mask, no_fail_mask, &
+    & in_no_fail_zones
 
 contains
 
@@ -132,6 +133,34 @@ contains
         & .and. body%point > 0
     end do
   end function region_mask
+
+  !> Slots in no-fail zone `number` of a scene.
+  function no_fail_mask(scene, body, number) result(mask)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: number
+    logical, allocatable :: mask(:)
+
+    if (scene%no_fail(number)%region /= '') then
+      mask = region_mask(scene, body, scene%no_fail(number)%region)
+    else
+      mask = inside(scene%no_fail(number), body%x, &
+        & touch*minval(body%spacing, mask=body%point > 0)) .and. body%point > 0
+    end if
+  end function no_fail_mask
+
+  !> Slots in any no-fail zone of a scene.
+  function in_no_fail_zones(scene, body) result(mask)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    logical, allocatable :: mask(:)
+    integer :: i
+
+    allocate (mask(body%n_slots), source=.false.)
+    do i = 1, size(scene%no_fail)
+      mask = mask .or. no_fail_mask(scene, body, i)
+    end do
+  end function in_no_fail_zones
 
   !> The outermost row of body points at a side: of one body, or of all whose face is the outermost.
   function outermost_row(scene, body, group) result(chosen)

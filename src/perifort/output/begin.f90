@@ -13,9 +13,10 @@ module pd_output_begin
   use pd_motion_from_scene, only: region_mask
   use pd_motion_plan, only: plan_type
   use pd_motion_system, only: system_type
+  use pd_motion_time_step, only: evaluations
   use pd_output_checkpoint, only: checkpoint_path, new_about
-  use pd_output_recorder, only: recorder_type, schedule_type, field_of, history_columns, &
-    & planned_outputs, planned_rows
+  use pd_output_recorder, only: recorder_type, schedule_type, field_of, check_fields, &
+    & history_columns, planned_outputs, planned_rows
   use pd_output_restart, only: restart_type
   use pd_output_types, only: kept_type
   implicit none (type, external)
@@ -55,11 +56,17 @@ contains
 
     if (restart%found) kept = restart%about%kept
     associate (body => system%body, schedule => recorder%schedule)
-      schedule = schedule_of(scene, plan)
+      schedule = schedule_of(scene, plan, system%family%n_bonds)
       allocate (recorder%fields(size(scene%output%fields)))
       do f = 1, size(recorder%fields)
         recorder%fields(f) = field_of(trim(scene%output%fields(f)))
       end do
+      call check_fields(recorder%fields, error)
+      do f = 1, size(recorder%probes)
+        if (allocated(error)) return
+        call check_fields(recorder%probes(f)%fields, error)
+      end do
+      if (allocated(error)) return
       allocate (positions(body%n_points, 3), source=0.0_wp)
       do c = 1, body%dim
         call in_point_order(body, body%x(:, c), positions(:, c))
@@ -79,30 +86,32 @@ contains
     end associate
   end subroutine open_recorder
 
-  !> When a scene's run writes.
-  pure type(schedule_type) function schedule_of(scene, plan) result(schedule)
+  !> When a scene's run writes; `bonds` are the ordered pairs of its families.
+  pure type(schedule_type) function schedule_of(scene, plan, bonds) result(schedule)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
+    integer(i8), intent(in) :: bonds
 
     schedule%relaxation = plan%relaxes
     schedule%steps = plan%steps
     schedule%every = scene%output%every
     if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
     if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
-    schedule%history_every = history_interval(scene, plan)
+    schedule%history_every = history_interval(scene, plan, bonds)
   end function schedule_of
 
   !> An error if a run would write more outputs, or rows of its history, than anybody can look at:
   !> the results have room for all of them from the beginning.
-  subroutine check_schedule(scene, plan, error)
+  subroutine check_schedule(scene, plan, bonds, error)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
+    integer(i8), intent(in) :: bonds     !! ordered pairs of the families
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: most_outputs = 1000000, most_rows = 10000000
     type(schedule_type) :: schedule
     real(wp) :: duration
 
-    schedule = schedule_of(scene, plan)
+    schedule = schedule_of(scene, plan, bonds)
     if (schedule%interval > 0.0_wp) then
       duration = schedule%steps*plan%step
       if (min(duration/schedule%interval, real(schedule%steps, wp)) > most_outputs) &
@@ -121,13 +130,29 @@ contains
       & ' are allowed: history_every = '//to_text(schedule%steps/most_rows + 1))
   end subroutine check_schedule
 
-  !> Steps (iterations in relaxation) between rows of the history.
-  pure integer function history_interval(scene, plan) result(every)
+  !> Steps (iterations in relaxation) between rows of the history. Without the user's word there are
+  !> at most about 2000, and so few that they take a twentieth of the time of the steps at most: for
+  !> the strain energy, a row takes 1.4 to 2 evaluations of the forces over all `bonds` (ordered
+  !> pairs). Rows that cost next to nothing, those of small bodies, may be more. The number follows
+  !> from the scene alone and not from a clock, so that every run of it has the same rows.
+  pure integer function history_interval(scene, plan, bonds) result(every)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
+    integer(i8), intent(in) :: bonds
+    real(wp), parameter :: row = 2.5_wp           ! evaluations of the forces that a row takes
+    real(wp), parameter :: share = 0.05_wp        ! of the time of the steps
+    real(wp), parameter :: no_cost = 5.0e6_wp     ! bonds of all rows: some 0.02 s on one thread
+    real(wp) :: affordable, free
+
     every = scene%output%history_every
-    if (every == 0) every = max(1, merge(plan%relaxation%maximum_iterations, plan%steps, &
-      & plan%relaxes)/2000)
+    if (every > 0) return
+    if (plan%relaxes) then
+      every = max(1, plan%relaxation%maximum_iterations/2000)
+    else
+      affordable = row/(share*evaluations(plan%integrator))
+      free = real(plan%steps, wp)*bonds/no_cost
+      every = max(1, plan%steps/2000, ceiling(min(affordable, free)))
+    end if
   end function history_interval
 
   !> The folder of the results: the one asked for, or out/ and the scene file's name.

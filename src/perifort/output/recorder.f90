@@ -1,11 +1,13 @@
 !> Writes what a run is asked to keep: outputs of fields, rows of history with energies, reactions
 !> and probes, and the progress line.
 module pd_output_recorder
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_clock, only: duration_text, phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
   use pd_base_numbers, only: pi
+  use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, to_text
   use pd_family_family, only: bonds_type, allocate_bonds
@@ -18,11 +20,12 @@ module pd_output_recorder
   use pd_output_contact, only: touching_points
   use pd_output_results, only: results_type
   use pd_output_rotation, only: turned_part
+  use pd_output_strain, only: find_large_strains, large_strain
   use pd_output_types, only: column_type, field_type
   implicit none (type, external)
   private
-  public :: recorder_type, schedule_type, probe_type, field_of, history_columns, history_row, &
-    & planned_outputs, planned_rows, probe_values, velocities_now
+  public :: recorder_type, schedule_type, probe_type, field_of, check_fields, history_columns, &
+    & history_row, planned_outputs, planned_rows, probe_values, velocities_now
 
   character(*), parameter :: xyz(3) = ['x', 'y', 'z']
 
@@ -54,6 +57,7 @@ module pd_output_recorder
     type(probe_type), allocatable :: probes(:)
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
+    type(team_type) :: team                  !! threads, whose number may change at any instant
     type(energies_type) :: energies          !! of the last row
     real(wp) :: supply = 0.0_wp              !! energy at the first row, with breaking at t = 0 [J]
     integer :: rows = 0
@@ -196,6 +200,7 @@ contains
       call write_rescued(observer, system, instant, error)
       return
     end if
+    call observer%team%look()
     associate (schedule => observer%schedule)
       observer%steps_done = instant%step
       observer%time = instant%time
@@ -228,11 +233,15 @@ contains
       call observer%timer%stop('energies and history')
       if (allocated(error)) return
     end if
+    if (output .or. keeping) call observer%team%pause()
     if (output) then
       call observer%timer%start('output')
       call write_output(observer, system, instant, v, error)
       ! a run that goes on does not have the output that is written because it stops
-      if (output_due_now .or. instant%last) call warn_of_contact(observer, system, instant)
+      if (output_due_now .or. instant%last) then
+        call warn_of_contact(observer, system, instant)
+        call warn_of_strain(observer, system, instant)
+      end if
       call observer%results%put_warnings(observer%warnings%text())
       call observer%timer%stop('output')
       if (allocated(error)) return
@@ -254,8 +263,9 @@ contains
     if (recorder%gave_way_at == instant%load_step) return
     recorder%gave_way_at = instant%load_step
     recorder%gave_way = recorder%gave_way + 1
-    call recorder%warn('conjugate gradient', 'the conjugate gradient finds no rest in load '// &
-      & 'step '//to_text(instant%load_step)//': dynamic relaxation goes on from where it stands')
+    call recorder%warn('conjugate gradient', 'the conjugate gradient finds no static '// &
+      & 'equilibrium in load step '//to_text(instant%load_step)//': dynamic relaxation goes on '// &
+      & 'from where it stands')
   end subroutine note_giving_way
 
   !> Whether the run has had the time that it was given.
@@ -441,16 +451,37 @@ contains
     case ('damage')
       values = [0.0_wp]
       if (size(system%state%damage) > 0) values = [system%state%damage(k)]
-    case default
+    case ('dilatation')
       call allocate_bonds(system%family, bonds)
       call system%family%bonds_of(k, bonds)
-      if (field%name == 'dilatation') then
-        values = [point_dilatation(system%model, system%state%u, k, bonds)]
-      else
-        values = [point_energy(system%model, system%state%u, k, bonds)]
-      end if
+      values = [point_dilatation(system%model, system%state%u, k, bonds)]
+    case ('energy_density')
+      call allocate_bonds(system%family, bonds)
+      call system%family%bonds_of(k, bonds)
+      values = [point_energy(system%model, system%state%u, k, bonds)]
+    case default
+      ! check_fields has refused it
+      values = [ieee_value(1.0_wp, ieee_quiet_nan)]
     end select
   end function probe_values
+
+  !> An internal error if scenes may name a field that nobody computes.
+  pure subroutine check_fields(fields, error)
+    type(field_type), intent(in) :: fields(:)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: f
+
+    do f = 1, size(fields)
+      select case (fields(f)%name)
+      case ('displacement', 'velocity', 'force_density', 'damage', 'dilatation', 'energy_density')
+        cycle
+      case default
+        call fail(error, "internal error: the field '"//trim(fields(f)%name)// &
+          & "' is known by its name, but nothing computes it")
+        return
+      end select
+    end do
+  end subroutine check_fields
 
   !> One output of all fields, in point order.
   subroutine write_output(recorder, system, instant, v, error)
@@ -483,10 +514,12 @@ contains
         allocate (values(system%body%n_slots))
         call reference_dilatation(system%family, system%model, system%state%u, values)
         call put_scalars(values)
-      case default  ! energy_density
+      case ('energy_density')
         allocate (values(system%body%n_slots))
         call energy_pass(system%family, system%model, system%state%u, values)
         call put_scalars(values)
+      case default
+        call check_fields(recorder%fields(f:f), error)
       end select
       if (allocated(error)) return
       if (allocated(values)) deallocate (values)
@@ -551,5 +584,21 @@ contains
       & "rotation, so forces and energies are off; &horizon dilatation = 'unprojected' has no "// &
       & 'such error')
   end subroutine warn_of_rotation
+  !> Warn once of strains that are too large for a law that is linear in the stretch.
+  subroutine warn_of_strain(recorder, system, instant)
+    class(recorder_type), intent(inout) :: recorder
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    integer :: number, point
+    real(wp) :: stretch
+
+    if (recorder%warnings%has('strain')) return
+    call find_large_strains(system, number, point, stretch)
+    if (number == 0) return
+    call recorder%warn('strain', 'at t = '//to_text(instant%time)//' s intact bonds of '// &
+      & to_text(number)//' points are strained by more than '//to_text(nint(100*large_strain))// &
+      & ' %, the most by '//to_text(100*stretch, 3)//' % (point '//to_text(point)// &
+      & '): the material is linear in the strain and not meant for that')
+  end subroutine warn_of_strain
 
 end module pd_output_recorder

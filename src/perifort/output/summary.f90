@@ -3,7 +3,7 @@ module pd_output_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
   use pd_base_warnings, only: warnings_type
-  use pd_base_text, only: to_text, with_unit, newline
+  use pd_base_text, only: line => labelled_line, newline, to_text, with_unit
   use pd_scene_types, only: scene_type
   use pd_family_lattice, only: lattice_family_type
   use pd_motion_plan, only: plan_type
@@ -15,70 +15,106 @@ module pd_output_summary
 
 contains
 
-  !> The scene as it will be computed: points, bonds, memory, kernels and why, time step, probes.
-  function summary_before(scene, system, plan, probes, cut, warnings, threads) result(text)
+  !> The scene as it will be computed, a fact in each line: points, bonds, memory, forces, time
+  !> step, probes, and what is to be noted.
+  function summary_before(scene, system, plan, probes, cut, warnings, notes, threads) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     type(plan_type), intent(in) :: plan
     type(probe_type), intent(in) :: probes(:)
     integer(i8), intent(in) :: cut        !! bonds removed by cracks
     type(warnings_type), intent(in) :: warnings  !! found so far
-    integer, intent(in) :: threads
+    type(warnings_type), intent(in) :: notes     !! what is right and may surprise
+    integer, intent(in) :: threads        !! that the run may use
     character(:), allocatable :: text
     integer :: p, k
 
     text = ''
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
-    text = text//line('points', to_text(system%body%n_points)//', '// &
-      & to_text(scene%header%dimension)//'D, horizon '//with_unit(system%family%rule%delta, 'm'))
-    text = text//line('bonds', to_text(system%family%n_bonds)// &
-      & ' (each from both ends), at most '//to_text(system%family%most_bonds)//' a point')
+    text = text//line('points', to_text(system%body%n_points)//' in '// &
+      & to_text(scene%header%dimension)//'D')
+    text = text//line('horizon', with_unit(system%family%rule%delta, 'm')//', '// &
+      & to_text(system%family%rule%delta/greatest_spacing(system), 5)//' spacings of '// &
+      & with_unit(greatest_spacing(system), 'm', 4))
+    text = text//line('bonds', to_text(system%family%n_bonds/2)//' pairs of points ('// &
+      & to_text(system%family%n_bonds)//' if both directions count)')
+    text = text//line('', 'at most '//to_text(system%family%most_bonds)//' at a point')
     if (size(scene%cracks) > 0) &
-      & text = text//line('cracks', to_text(size(scene%cracks))//', which cut '// &
-      & to_text(cut)//' bonds')
+      & text = text//line('cracks', to_text(size(scene%cracks))//', which cut the bonds of '// &
+      & to_text(cut)//' pairs')
     text = text//line('memory', with_unit(real(memory_of(system), wp), 'B', 3))
-    text = text//kernels(scene, system)
+    text = text//forces(scene, system)
     text = text//line('threads', to_text(threads))
     if (plan%relaxes) then
-      text = text//line('relaxation', to_text(plan%relaxation%load_steps)// &
-        & ' load step(s), tolerance '//to_text(plan%relaxation%tolerance)//', '// &
-        & solver_of(scene))
+      text = text//statics(scene, plan)
     else
-      text = text//line('time step', with_unit(plan%step, 's', 6)//', '// &
-        & to_text(plan%step/plan%limit, 3)//' of the stable '//with_unit(plan%limit, 's', 6)// &
-        & ' ('//trim(merge('spectral', '7.25    ', plan%spectral))//', '//plan%integrator//')')
-      if (plan%spectral) text = text//line('', 'the largest frequency, measured in '// &
-        & to_text(plan%evaluations)//' evaluations, allows '// &
-        & to_text(plan%limit/plan%equation, 3)//' of 7.25 ('//with_unit(plan%equation, 's', 6)// &
-        & ')'//trim(merge(', whatever breaks', repeat(' ', 17), system%model%breaking)))
-      if (scene%time%limit == 'spectral' .and. .not. plan%spectral) text = text//line('', &
-        & '7.25, because the largest frequency allows no more here')
-      text = text//line('', '7.25 as printed '//printed(plan)//', the book''s estimate '// &
-        & with_unit(plan%book, 's', 6))
-      text = text//line('steps', to_text(plan%steps)//', to t = '//&
-        & with_unit(plan%steps*plan%step, 's', 6))
+      text = text//steps(scene, system, plan)
     end if
     do p = 1, size(probes)
       k = int(probes(p)%slot)
       text = text//line('probe', probes(p)%name//' is point '// &
         & to_text(int(system%body%point(k)))//' at ('//position(system, k)//') m')
     end do
+    do p = 1, notes%count()
+      text = text//line('note', notes%line(p))
+    end do
     do p = 1, warnings%count()
       text = text//line('warning', warnings%line(p))
     end do
   end function summary_before
 
-  !> The way to rest.
-  pure function solver_of(scene) result(text)
-    type(scene_type), intent(in) :: scene
-    character(:), allocatable :: text
-    text = 'conjugate gradient'
-    if (scene%relaxation%solver == 'dynamic_relaxation') &
-      & text = 'dynamic relaxation, density matrix '//trim(scene%relaxation%density_matrix)
-  end function solver_of
+  !> The largest spacing of all points [m].
+  pure real(wp) function greatest_spacing(system) result(spacing)
+    type(system_type), intent(in) :: system
+    spacing = maxval(system%body%spacing, mask=system%body%point > 0)
+  end function greatest_spacing
 
-  !> The kernels chosen, each with its reason.
-  function kernels(scene, system) result(text)
+  !> How static equilibrium is found.
+  pure function statics(scene, plan) result(text)
+    type(scene_type), intent(in) :: scene
+    type(plan_type), intent(in) :: plan
+    character(:), allocatable :: text
+
+    text = line('relaxation', 'static equilibrium after each of '// &
+      & to_text(plan%relaxation%load_steps)//' load step(s)')
+    if (scene%relaxation%solver == 'dynamic_relaxation') then
+      text = text//line('solver', 'dynamic relaxation, density matrix '// &
+        & trim(scene%relaxation%density_matrix))
+    else
+      text = text//line('solver', 'conjugate gradient')
+    end if
+    text = text//line('tolerance', to_text(plan%relaxation%tolerance))
+  end function statics
+
+  !> The time step, where its limit is from, and how many there are.
+  pure function steps(scene, system, plan) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(plan_type), intent(in) :: plan
+    character(:), allocatable :: text
+
+    text = line('time step', with_unit(plan%step, 's', 6)//', '// &
+      & to_text(plan%step/plan%limit, 3)//' of the stable step')
+    text = text//line('stable step', with_unit(plan%limit, 's', 6)//' for '//plan%integrator// &
+      & trim(merge(', from the largest frequency of the body', ', from equation 7.25'// &
+      & repeat(' ', 20), plan%spectral)))
+    if (plan%spectral) then
+      text = text//line('', 'measured in '//to_text(plan%evaluations)//' evaluations of the forces')
+      if (system%model%breaking) text = text//line('', &
+        & 'it holds for any state of broken bonds')
+      text = text//line('equation 7.25', with_unit(plan%equation, 's', 6)// &
+        & '; the stable step is '//to_text(plan%limit/plan%equation, 3)//' times as long')
+    else if (scene%time%limit == 'spectral') then
+      text = text//line('', 'the largest frequency allows no longer step')
+    end if
+    text = text//line('7.25 as printed', printed(plan))
+    text = text//line('book''s estimate', with_unit(plan%book, 's', 6))
+    text = text//line('steps', to_text(plan%steps))
+    text = text//line('end time', with_unit(plan%steps*plan%step, 's', 6))
+  end function steps
+
+  !> How the forces are computed and why so.
+  function forces(scene, system) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     character(:), allocatable :: text
@@ -86,26 +122,27 @@ contains
     associate (model => system%model)
       text = line('families', system%family%describe())
       if (model%dilatation) then
-        text = text//line('kernels', 'dilatation and force pass: some material has a /= 0; '// &
-          & trim(scene%horizon%dilatation)//' dilatation')
+        text = text//line('forces', 'state-based: two passes over the bonds, for the '// &
+          & 'dilatations and for the forces')
+        text = text//line('dilatation', trim(scene%horizon%dilatation))
       else
-        text = text//line('kernels', 'force pass only: a = 0 in every material (bond-based)')
+        text = text//line('forces', 'bond-based: one pass over the bonds, no dilatation')
       end if
-      text = text//line('', trim(merge('surface factors: corrected by energy ', &
-        & 'no surface factors: switched off     ', model%surface)))
+      text = text//line('surfaces', trim(merge('corrected by energy', &
+        & 'not corrected      ', model%surface)))
       if (model%breaking) then
-        text = text//line('', 'bonds can break'// &
-          & trim(merge(', in compression too', repeat(' ', 20), model%compression)))
+        text = text//line('fracture', 'bonds can break'// &
+          & trim(merge(' in tension and in compression', repeat(' ', 30), model%compression)))
       else if (any(scene%materials%critical_stretch > 0.0_wp) .or. &
         & any(scene%materials%critical_energy_release_rate > 0.0_wp)) then
-        text = text//line('', 'no bond can break: all points lie in no-fail zones')
+        text = text//line('fracture', 'no bond can break: all points lie in no-fail zones')
       else
-        text = text//line('', 'no bond can break: no material has a critical stretch')
+        text = text//line('fracture', 'no bond can break: no material has a critical stretch')
       end if
-      text = text//line('', trim(merge('thermal strain   ', 'no thermal strain', model%thermal)))
+      text = text//line('thermal strain', trim(merge('yes', 'no ', model%thermal)))
       text = text//line('precision', precision_of(scene, system))
     end associate
-  end function kernels
+  end function forces
 
   !> The precision of the bonds, and why it is not the one that was asked for.
   function precision_of(scene, system) result(text)
@@ -119,7 +156,7 @@ contains
       if (family%mixed) text = 'mixed: bonds in single precision, state in double'
     end select
     if (text /= 'double' .or. scene%header%precision /= 'mixed') return
-    text = text//': mixed is not there for '
+    text = text//': mixed precision is not available for '
     if (scene%header%dimension == 1) then
       text = text//'1D'
     else if (system%model%thermal) then
@@ -132,7 +169,7 @@ contains
   pure function printed(plan) result(text)
     type(plan_type), intent(in) :: plan
     character(:), allocatable :: text
-    text = 'has no value (its sum is negative)'
+    text = 'no value, because its sum is negative'
     if (plan%printed > 0.0_wp) text = with_unit(plan%printed, 's', 6)
   end function printed
 
@@ -168,20 +205,22 @@ contains
       & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
       & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
       & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
+    if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
     if (recorder%gave_way > 0) text = text//line('solver', to_text(recorder%gave_way)// &
       & ' load step(s) were left to dynamic relaxation by the conjugate gradient')
     associate (now => recorder%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))
       if (system%model%breaking) then
-        text = text//line('dissipated', with_unit(system%dissipated, 'J')//' by breaking '// &
-          & to_text(system%broken)//' bonds')
-        text = text//line('damage', 'at most '//to_text(maxval(system%state%damage), 3))
+        text = text//line('dissipated', with_unit(system%dissipated, 'J'))
+        text = text//line('broken bonds', to_text(system%broken)//' pairs of points')
+        text = text//line('greatest damage', to_text(maxval(system%state%damage), 3))
       end if
       text = text//line('external work', with_unit(system%external_work, 'J'))
       call recorder%energy_balance(system, balance, share)
       if (share >= 0.0_wp) then
-        parts = to_text(100*share, 2)//' % of the energy'
+        parts = to_text(100*share, 2)//' % of the greater of the energy supplied and the '// &
+          & 'energy present'
         if (abs(system%dissipated) > 0.0_wp) parts = parts//', '// &
           & to_text(100*abs(balance/system%dissipated), 2)//' % of the dissipated energy'
         text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '//parts)
@@ -202,15 +241,6 @@ contains
     if (system%model%surface) reals = reals + 2*system%body%dim
     bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) + system%family%bytes()
   end function memory_of
-
-  !> A labelled line.
-  pure function line(label, content) result(text)
-    character(*), intent(in) :: label, content
-    character(:), allocatable :: text
-    character(18) :: column
-    column = '  '//label
-    text = column//content//newline
-  end function line
 
   pure function position(system, k) result(text)
     type(system_type), intent(in) :: system

@@ -390,7 +390,7 @@ contains
     call keys%key('duration', group%duration, 's', 'time to compute, instead of steps', &
       & above=0.0_wp)
     call keys%key('breaking', group%breaking, 'explicit: a bond beyond its limit breaks before '// &
-      & "the step's forces, or after it has pulled once more (as in the book's programs)", &
+      & "the forces of the step are computed, or after that (as in the book's programs)", &
       & allowed=[character(13) :: 'before_forces', 'after_forces'])
   end subroutine visit_time
 
@@ -426,7 +426,8 @@ contains
       & above=0.0_wp)
     call keys%key('history_every', group%history_every, '', &
       & 'steps (relaxation: iterations) between rows of the history', &
-      & at_least=1, default='max(1, steps/2000); relaxation: max(1, maximum_iterations/2000)', &
+      & at_least=1, default='max(1, steps/2000), and so many that rows take at most 5 % of the '// &
+      & 'time; relaxation: max(1, maximum_iterations/2000)', &
       & hidden=group%history_every == 0)
     call keys%list('fields', group%fields, 'fields to write', field_names, &
       & default="'displacement', 'velocity', 'damage'")

@@ -147,7 +147,7 @@ module pd_scene_types
   type :: output_group
     integer :: every = 0                         !! steps (load steps in relaxation); 0 = steps/10
     real(wp) :: interval = unset                 !! [s], instead of every
-    integer :: history_every = 0                 !! 0 = max(1, steps/2000)
+    integer :: history_every = 0                 !! 0 = by their cost, at most about 2000
     character(name_length), allocatable :: fields(:)
     character(name_length) :: precision = 'double'   !! 'single'
     character(name_length) :: format = 'vtkhdf'      !! 'vtu', 'both'

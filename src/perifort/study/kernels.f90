@@ -249,8 +249,8 @@ contains
   !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
   !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
   !> loops: xi and eta 2d, |xi|^2, x and e 3(2d - 1), the rest of them and the weight 9, polynomial
-  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more; stored
-  !> weights save 6 and are not counted.
+  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more;
+  !> stored weights save 6 and are not counted.
   !> Unprojected, the sum of the dilatation is 2 less, and what it adds to the force 3.
   pure real(wp) function flops_of_bond(family, kind) result(flops)
     class(family_type), intent(in) :: family

@@ -140,7 +140,7 @@ contains
     watcher%measure = measure
     watcher%quick = around < 0.0_wp
     watcher%relaxation = set_up%plan%relaxes
-    watcher%every = history_interval(scene, set_up%plan)
+    watcher%every = history_interval(scene, set_up%plan, set_up%system%family%n_bonds)
     watcher%probes = set_up%probes
     if (watcher%quick) return
     call choose_places(scene, set_up%system, around, watcher, error)

@@ -1,0 +1,192 @@
+!> What points and families of a scene show to be allowed, but to give wrong answers: bodies one
+!> point thick, horizons too short for shear, volumes of a cloud that contradict the distances of
+!> its points, cracks that run through points.
+module pd_family_warnings
+  use pd_base_kinds, only: wp
+  use pd_base_numbers, only: pi
+  use pd_base_text, only: to_text, with_unit
+  use pd_base_warnings, only: warnings_type
+  use pd_scene_types, only: scene_type
+  use pd_body_body, only: body_type
+  use pd_family_cracks, only: points_on
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_joints, only: joint_type, count_joints
+  use pd_family_volume, only: reach
+  implicit none (type, external)
+  private
+  public :: warn_of_points
+
+  real(wp), parameter :: flat = 1.0e-6_wp       !! height of a body one point thick [spacings]
+  !> No arrangement has all points farther from their nearest ones than 1.12 times the root of their
+  !> volume (the closest packing of spheres; 1.07 in 2D, 1 in 1D).
+  real(wp), parameter :: most_distance = 1.25_wp
+  !> Of the horizon's volume, that the volumes in it may sum up to: coarse families reach 1.67.
+  real(wp), parameter :: most_filled = 2.0_wp
+  real(wp), parameter :: too_far = 0.5_wp, too_full = 0.1_wp  !! parts of the points [-]
+
+contains
+
+  !> Add the warnings about points, families and cracks of a scene.
+  subroutine warn_of_points(scene, body, family, warnings)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(warnings_type), intent(inout) :: warnings   !! added to
+    integer :: i
+
+    do i = 1, size(scene%bodies)
+      call warn_of_thickness(body, family, i, name_of(scene, i), warnings)
+      call warn_of_horizon(body, family, i, name_of(scene, i), warnings)
+      call warn_of_volumes(body, family, i, name_of(scene, i), warnings)
+    end do
+    do i = 1, size(scene%cracks)
+      call warn_of_crack(scene, body, i, warnings)
+    end do
+    call warn_of_joints(scene, body, family, warnings)
+  end subroutine warn_of_points
+
+  !> Warn if a body of a 2D or 3D scene has one layer of points only and no neighbour across it: it
+  !> deforms as a chain or a sheet of bonds, not as a plate or a block of its material.
+  subroutine warn_of_thickness(body, family, number, name, warnings)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    integer, intent(in) :: number        !! of the body
+    character(*), intent(in) :: name     !! of the body, as told
+    type(warnings_type), intent(inout) :: warnings
+    type(bonds_type) :: bonds
+    logical, allocatable :: mine(:)
+    logical :: thin
+    real(wp) :: height
+    integer :: c, k
+
+    if (body%dim == 1) return
+    mine = body%body == number .and. body%point > 0 .and. body%layer == 0
+    if (count(mine) == 0) return
+    call allocate_bonds(family, bonds)
+    do c = 1, body%dim
+      height = flat*minval(body%spacing, mask=mine)
+      if (maxval(body%x(:, c), mask=mine) - minval(body%x(:, c), mask=mine) > height) cycle
+      thin = .false.  ! isolated points have another warning
+      do k = 1, body%n_slots
+        if (.not. mine(k)) cycle
+        call family%bonds_of(k, bonds)
+        if (bonds%n == 0) cycle
+        thin = .not. any(abs(bonds%xi(:bonds%n, c)) > height)
+        if (.not. thin) exit
+      end do
+      if (.not. thin) cycle
+      call warnings%add('thin body '//to_text(number)//' '//to_text(c), name// &
+        & ' is one point thick in '//achar(iachar('x') + c - 1)//': its stiffness can be wrong '// &
+        & 'by 21 %; use more points across it, or a scene of fewer dimensions', tell=.false.)
+    end do
+  end subroutine warn_of_thickness
+
+  !> Warn if no bond of a body runs along a diagonal of its grid.
+  subroutine warn_of_horizon(body, family, number, name, warnings)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    integer, intent(in) :: number        !! of the body
+    character(*), intent(in) :: name     !! of the body, as told
+    type(warnings_type), intent(inout) :: warnings
+    real(wp) :: spacing
+
+    if (body%dim == 1) return
+    if (.not. any(body%body == number .and. body%point > 0)) return
+    spacing = maxval(body%spacing, mask=body%body == number .and. body%point > 0)
+    if (reach(family%rule, spacing, body%dim) >= sqrt(2.0_wp)*spacing) return
+    call warnings%add('short horizon '//to_text(number), 'the horizon of '// &
+      & with_unit(family%rule%delta, 'm', 4)//' is shorter than 1.4142 spacings of '// &
+      & with_unit(spacing, 'm', 4)//': '//name//' has no diagonal bonds and no shear '// &
+      & 'stiffness; use a &horizon ratio of 2 to 4', tell=.false.)
+  end subroutine warn_of_horizon
+
+  !> Warn if the volumes of a cloud are much smaller or larger than the space its points have.
+  subroutine warn_of_volumes(body, family, number, name, warnings)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    integer, intent(in) :: number        !! of the body
+    character(*), intent(in) :: name     !! of the body, as told
+    type(warnings_type), intent(inout) :: warnings
+    real(wp), parameter :: ball(3) = [2.0_wp, pi, 4*pi/3]  ! volume of the unit ball
+    type(bonds_type) :: bonds
+    real(wp) :: filled
+    integer :: points, far, full, k
+
+    points = 0
+    far = 0
+    full = 0
+    !$omp parallel default(none) shared(body, family, number) private(bonds, filled, k) &
+    !$omp reduction(+:points, far, full)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(static)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0 .or. body%body(k) /= number .or. body%grid(k) /= 0) cycle
+      call family%bonds_of(k, bonds)
+      points = points + 1
+      if (.not. any(bonds%length(:bonds%n) <= most_distance*body%spacing(k))) far = far + 1
+      filled = body%spacing(k)**body%dim + sum(body%spacing(bonds%j(:bonds%n))**body%dim)
+      if (filled > most_filled*ball(body%dim)*family%rule%delta**body%dim) full = full + 1
+    end do
+    !$omp end parallel
+    if (points == 0) return
+    if (far > too_far*points) then
+      call warnings%add('cloud volumes '//to_text(number), name//': the volumes are too small '// &
+        & 'for the distances of its points; '//to_text(far)//' of '//to_text(points)// &
+        & ' points have their nearest one farther away than '//to_text(most_distance)// &
+        & ' times volume^(1/dimension)', tell=.false.)
+    else if (full > too_full*points) then
+      call warnings%add('cloud volumes '//to_text(number), name//': the volumes are too large '// &
+        & 'for the distances of its points; around '//to_text(full)//' of '//to_text(points)// &
+        & ' points they sum up to more than twice the volume within the horizon', tell=.false.)
+    end if
+  end subroutine warn_of_volumes
+
+  !> Warn if a crack runs through points: they count as lying on one side of it.
+  subroutine warn_of_crack(scene, body, number, warnings)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: number        !! of the crack
+    type(warnings_type), intent(inout) :: warnings
+    integer :: points
+
+    points = points_on(scene%cracks(number), body)
+    if (points == 0) return
+    call warnings%add('crack through points '//to_text(number), '&crack number '// &
+      & to_text(number)//' runs through '//to_text(points)//' points, which count as lying on '// &
+      & 'one side of it: the cut is not symmetric; shift the crack by half a spacing ('// &
+      & with_unit(minval(body%spacing, mask=body%point > 0)/2, 'm', 4)//') across its plane', &
+      & tell=.false.)
+  end subroutine warn_of_crack
+
+  !> A body as it is told of: by its name, or by its number.
+  pure function name_of(scene, number) result(name)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    character(:), allocatable :: name
+    name = 'body '//to_text(number)
+    if (scene%bodies(number)%name /= '') name = "the body '"//trim(scene%bodies(number)%name)//"'"
+  end function name_of
+
+  !> Warn of bodies that are bonded because points of both lie within one horizon: the first few
+  !> pairs one by one.
+  subroutine warn_of_joints(scene, body, family, warnings)
+    type(scene_type), intent(in) :: scene            !! for the names of bodies
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(warnings_type), intent(inout) :: warnings   !! added to
+    integer, parameter :: most = 10  ! pairs reported one by one
+    type(joint_type), allocatable :: joints(:)
+    integer :: i
+
+    call count_joints(body, family, joints)
+    do i = 1, min(most, size(joints))
+      call warnings%add('joint '//to_text(i), to_text(joints(i)%bonds)//' bonds join '// &
+        & name_of(scene, joints(i)%bodies(1))//' and '//name_of(scene, joints(i)%bodies(2))// &
+        & ', whose points lie within a horizon of each other: they act as one; a &crack between them parts them', &
+        & tell=.false.)
+    end do
+    if (size(joints) > most) call warnings%add('joints', to_text(sum(joints(most + 1:)%bonds))// &
+      & ' bonds join '//to_text(size(joints) - most)//' more pairs of bodies', tell=.false.)
+  end subroutine warn_of_joints
+
+end module pd_family_warnings

@@ -1,0 +1,405 @@
+!> Every warning has a scene that triggers it and one that must not; so have the notes.
+module test_warnings
+  use pd_base_error, only: fault_type => error_type
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: to_text
+  use pd_base_warnings, only: warnings_type
+  use pd_driver, only: prepare, run_options_type, run_scene, set_up_type
+  use pd_output_files, only: file_exists, make_directory
+  use pd_output_sink, only: sink_type
+  use pd_scene_file, only: read_text_file
+  use pd_scene_types, only: scene_type
+  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
+  use bodies, only: box_scene, expect_true
+  implicit none (type, external)
+  private
+  public :: collect_warnings
+
+  character(*), parameter :: here = 'build/test_warnings'
+  real(wp), parameter :: spacing = 1.0e-2_wp
+
+contains
+
+  subroutine collect_warnings(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('bodies one point thick', test_thin), &
+      & new_unittest('cracks through points', test_cracks), &
+      & new_unittest('volumes of a cloud', test_volumes), &
+      & new_unittest('horizons without shear stiffness', test_horizons), &
+      & new_unittest('stiffness in other units', test_stiffness), &
+      & new_unittest('density in other units', test_density), &
+      & new_unittest('loads in other units', test_loads), &
+      & new_unittest('motions in other units', test_motions), &
+      & new_unittest('outputs beyond the end', test_schedule), &
+      & new_unittest('empty regions and zones', test_empty), &
+      & new_unittest('regions that are clamped', test_clamps), &
+      & new_unittest('large strains', test_strains)]
+  end subroutine collect_warnings
+
+  !> Hold a scene to having (or not having) a warning, or a note, with this text, told once.
+  subroutine expect_told(error, scene, text, told, what, note)
+    type(error_type), allocatable, intent(inout) :: error
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: text       !! part of the warning
+    logical, intent(in) :: told            !! it must be there
+    character(*), intent(in) :: what       !! the scene, for messages
+    logical, intent(in), optional :: note  !! it is a note
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    type(warnings_type) :: list
+    integer :: i, n
+
+    if (allocated(error)) return
+    call prepare(scene, set_up, fault)
+    if (allocated(fault)) then
+      call test_failed(error, what//' is refused: '//fault%message)
+      return
+    end if
+    list = set_up%warnings
+    if (present(note)) list = set_up%notes
+    n = 0
+    do i = 1, list%count()
+      if (index(list%line(i), text) > 0) n = n + 1
+    end do
+    call expect_true(error, n == merge(1, 0, told), what//": '"//text//"' "//to_text(n)// &
+      & ' times in: '//list%text())
+  end subroutine expect_told
+
+  !> A chain in the plane and a sheet in space are; two rows, a chain in 1D, or a sheet that another
+  !> body on the same grid makes thicker are not.
+  subroutine test_thin(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: text = 'is one point thick in '
+    type(scene_type) :: scene
+
+    call box_scene([8, 1], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, text//'y', .true., 'a chain in 2D')
+    call expect_told(error, scene, text//'x', .false., 'a chain in 2D')
+    scene%horizon%family = 'list'
+    call expect_told(error, scene, text//'y', .true., 'a chain in 2D, list')
+    call box_scene([6, 5, 1], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, text//'z', .true., 'a sheet in 3D')
+    call box_scene([1, 8, 1], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, text//'z', .true., 'a chain in 3D')
+    call expect_told(error, scene, text//'x', .true., 'a chain in 3D')
+    call box_scene([8], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, text, .false., 'a bar in 1D')
+    call box_scene([8, 2], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, text, .false., 'two rows in 2D')
+    call box_scene([8, 1], spacing, 0.2_wp, scene)
+    scene%bodies = [scene%bodies(1), scene%bodies(1)]
+    scene%bodies(2)%name = 'upper'
+    scene%bodies(2)%lower(2) = spacing
+    scene%bodies(2)%upper(2) = 2*spacing
+    call expect_told(error, scene, text, .false., 'two chains side by side')
+  end subroutine test_thin
+
+  !> Points lie at half-integer multiples of the spacing. Cracks between rows, or whose line runs
+  !> through points beyond their tip, cut none in two.
+  subroutine test_cracks(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%cracks)
+    allocate (scene%cracks(1))
+    scene%cracks(1)%from(:2) = [0.0_wp, 3.5_wp]*spacing
+    scene%cracks(1)%to(:2) = [4.0_wp, 3.5_wp]*spacing
+    call expect_told(error, scene, 'runs through 4 points', .true., 'a crack along a row')
+    call expect_told(error, scene, 'half a spacing (5 mm)', .true., 'a crack along a row')
+    scene%cracks(1)%from(2) = 4.0_wp*spacing
+    scene%cracks(1)%to(2) = 4.0_wp*spacing
+    call expect_told(error, scene, 'runs through', .false., 'a crack between rows')
+    scene%cracks(1)%from(:2) = [-4.0_wp, 3.5_wp]*spacing
+    scene%cracks(1)%to(:2) = [0.4_wp, 3.5_wp]*spacing
+    call expect_told(error, scene, 'runs through', .false., 'a crack that ends before the points')
+    call box_scene([6, 6, 6], spacing, 0.2_wp, scene)
+    deallocate (scene%cracks)
+    allocate (scene%cracks(1))
+    scene%cracks(1)%centre = [3.0_wp, 3.0_wp, 3.5_wp]*spacing
+    scene%cracks(1)%normal = [0.0_wp, 0.0_wp, 1.0_wp]
+    scene%cracks(1)%radius = 1.0_wp*spacing
+    call expect_told(error, scene, 'runs through 4 points', .true., 'a disc through points')
+    scene%cracks(1)%centre(3) = 3.0_wp*spacing
+    call expect_told(error, scene, 'runs through', .false., 'a disc between points')
+  end subroutine test_cracks
+
+  !> A cloud of 12 x 12 points in a square array, each moved a little, whose volumes are so many
+  !> times those that fit.
+  subroutine cloud(factor, scene, error)
+    real(wp), intent(in) :: factor
+    type(scene_type), intent(out) :: scene
+    type(error_type), allocatable, intent(inout) :: error
+    type(sink_type) :: sink
+    type(fault_type), allocatable :: fault
+    integer :: i, j
+
+    call box_scene([2, 2], spacing, 0.2_wp, scene)
+    scene%bodies(1)%file = here//'/cloud.txt'
+    if (allocated(error)) return
+    call make_directory(here, fault)
+    if (.not. allocated(fault)) call sink%open(here//'/cloud.txt', fault)
+    do j = 1, 12
+      do i = 1, 12
+        if (.not. allocated(fault)) call sink%put(to_text((i + 0.1_wp*sin(7.0_wp*j))*spacing)// &
+          & ' '//to_text((j + 0.1_wp*sin(5.0_wp*i))*spacing)//' 0 '// &
+          & to_text(factor*spacing**2*scene%header%thickness)//new_line('a'), fault)
+      end do
+    end do
+    if (.not. allocated(fault)) call sink%close(fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+  end subroutine cloud
+
+  !> Volumes twice too small leave each point's nearest one 1.4 roots of a volume away; volumes
+  !> three times too large sum up to three times the horizon's. 30 % off may be how a cloud was
+  !> made.
+  subroutine test_volumes(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: right(3) = [0.75_wp, 1.0_wp, 1.3_wp]
+    type(scene_type) :: scene
+    integer :: i
+
+    call cloud(0.5_wp, scene, error)
+    call expect_told(error, scene, 'volumes are too small', .true., 'half the volume')
+    call cloud(3.0_wp, scene, error)
+    call expect_told(error, scene, 'volumes are too large', .true., 'three times the volume')
+    do i = 1, 3
+      call cloud(right(i), scene, error)
+      call expect_told(error, scene, 'the volumes are', .false., to_text(right(i))//' volumes')
+    end do
+    call box_scene([12, 12], spacing, 0.2_wp, scene)
+    scene%horizon%ratio = 1.0_wp
+    scene%horizon%family = 'list'
+    call expect_told(error, scene, 'the volumes are', .false., 'a lattice')
+  end subroutine test_volumes
+
+  subroutine test_horizons(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: text = 'no shear stiffness'
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    scene%horizon%ratio = 1.4_wp
+    call expect_told(error, scene, text, .true., 'ratio 1.4')
+    scene%horizon%ratio = sqrt(2.0_wp)
+    call expect_told(error, scene, text, .false., 'ratio root 2')
+    call box_scene([5, 5, 5], spacing, 0.2_wp, scene)
+    scene%horizon%ratio = 1.0_wp
+    call expect_told(error, scene, text, .true., 'ratio 1 in 3D')
+    scene%horizon%ratio = 1.5_wp
+    call expect_told(error, scene, text, .false., 'ratio 1.5 in 3D')
+    call box_scene([8], spacing, 0.2_wp, scene)
+    scene%horizon%ratio = 1.0_wp
+    call expect_told(error, scene, text, .false., 'ratio 1 in 1D')
+  end subroutine test_horizons
+
+  !> 210,000 is steel in MPa, beside a plate 80 (mm) long.
+  subroutine test_stiffness(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: text = "Young's modulus of "
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, 'SI units', .false., 'steel')
+    scene%materials(1)%youngs_modulus = 200.0_wp
+    call expect_told(error, scene, text//'200 Pa', .true., 'steel in GPa')
+    scene%materials(1)%youngs_modulus = 2.0e14_wp
+    call expect_told(error, scene, text, .true., 'too stiff')
+    scene%materials(1)%youngs_modulus = 2.1e5_wp
+    call expect_told(error, scene, text, .false., 'a small piece of jelly')
+    call box_scene([8, 8], 10.0_wp, 0.2_wp, scene)
+    call expect_told(error, scene, text, .false., 'a large piece of steel')
+    scene%materials(1)%youngs_modulus = 2.1e5_wp
+    call expect_told(error, scene, 'as if they were in MPa and mm', .true., 'mm, N, MPa')
+  end subroutine test_stiffness
+
+  !> 7.85 g/cm3 and 7.85e-9 t/mm3 are steel. Statics has no density.
+  subroutine test_density(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: wrong(3) = [7.85_wp, 7.85e-9_wp, 7.85e6_wp]
+    type(scene_type) :: scene
+    integer :: i
+
+    do i = 1, 3
+      call box_scene([8, 8], spacing, 0.2_wp, scene)
+      scene%materials(1)%density = wrong(i)
+      call expect_told(error, scene, 'has a density of', .true., to_text(wrong(i)))
+      scene%time%method = 'relaxation'
+      call expect_told(error, scene, 'has a density of', .false., to_text(wrong(i))//', statics')
+    end do
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    call expect_told(error, scene, 'has a density of', .false., 'steel')
+  end subroutine test_density
+
+  !> A plate 8 cm square and 2 mm thick, E = 2e11 Pa: 2e11 Pa, 3.2e7 N and 2.5e12 N/m3 strain it
+  !> by 1.
+  subroutine test_loads(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%side = 'x_max'
+    scene%loads(1)%pressure = -1.9e11_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'a large pressure')
+    scene%loads(1)%pressure = -2.1e11_wp
+    call expect_told(error, scene, 'its pressure predicts a strain of 1.1', .true., &
+      & 'a pressure beyond E')
+    scene%loads(1)%pressure = -2.1e10_wp
+    scene%loads(1)%times = [0.0_wp, 1.0_wp]
+    scene%loads(1)%values = [0.0_wp, 10.0_wp]
+    call expect_told(error, scene, 'its pressure predicts', .true., 'a pressure times a factor')
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%side = 'x_max'
+    scene%loads(1)%force(1) = 3.1e7_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'a large force')
+    scene%loads(1)%force(1) = 3.4e7_wp
+    call expect_told(error, scene, 'its force predicts a strain', .true., 'a force beyond E A')
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%body_force(2) = 2.4e12_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'a large body force')
+    scene%loads(1)%body_force(2) = 2.6e12_wp
+    call expect_told(error, scene, 'its body_force predicts a strain', .true., &
+      & 'a body force beyond E/L')
+  end subroutine test_loads
+
+  !> The plate is 8 cm long, and its bar waves run at sqrt(E/rho) = 5048 m/s.
+  subroutine test_motions(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%boundaries)
+    allocate (scene%boundaries(1))
+    scene%boundaries(1)%side = 'x_max'
+    scene%boundaries(1)%velocity(1) = 5000.0_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'a fast boundary')
+    scene%boundaries(1)%velocity(1) = 5600.0_wp
+    call expect_told(error, scene, 'its velocity predicts a strain', .true., 'faster than waves')
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%boundaries)
+    allocate (scene%boundaries(1))
+    scene%boundaries(1)%side = 'x_max'
+    scene%boundaries(1)%ramp_time = 1.0_wp
+    scene%boundaries(1)%displacement(1) = 0.07_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'a large displacement')
+    scene%boundaries(1)%displacement(1) = 0.1_wp
+    call expect_told(error, scene, 'its displacement predicts a strain', .true., &
+      & 'a displacement beyond the length')
+  end subroutine test_motions
+
+  !> Ten steps of 1e-7 s.
+  subroutine test_schedule(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: beyond = 'only the first and the final state are written'
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    scene%time%step = 1.0e-7_wp
+    scene%time%steps = 10
+    scene%output%interval = 1.1e-6_wp
+    call expect_told(error, scene, beyond, .true., 'an interval beyond the end')
+    scene%output%interval = 1.0e-6_wp
+    call expect_told(error, scene, beyond, .false., 'an interval to the end')
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    scene%time%steps = 10
+    scene%output%every = 11
+    call expect_told(error, scene, beyond, .true., 'every 11th of 10 steps')
+    scene%output%every = 10
+    call expect_told(error, scene, beyond, .false., 'every 10th of 10 steps')
+    scene%output%history_every = 10
+    call expect_told(error, scene, 'history_every', .false., 'a row every 10th of 10 steps')
+    scene%output%history_every = 11
+    call expect_told(error, scene, 'history_every = 11 is more', .true., &
+      & 'a row every 11th of 10 steps')
+    scene%time%method = 'relaxation'
+    scene%output%every = 1
+    call expect_told(error, scene, 'history_every', .false., 'iterations of a relaxation')
+    scene%output%every = 2
+    call expect_told(error, scene, beyond, .true., 'every second of one load step')
+  end subroutine test_schedule
+
+  subroutine test_empty(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%regions, scene%no_fail)
+    allocate (scene%regions(1), scene%no_fail(1))
+    scene%regions(1)%name = 'left'
+    scene%regions(1)%shape = 'box'
+    scene%no_fail(1)%shape = 'box'
+    scene%materials(1)%critical_stretch = 1.0_wp
+    call expect_told(error, scene, 'holds no point', .false., 'boxes without limits')
+    scene%no_fail(1)%upper(1) = -1.0_wp
+    call expect_told(error, scene, '&no_fail number 1 holds no point', .true., 'an empty zone')
+    scene%no_fail(1)%upper(1) = 1.0_wp
+    scene%regions(1)%upper(1) = -1.0_wp
+    call expect_told(error, scene, 'the region left holds no point', .true., 'an empty region')
+  end subroutine test_empty
+
+  subroutine test_clamps(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    deallocate (scene%regions, scene%boundaries)
+    allocate (scene%regions(1), scene%boundaries(1))
+    scene%regions(1)%name = 'left'
+    scene%regions(1)%shape = 'box'
+    scene%regions(1)%upper(1) = 2*spacing
+    scene%boundaries(1)%region = 'left'
+    scene%boundaries(1)%displacement(1) = 0.0_wp
+    call expect_told(error, scene, 'cannot rotate', .false., 'one component', note=.true.)
+    scene%boundaries(1)%velocity(2) = 0.0_wp
+    call expect_told(error, scene, 'cannot rotate', .true., 'all components', note=.true.)
+    scene%regions(1)%upper(:2) = spacing
+    call expect_told(error, scene, 'cannot rotate', .false., 'a single point', note=.true.)
+  end subroutine test_clamps
+
+  !> A uniform strain along x of 11 % is told by the run, 9 % and a turn by 90 degrees are not; in
+  !> every dimension.
+  subroutine test_strains(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: dim, i
+    type(scene_type) :: scene
+    type(run_options_type) :: options
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+    real(wp), parameter :: strain(4) = [0.11_wp, -0.11_wp, 0.09_wp, 0.0_wp]
+
+    options%output_directory = here//'/strain'
+    options%quiet = .true.
+    options%overwrite = .true.
+    do dim = 1, 3
+      do i = 1, size(strain)
+        if (i == 4 .and. dim == 1) cycle
+        call box_scene(spread(5, 1, dim), spacing, 0.2_wp, scene)
+        deallocate (scene%initial)
+        allocate (scene%initial(1))
+        scene%initial(1)%displacement_gradient(1, 1) = strain(i)
+        ! a turn is u_x = -x - y, u_y = x - y
+        if (i == 4) scene%initial(1)%displacement_gradient(:2, :2) = &
+          & reshape([-1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp], [2, 2])
+        call run_scene(scene, options, fault)
+        if (allocated(fault)) then
+          call test_failed(error, fault%message)
+          return
+        end if
+        text = ''
+        if (file_exists(here//'/strain/warnings.txt')) &
+          & call read_text_file(here//'/strain/warnings.txt', text, fault)
+        call expect_true(error, (index(text, 'strained by more than 10 %') > 0) .eqv. i <= 2, &
+          & to_text(dim)//'D, case '//to_text(i)//': '//text)
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_strains
+
+end module test_warnings
