@@ -134,8 +134,8 @@ contains
     force = 2*diary%strain(diary%n)/jump
   end function pull_of
 
-  !> Bodies with holes, steps and round corners, against the rule as it is written: of all points of a
-  !> column, the outermost; if no column ends further out by more than delta, three points follow it.
+  !> Bodies with holes, steps and round corners, against the rule as it is written: of all points of
+  !> a column, the outermost; if no column ends further out by more than delta, three points follow.
   subroutine test_columns(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

@@ -75,8 +75,8 @@ contains
     end do
   end subroutine test_spacings
 
-  !> A fine body fills the room of four coarse cells that shapes have taken; one that is a cell larger
-  !> does not fit.
+  !> A fine body fills the room of four coarse cells that shapes have taken; one that is a cell
+  !> larger does not fit.
   subroutine test_hole(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -103,8 +103,8 @@ contains
   end subroutine test_hole
 
   !> Two clouds whose points interlock at a third of a spacing, as the centroids of tetrahedra may:
-  !> accepted, as is a lattice with a cloud. Points in one place are refused, of one cloud, of two, or
-  !> of a cloud and a lattice.
+  !> accepted, as is a lattice with a cloud. Points in one place are refused, of one cloud, of two,
+  !> or of a cloud and a lattice.
   subroutine test_clouds(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: shifts(*) = [0.3_wp, 1.0e-5_wp, 0.0_wp, 1.0e-7_wp]
