@@ -5,7 +5,7 @@ module pd_body_lattices
   use pd_body_body, only: body_type, grid_type, allocate_points
   implicit none (type, external)
   private
-  public :: lattice_points, points_of_cells, lattice_grid, cell_of
+  public :: lattice_points, box_of_cells, lattice_grid, cell_of
 
 contains
 
@@ -15,42 +15,14 @@ contains
     type(body_group), intent(in) :: group  !! with lower, upper and points
     real(wp), intent(in) :: depth          !! what makes dx^dim a volume: thickness, area or 1
     type(body_type), intent(out) :: body
-    integer, allocatable :: cells(:, :)
-    integer :: i, j, k, n, count(3)
+    type(grid_type) :: grid
+    integer :: count(3)
 
     count = 1
     count(:dim) = group%points(:dim)
-    allocate (cells(3, product(count)))
-    n = 0
-    do k = 1, count(3)
-      do j = 1, count(2)
-        do i = 1, count(1)
-          n = n + 1
-          cells(:, n) = [i, j, k]
-        end do
-      end do
-    end do
-    call points_of_cells(dim, lattice_grid(group, dim), cells, depth, body)
+    grid = lattice_grid(group, dim)
+    call box_of_cells(dim, grid, [1, 1, 1], count, depth, body)
   end subroutine lattice_points
-
-  !> Points at the centres of these cells of a grid, in their order.
-  pure subroutine points_of_cells(dim, grid, cells, depth, body)
-    integer, intent(in) :: dim
-    type(grid_type), intent(in) :: grid
-    integer, intent(in) :: cells(:, :)     !! (3, n); cell 1 begins at the grid's origin
-    real(wp), intent(in) :: depth          !! what makes dx^dim a volume
-    type(body_type), intent(out) :: body
-    integer :: c, n
-
-    call allocate_points(body, dim, size(cells, 2))
-    do c = 1, dim
-      do n = 1, size(cells, 2)
-        body%x(n, c) = grid%origin(c) + (cells(c, n) - 0.5_wp)*grid%spacing
-      end do
-    end do
-    body%volume = depth*grid%spacing**dim
-    body%spacing = grid%spacing
-  end subroutine points_of_cells
 
   !> The grid of a lattice body: its cell 1 begins at the body's lower corner.
   pure type(grid_type) function lattice_grid(group, dim) result(grid)
@@ -59,6 +31,31 @@ contains
     grid%origin(:dim) = group%lower(:dim)
     grid%spacing = (group%upper(1) - group%lower(1))/group%points(1)
   end function lattice_grid
+
+  !> Points at the centres of the cells first..last of a grid, x fastest.
+  pure subroutine box_of_cells(dim, grid, first, last, depth, body)
+    integer, intent(in) :: dim
+    type(grid_type), intent(in) :: grid
+    integer, intent(in) :: first(3), last(3)  !! cell 1 begins at the grid's origin
+    real(wp), intent(in) :: depth             !! what makes dx^dim a volume
+    type(body_type), intent(out) :: body
+    integer :: i, j, k, n
+
+    call allocate_points(body, dim, product(max(0, last - first + 1)))
+    n = 0
+    do k = first(3), last(3)
+      do j = first(2), last(2)
+        do i = first(1), last(1)
+          n = n + 1
+          body%x(n, 1) = grid%origin(1) + (i - 0.5_wp)*grid%spacing
+          if (dim > 1) body%x(n, 2) = grid%origin(2) + (j - 0.5_wp)*grid%spacing
+          if (dim > 2) body%x(n, 3) = grid%origin(3) + (k - 0.5_wp)*grid%spacing
+        end do
+      end do
+    end do
+    body%volume = depth*grid%spacing**dim
+    body%spacing = grid%spacing
+  end subroutine box_of_cells
 
   !> The cell (3) of a grid whose centre is nearest to `x`; 1 along axes that are not used.
   pure function cell_of(grid, x) result(cell)

@@ -10,8 +10,8 @@ module pd_body_layers
   use pd_base_text, only: to_text, with_unit
   use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type
-  use pd_body_body, only: body_type, grid_type, allocate_points, append_points
-  use pd_body_lattices, only: lattice_grid, points_of_cells, cell_of
+  use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
+  use pd_body_lattices, only: lattice_grid, box_of_cells, cell_of
   implicit none (type, external)
   private
   public :: add_layers, layer_rows, layer_count_type, layer_count_text
@@ -89,8 +89,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(side_type), allocatable :: sides(:)
     type(body_type) :: part
-    integer, allocatable :: cells(:, :)
-    integer :: axis, outward, i, n
+    logical, allocatable :: chosen(:)
+    integer :: axis, outward, i, n, first(3), last(3)
 
     associate (boundary => scene%boundaries(tally%boundary))
       axis = index('xyz', boundary%side(1:1))
@@ -99,11 +99,14 @@ contains
       call choose_columns(body%dim, axis, outward, delta, sides, tally)
       call allocate_points(layer, body%dim, 0)
       do i = 1, size(sides)
-        call cells_of_layer(sides(i), axis, outward, cells)
-        n = size(cells, 2)
-        call claim_cells(scene, tally%boundary, body, sides(i), claimed, owner, cells)
-        tally%shared = tally%shared + n - size(cells, 2)
-        call points_of_cells(body%dim, sides(i)%grid, cells, depth, part)
+        if (.not. any(sides(i)%has)) cycle
+        call box_of_layer(sides(i), axis, outward, first, last)
+        call box_of_cells(body%dim, sides(i)%grid, first, last, depth, part)
+        chosen = cells_of_layer(sides(i), axis, outward, first, last)
+        n = count(chosen)
+        call claim_cells(scene, tally%boundary, body, sides(i), first, last, claimed, owner, chosen)
+        tally%shared = tally%shared + n - count(chosen)
+        if (.not. all(chosen)) call keep_points(part, chosen)
         part%grid = sides(i)%number
         part%body = int(sides(i)%body, i2)
         part%material = sides(i)%material
@@ -290,80 +293,85 @@ contains
     end function ends_below
   end subroutine hide
 
-  !> The cells (3, n) of the layer at one side, x fastest, then y, then z.
-  pure subroutine cells_of_layer(side, axis, outward, cells)
+  !> The box of cells first..last around the layer at one side, which some column has.
+  pure subroutine box_of_layer(side, axis, outward, first, last)
     type(side_type), intent(in) :: side
     integer, intent(in) :: axis, outward
-    integer, allocatable, intent(out) :: cells(:, :)
-    integer :: low(3), high(3), c(2), i, j, k, n, level, pass, at(3)
+    integer, intent(out) :: first(3), last(3)
+    integer :: low, high
+
+    first = 1
+    last(across(axis)) = shape(side%top)
+    low = minval(side%top, mask=side%has) + 1
+    high = maxval(side%top, mask=side%has) + side%rows
+    first(axis) = min(outward*low, outward*high)
+    last(axis) = max(outward*low, outward*high)
+    if (side%rows == 0) last(axis) = first(axis) - 1
+  end subroutine box_of_layer
+
+  !> Which cells of the box first..last, x fastest, belong to the layer at one side.
+  pure function cells_of_layer(side, axis, outward, first, last) result(chosen)
+    type(side_type), intent(in) :: side
+    integer, intent(in) :: axis, outward, first(3), last(3)
+    logical, allocatable :: chosen(:)
+    integer :: c(2), i, j, k, n, level, at(3)
 
     c = across(axis)
-    low = 1
-    high(c) = shape(side%top)
-    allocate (cells(3, 0))
-    if (.not. any(side%has)) return
-    low(axis) = minval(side%top, mask=side%has) + 1
-    high(axis) = maxval(side%top, mask=side%has) + side%rows
-    if (outward < 0) then
-      level = low(axis)
-      low(axis) = -high(axis)
-      high(axis) = -level
-    end if
-    do pass = 1, 2
-      n = 0
-      do k = low(3), high(3)
-        do j = low(2), high(2)
-          do i = low(1), high(1)
-            at = [i, j, k]
-            associate (top => side%top(at(c(1)), at(c(2))))
-              level = outward*at(axis)
-              if (level <= top .or. level > top + side%rows) cycle
-              if (.not. side%has(at(c(1)), at(c(2)))) cycle
-            end associate
-            n = n + 1
-            if (pass == 2) cells(:, n) = at
-          end do
+    allocate (chosen(product(max(0, last - first + 1))))
+    n = 0
+    do k = first(3), last(3)
+      do j = first(2), last(2)
+        do i = first(1), last(1)
+          n = n + 1
+          at = [i, j, k]
+          chosen(n) = side%has(at(c(1)), at(c(2)))
+          if (.not. chosen(n)) cycle
+          level = outward*at(axis) - side%top(at(c(1)), at(c(2)))
+          chosen(n) = level > 0 .and. level <= side%rows
         end do
       end do
-      if (pass == 1) then
-        deallocate (cells)
-        allocate (cells(3, n))
-      end if
     end do
-  end subroutine cells_of_layer
+  end function cells_of_layer
 
   !> Where the corner between two sides is cut or round, both layers reach for the same cells: the
-  !> earlier one has them. Two layers at one side, or of different bodies, must not meet like that;
-  !> there the cells remain, and are found to overlap.
-  subroutine claim_cells(scene, boundary, body, side, claimed, owner, cells)
+  !> earlier one has them, and they are taken from `chosen`. Two layers at one side, or of different
+  !> bodies, must not meet like that; there the cells remain, and are found to overlap.
+  subroutine claim_cells(scene, boundary, body, side, first, last, claimed, owner, chosen)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: boundary
     type(body_type), intent(in) :: body
     type(side_type), intent(in) :: side
+    integer, intent(in) :: first(3), last(3)      !! the box of cells, x fastest
     type(lookup_type), intent(inout) :: claimed
     integer(i2), allocatable, intent(inout) :: owner(:)
-    integer, allocatable, intent(inout) :: cells(:, :)
-    logical :: mine(size(cells, 2)), is_new
-    integer :: n, number, shift(3)
+    logical, intent(inout) :: chosen(:)
+    logical :: is_new
+    integer :: i, j, k, n, number, shift(3)
     integer(i8) :: key
 
     ! the numbers of cells count from the body's corner, bodies of one grid from different ones
     shift = nint((side%grid%origin - body%grids(side%number)%origin)/side%grid%spacing)
-    mine = .true.
-    do n = 1, size(cells, 2)
-      key = mix(mix(mix(int(side%number, i8), int(cells(1, n) + shift(1), i8)), &
-        & int(cells(2, n) + shift(2), i8)), int(cells(3, n) + shift(3), i8))
-      call claimed%number_of(key, number, is_new)
-      if (is_new) then
-        if (number > size(owner)) owner = [owner, spread(0_i2, 1, max(1024, number))]
-        owner(number) = int(boundary, i2)
-      else
-        associate (earlier => scene%boundaries(owner(number)), this => scene%boundaries(boundary))
-          mine(n) = earlier%body /= this%body .or. earlier%side(1:1) == this%side(1:1)
-        end associate
-      end if
+    n = 0
+    do k = first(3), last(3)
+      do j = first(2), last(2)
+        do i = first(1), last(1)
+          n = n + 1
+          if (.not. chosen(n)) cycle
+          key = mix(mix(mix(int(side%number, i8), int(i + shift(1), i8)), int(j + shift(2), i8)), &
+            & int(k + shift(3), i8))
+          call claimed%number_of(key, number, is_new)
+          if (is_new) then
+            if (number > size(owner)) owner = [owner, spread(0_i2, 1, max(1024, number))]
+            owner(number) = int(boundary, i2)
+          else
+            associate (earlier => scene%boundaries(owner(number)), &
+              & this => scene%boundaries(boundary))
+              chosen(n) = earlier%body /= this%body .or. earlier%side(1:1) == this%side(1:1)
+            end associate
+          end if
+        end do
+      end do
     end do
-    cells = reshape(pack(cells, spread(mine, 1, 3)), [3, count(mine)])
   end subroutine claim_cells
 
   !> What the user reads of a layer that does not cover its side; '' if it does.

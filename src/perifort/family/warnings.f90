@@ -182,8 +182,8 @@ contains
     do i = 1, min(most, size(joints))
       call warnings%add('joint '//to_text(i), to_text(joints(i)%bonds)//' bonds join '// &
         & name_of(scene, joints(i)%bodies(1))//' and '//name_of(scene, joints(i)%bodies(2))// &
-        & ', whose points lie within a horizon of each other: they act as one; a &crack between them parts them', &
-        & tell=.false.)
+        & ', whose points lie within a horizon of each other: they act as one; a &crack '// &
+        & 'between them parts them', tell=.false.)
     end do
     if (size(joints) > most) call warnings%add('joints', to_text(sum(joints(most + 1:)%bonds))// &
       & ' bonds join '//to_text(size(joints) - most)//' more pairs of bodies', tell=.false.)

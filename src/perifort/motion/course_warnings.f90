@@ -81,8 +81,8 @@ contains
           call warnings%add('velocity '//to_text(i)//directions(c:c), 'relaxation has no '// &
             & 'speeds: velocity_'//directions(c:c)//' of &boundary number '//to_text(i)// &
             & ' displaces its points by '//with_unit(way, 'm', 3)//' over the load steps, '// &
-            & 'whose time runs from 0 to 1 s; displacement_'//directions(c:c)//' says that directly', &
-            & tell=.false.)
+            & 'whose time runs from 0 to 1 s; displacement_'//directions(c:c)// &
+            & ' says that directly', tell=.false.)
         end associate
       end do
     end do
