@@ -24,7 +24,8 @@ module pd_motion_memory
     real(wp), allocatable :: rate(:, :)    !! displacement per iteration (n_slots, dim) [m]
     real(wp), allocatable :: trend(:, :)   !! of the last load step, of 0 rows if of no use [m]
     real(wp), allocatable :: start(:, :)   !! displacements where the load step began [m]
-    real(wp) :: reference = 0.0_wp         !! square of the force that residuals are parts of [N2]
+    integer :: next_judgement = 0          !! iteration of dynamic relaxation that is judged next
+    real(wp) :: softness = 0.0_wp          !! of the preconditioned stiffness, as far as known [-]
     real(wp) :: residual = 0.0_wp          !! relative [-]
     real(wp) :: stiffness = 0.0_wp         !! U.K.U of 7.36
     real(wp) :: displacement = 0.0_wp      !! U.U [m2]
@@ -48,7 +49,8 @@ contains
     call archive%keep('rate', memory%rate)
     call archive%keep('trend', memory%trend)
     call archive%keep('start of load step', memory%start)
-    call archive%keep('reference', memory%reference)
+    call archive%keep('next judgement', memory%next_judgement)
+    call archive%keep('softness', memory%softness)
     call archive%keep('residual', memory%residual)
     call archive%keep('U.K.U', memory%stiffness)
     call archive%keep('U.U', memory%displacement)

@@ -16,6 +16,8 @@ module pd_motion_observer
     real(wp) :: dt = 0.0_wp           !! step size [s]
     real(wp) :: kick = 0.0_wp         !! velocities at this instant are v + kick*force/rho [s]
     real(wp) :: residual = 0.0_wp     !! relaxation: relative residual force [-]
+    real(wp) :: change = 0.0_wp       !! relaxation: change of displacement over displacement [-]
+    character(:), allocatable :: note !! a warning for the user about this instant
     logical :: last = .false.         !! the final state
     logical :: settled = .true.       !! relaxation: a load step has converged
     logical :: gave_way = .false.     !! the conjugate gradient left this to dynamic relaxation

@@ -204,6 +204,10 @@ contains
       end if
     end associate
     if (instant%gave_way) call note_giving_way(observer, instant)
+    if (allocated(instant%note)) then
+      if (instant%note /= '') call observer%warn('equilibrium', 'load step '// &
+        & to_text(instant%load_step)//': '//instant%note)
+    end if
     may_stop = .not. instant%last
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
