@@ -15,7 +15,7 @@ module pd_motion_balance
   private
   public :: balance_type, begin_balance, weigh, weigh_energies, balanced_but_for_error
   public :: allowed_error, error_is_known, relative_residual, describe_left_over
-  public :: fail_unconverged, check_drowned
+  public :: fail_unconverged, check_drowned, rounding_note
 
   !> What is out of balance in one piece. Norms of forces are squared, over components: [N2].
   type :: tally_type
@@ -46,8 +46,11 @@ module pd_motion_balance
   !> Rounding of a force: so many units in the last place of a displacement times the stiffness of a
   !> point, which bounds its row (doc/theory.md, 6).
   real(wp), parameter :: last_places = 2.0_wp
-  !> What acts must be so many times what rounding leaves.
-  real(wp), parameter :: audible = 1.0e3_wp
+  !> That is a bound. What rounding does leave is nearer to this part of it, since the errors of a
+  !> point's bonds are of either sign: so far a residual can be brought beside what acts.
+  real(wp), parameter :: likely = 0.05_wp
+  !> What acts must be so many times the bound: then what is left is a thousandth.
+  real(wp), parameter :: audible = 1.0e3_wp*likely
 
 contains
 
@@ -220,10 +223,16 @@ contains
     squared = max(piece%support, piece%load, piece%thermal)
   end function scale_of
 
+  !> Whether what acts on a piece, if anything does, is too little to be told from rounding.
+  elemental logical function silent(piece)
+    type(tally_type), intent(in) :: piece
+    silent = scale_of(piece) < audible**2*piece%rounding
+  end function silent
+
   !> Whether a piece's residual is what rounding leaves.
   elemental logical function at_the_floor(piece)
     type(tally_type), intent(in) :: piece
-    at_the_floor = piece%residual <= piece%rounding
+    at_the_floor = piece%residual <= piece%rounding*merge(1.0_wp, likely**2, silent(piece))
   end function at_the_floor
 
   !> Whether residual force and net forces and moments of a piece are small enough.
@@ -271,7 +280,8 @@ contains
     type(balance_type), intent(in) :: balance   !! with energies
     real(wp), intent(in) :: softness            !! [-]
     real(wp), intent(in) :: allowed(:)          !! error energy of each piece [J]
-    error_is_known = all(balance%piece%rho <= balance%piece%rho_rounding .or. &
+    error_is_known = all(balance%piece%rho &
+      & <= balance%piece%rho_rounding*merge(1.0_wp, likely**2, silent(balance%piece)) .or. &
       & (softness > 0.0_wp .and. balance%piece%rho*softness <= allowed))
   end function error_is_known
 
@@ -285,7 +295,7 @@ contains
     type(tally_type), intent(in) :: piece
     relative = 0.0_wp
     if (piece%residual <= 0.0_wp) return
-    if (at_the_floor(piece) .and. scale_of(piece) <= audible**2*piece%rounding) return
+    if (at_the_floor(piece) .and. silent(piece)) return
     relative = sqrt(piece%residual/max(scale_of(piece), tiny(1.0_wp)))
   end function relative_to_scale
 
@@ -314,6 +324,19 @@ contains
       & describe_left_over(system, rigid, balance, worst_piece(balance), t), status_no_answer)
   end subroutine fail_unconverged
 
+  !> What to say about an accepted state whose residual is above the tolerance, '' if it is not.
+  function rounding_note(relaxation, balance) result(text)
+    type(relaxation_type), intent(in) :: relaxation
+    type(balance_type), intent(in) :: balance   !! as weighed
+    character(:), allocatable :: text
+
+    text = ''
+    if (relative_residual(balance) <= relaxation%tolerance) return
+    text = 'the residual stops at '//to_text(relative_residual(balance), 2)//', above the '// &
+      & 'tolerance of '//to_text(relaxation%tolerance)//', because forces are not formed more '// &
+      & 'exactly; the state is accepted, since its error is known to be small'
+  end function rounding_note
+
   !> An error if the loads of some piece vanish in the rounding of its forces: then nothing is known
   !> of its equilibrium.
   subroutine check_drowned(system, rigid, balance, error)
@@ -341,8 +364,7 @@ contains
 
     do piece = 1, size(balance%piece)
       associate (tally => balance%piece(piece))
-        if (at_the_floor(tally) .and. max(tally%load, tally%thermal) > 0.0_wp .and. &
-          & scale_of(tally) < audible**2*tally%rounding) return
+        if (silent(tally) .and. max(tally%load, tally%thermal) > 0.0_wp) return
       end associate
     end do
     piece = 0

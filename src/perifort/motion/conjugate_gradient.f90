@@ -10,13 +10,13 @@ module pd_motion_conjugate_gradient
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
-    & check_drowned
+    & check_drowned, rounding_note
   use pd_motion_conditions, only: impose
   use pd_motion_krylov, only: make_room, linearise, take_residual, first_direction, &
     & next_direction, take_direction, apply_stiffness, go_along, volume_inner, note_length, &
     & smallest_curvature
   use pd_motion_newton, only: newton_type, krylov_type, sums_type
-  use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_observer, only: observer_type, instant_type, add_note
   use pd_motion_residual, only: relaxation_type, squared_force
   use pd_motion_rigid, only: rigid_type, remove_free_motions
   use pd_motion_start, only: move_along
@@ -107,7 +107,10 @@ contains
       amid = .false.
       call solve(system, relaxation, rigid, balance, newton, instant, observer, ended, error)
       if (allocated(error)) return
-      if (ended == at_rest) exit
+      if (ended == at_rest) then
+        call add_note(instant, rounding_note(relaxation, balance))
+        exit
+      end if
       if (ended == used_up) then
         call fail_unconverged(system, relaxation, rigid, balance, instant%load_step, instant%time, &
           & newton%change, error)
@@ -115,10 +118,7 @@ contains
       end if
       if (has_stalled(system, relaxation, rigid, instant%time, newton, balance)) then
         instant%residual = relative_residual(balance)
-        instant%note = 'the residual of load step '//to_text(instant%load_step)//' stops at '// &
-          & to_text(instant%residual, 2)//', above the tolerance of '// &
-          & to_text(relaxation%tolerance)//': the forces are not formed more exactly. The state '// &
-          & 'is in balance to that'
+        call add_note(instant, rounding_note(relaxation, balance))
         exit
       end if
       call judge(system, instant%time, change, ended, newton, gave_way)

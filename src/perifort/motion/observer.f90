@@ -6,7 +6,7 @@ module pd_motion_observer
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
-  public :: observer_type, instant_type
+  public :: observer_type, instant_type, add_note
 
   !> One instant of a motion.
   type :: instant_type
@@ -40,5 +40,22 @@ module pd_motion_observer
       type(error_type), allocatable, intent(out) :: error
     end subroutine observe_interface
   end interface
+
+contains
+
+  !> Add to what the user is to be told at this instant.
+  pure subroutine add_note(instant, text)
+    type(instant_type), intent(inout) :: instant
+    character(*), intent(in) :: text   !! '' adds nothing
+
+    if (text == '') return
+    if (allocated(instant%note)) then
+      if (instant%note /= '') then
+        instant%note = instant%note//'; '//text
+        return
+      end if
+    end if
+    instant%note = text
+  end subroutine add_note
 
 end module pd_motion_observer

@@ -8,11 +8,11 @@ module pd_motion_relaxation
   use pd_base_text, only: to_text
   use pd_motion_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
-    & check_drowned
+    & check_drowned, rounding_note
   use pd_motion_conjugate_gradient, only: relax_by_conjugate_gradient
   use pd_motion_estimate, only: estimate_error
   use pd_motion_memory, only: memory_type, not_begun
-  use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_observer, only: observer_type, instant_type, add_note
   use pd_motion_residual, only: relaxation_type
   use pd_motion_rigid, only: rigid_type, find_free_motions, check_balance, turn_back
   use pd_motion_fault, only: faulty_slot, greatest_stretch, place
@@ -38,7 +38,8 @@ module pd_motion_relaxation
   !> Sums over the free components, one pass for all.
   type :: sums_type
     real(wp) :: stiffness = 0.0_wp      !! U.K.U
-    real(wp) :: displacement = 0.0_wp   !! U.U
+    real(wp) :: moved = 0.0_wp          !! U.U, U as it is in U.K.U: since the relaxation began
+    real(wp) :: displacement = 0.0_wp   !! square of all displacements
     real(wp) :: change = 0.0_wp         !! dU.dU
     real(wp) :: residual = 0.0_wp       !! (V F).(V F)
     real(wp) :: support = 0.0_wp        !! the same of the support forces
@@ -103,6 +104,7 @@ contains
           return
         end if
         if (allocated(system%memory%rate)) deallocate (system%memory%rate)
+        if (allocated(system%memory%base)) deallocate (system%memory%base)
         system%memory%trend = system%memory%trend(:0, :)
         ! the forces that did the work are those before the bonds break
         call account(system, instant%time, at_rest=.true.)
@@ -159,21 +161,6 @@ contains
     call evaluate(system, instant%time, breaking=.false.)
   end subroutine turn_where_free
 
-  !> Add to what the user is to be told at this instant.
-  subroutine add_note(instant, text)
-    type(instant_type), intent(inout) :: instant
-    character(*), intent(in) :: text
-
-    if (text == '') return
-    if (allocated(instant%note)) then
-      if (instant%note /= '') then
-        instant%note = instant%note//'; '//text
-        return
-      end if
-    end if
-    instant%note = text
-  end subroutine add_note
-
   !> Fill a system's memory with all that a relaxation may ever carry, whose size is then known.
   subroutine fill_memory(system, relaxation)
     type(system_type), intent(inout) :: system
@@ -181,7 +168,7 @@ contains
 
     system%memory = memory_type()
     if (.not. relaxation%conjugate_gradient) then
-      allocate (system%memory%rate, mold=system%state%u)
+      allocate (system%memory%rate, system%memory%base, mold=system%state%u)
       return
     end if
     allocate (system%memory%newton)
@@ -235,6 +222,7 @@ contains
         memory%next_judgement = 0
         call move_along(system, rigid, instant%time, no_trend)
         call evaluate(system, instant%time, breaking=.false.)
+        memory%base = system%state%u
         call weigh(system, relaxation, rigid, instant%time, balance)
         ! nothing acts, or nothing is left to do
         call weigh_energies(system, rigid, balance)
@@ -284,14 +272,15 @@ contains
           call judge(system, relaxation, rigid, instant%time, balance, accepted)
           if (accepted) then
             instant%residual = relative_residual(balance)
+            call add_note(instant, rounding_note(relaxation, balance))
             memory%iteration = 0
             call check_drowned(system, rigid, balance, error)
             return
           end if
         end if
         damping = 0.0_wp                                           ! 7.35, 7.36
-        if (memory%stiffness > 0.0_wp .and. memory%displacement > 0.0_wp) &
-          & damping = min(largest_damping, 2*sqrt(memory%stiffness/memory%displacement))
+        if (memory%stiffness > 0.0_wp .and. memory%moved > 0.0_wp) &
+          & damping = min(largest_damping, 2*sqrt(memory%stiffness/memory%moved))
         call accelerate(rate, a, damping)                          ! 7.29a
       end do
     end associate
@@ -337,6 +326,7 @@ contains
     memory%residual = 0.0_wp
     if (sums%residual > 0.0_wp) memory%residual = sqrt(sums%residual/max(reference, tiny(1.0_wp)))
     memory%stiffness = sums%stiffness
+    memory%moved = sums%moved
     memory%displacement = sums%displacement
     memory%change = sums%change
   end subroutine remember
@@ -417,8 +407,9 @@ contains
           part(block)%residual = part(block)%residual &
             & + (a(k, c)*relaxation%mass(k, c)*system%body%volume(k))**2
           part(block)%change = part(block)%change + rate(k, c)**2
-          u2 = system%state%u(k, c)**2
-          part(block)%displacement = part(block)%displacement + u2
+          part(block)%displacement = part(block)%displacement + system%state%u(k, c)**2
+          u2 = (system%state%u(k, c) - system%memory%base(k, c))**2
+          part(block)%moved = part(block)%moved + u2
           if (abs(rate(k, c)) > 0.0_wp) part(block)%stiffness = part(block)%stiffness &
             & - u2*(a(k, c) - a_before(k, c))/rate(k, c)
         end do
@@ -427,6 +418,7 @@ contains
     do block = 1, blocks
       sums%stiffness = sums%stiffness + part(block)%stiffness
       sums%displacement = sums%displacement + part(block)%displacement
+      sums%moved = sums%moved + part(block)%moved
       sums%change = sums%change + part(block)%change
       sums%residual = sums%residual + part(block)%residual
       sums%support = sums%support + part(block)%support
