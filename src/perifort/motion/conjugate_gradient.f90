@@ -290,6 +290,7 @@ contains
       call iterate(system, newton, ended)
       if (ended /= under_way) exit
       instant%step = instant%step + 1
+      instant%iteration = instant%step - system%memory%began
       instant%residual = relative(newton%linear%residual, &
         & max(balance%acting, newton%linear%support))
       instant%change = newton%change

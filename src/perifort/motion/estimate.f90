@@ -14,6 +14,9 @@ module pd_motion_estimate
 
   !> The estimate ends when what is still missing is surely less than this part of it.
   real(wp), parameter :: sure = 0.3_wp
+  !> ... or when so little is left of the residual (squared) that rounding and the differences that
+  !> make the tangent decide about it.
+  real(wp), parameter :: used_up = 1.0e-10_wp
   integer, parameter :: fewest = 10
 
 contains
@@ -36,7 +39,7 @@ contains
     type(krylov_type) :: krylov
     type(sums_type) :: sums
     real(wp), allocatable :: u(:, :), force(:, :), first(:, :), energy(:)
-    real(wp) :: curvature, gained
+    real(wp) :: curvature, gained, rho
     integer :: p, k
 
     allocate (u, source=system%state%u)
@@ -48,6 +51,7 @@ contains
     where (.not. krylov%inverse > 0.0_wp) krylov%residual = 0.0_wp
     allocate (first, source=krylov%residual)
     call first_direction(system, krylov)
+    rho = sums%rho
     gained = 0.0_wp
     within = .true.
     do iterations = 0, most
@@ -62,6 +66,7 @@ contains
       within = gained <= sum(allowed)
       if (.not. within) exit
       call go_along(system, krylov%rho/curvature, krylov, sums)
+      if (sums%rho <= used_up*rho) exit
       if (iterations >= fewest .and. sums%rho*krylov%ritz%softness <= sure*gained) exit
       call next_direction(system, sums%rho, krylov)
     end do

@@ -19,6 +19,7 @@ module pd_motion_memory
     real(wp), allocatable :: a(:, :, :)    !! accelerations then (n_slots, dim, 2) [m/s2]
     ! relaxation
     integer :: load_step = 0               !! the load step under way, or the last one settled
+    integer :: began = 0                   !! step at which the load step began
     integer :: iteration = 0               !! of the dynamic relaxation under way; 0: none is
     type(newton_type), allocatable :: newton  !! there while conjugate gradients are under way
     real(wp), allocatable :: rate(:, :)    !! displacement per iteration (n_slots, dim) [m]
@@ -47,6 +48,7 @@ contains
     call archive%keep('earlier velocities', memory%v)
     call archive%keep('earlier accelerations', memory%a)
     call archive%keep('load step', memory%load_step)
+    call archive%keep('begin of load step', memory%began)
     call archive%keep('iteration', memory%iteration)
     call archive%keep('rate', memory%rate)
     call archive%keep('base', memory%base)

@@ -12,6 +12,8 @@ module pd_motion_observer
   type :: instant_type
     integer :: step = 0               !! complete steps (iterations in relaxation)
     integer :: load_step = 0          !! relaxation
+    integer :: iteration = 0          !! relaxation: iterations in this load step
+    logical :: dynamic = .false.      !! relaxation: they are those of dynamic relaxation
     real(wp) :: time = 0.0_wp         !! [s]; relaxation: 0 to 1 over the load steps
     real(wp) :: dt = 0.0_wp           !! step size [s]
     real(wp) :: kick = 0.0_wp         !! velocities at this instant are v + kick*force/rho [s]

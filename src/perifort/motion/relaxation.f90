@@ -86,6 +86,7 @@ contains
     do i = first, relaxation%load_steps
       if (relaxation%conjugate_gradient .and. relaxation%load_steps > 1 .and. .not. amid) &
         & system%memory%start = system%state%u
+      if (.not. amid) system%memory%began = instant%step
       amid = .false.
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
@@ -96,9 +97,11 @@ contains
             & instant, observer, dynamic, error)
           instant%gave_way = dynamic
         end if
+        instant%dynamic = dynamic
         if (dynamic .and. .not. allocated(error)) &
           & call relax(system, relaxation, rigid, instant, observer, error)
         instant%gave_way = .false.
+        instant%dynamic = .false.
         if (allocated(error)) then
           if (error%status == status_no_answer) call show_good(good, system, observer, error)
           return
@@ -134,7 +137,7 @@ contains
 
   !> Take back what pieces that are free have moved as a whole, unless that takes them out of
   !> balance: loads that keep their direction hold a piece as it is turned, and the projected
-  !> dilatation isn't the same in a frame that is turned. Then the state stays as it was found.
+  !> dilatation isn't the same in a frame that is turned. Then only translations are taken back.
   !> Forces and residual are those of the state that is left.
   subroutine turn_where_free(system, relaxation, rigid, instant)
     type(system_type), intent(inout) :: system
@@ -150,12 +153,13 @@ contains
       call weigh(system, relaxation, rigid, instant%time, balance)
       before = relative_residual(balance)
       allocate (found, source=system%state%u)
-      call turn_back(system, rigid, system%state%u)
+      call turn_back(system, rigid, .true., system%state%u)
       call evaluate(system, instant%time, breaking=.false.)
       call weigh(system, relaxation, rigid, instant%time, balance)
       instant%residual = relative_residual(balance)
       if (instant%residual <= before .or. balanced_but_for_error(relaxation, rigid, balance)) return
       system%state%u = found
+      call turn_back(system, rigid, .false., system%state%u)
       instant%residual = before
     end if
     call evaluate(system, instant%time, breaking=.false.)
@@ -241,6 +245,7 @@ contains
           call add_up(system, relaxation, rate, a, a_before, sums)
           call remember(system%memory, iteration, max(balance%acting, sums%support), sums)
           instant%step = instant%step + 1
+          instant%iteration = instant%step - memory%began
           memory%step = instant%step
           fault = faulty_slot(system, rate, 1.0_wp)
           if (fault > 0) then

@@ -249,11 +249,12 @@ contains
   !> Take the mean motion out of displacements `u` (n_slots, dim) [m] where nothing holds it,
   !> without straining anything: a piece without any constraint is moved and turned back as a rigid
   !> body until its mean displacement and mean rotation vanish (the best fit to where its points
-  !> were in the least squares of volume). Of a piece that is held in part, a free translation is
-  !> taken back, and a free rotation left as it is.
-  subroutine turn_back(system, rigid, u)
+  !> were in the least squares of volume). Of a piece that is held in part, and of all pieces without
+  !> `turning`, a free translation is taken back, and a free rotation left as it is.
+  subroutine turn_back(system, rigid, turning, u)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
+    logical, intent(in) :: turning
     real(wp), intent(inout) :: u(:, :)
     real(wp) :: mode(6), amount(6), largest
     integer :: p, turn, i, c
@@ -262,7 +263,8 @@ contains
       associate (piece => rigid%piece(p), pieces => rigid%pieces)
         if (piece%number == 0) cycle
         associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
-          if (piece%held) then
+          if (piece%held .or. .not. turning) then
+            ! about the centre of volume, translations and rotations don't mix in the modes
             amount = amounts(system, piece, slots, u)
             do i = 1, piece%number
               if (any(abs(piece%combination(4:, i)) > 1.0e-9_wp*norm2(piece%combination(:3, i)))) &

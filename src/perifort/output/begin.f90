@@ -90,6 +90,7 @@ contains
     if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
     if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
     schedule%history_every = history_interval(scene, plan)
+    schedule%tolerance = plan%relaxation%tolerance
   end function schedule_of
 
   !> An error if a run would write more outputs, or rows of its history, than anybody can look at:
@@ -121,13 +122,13 @@ contains
       & ' are allowed: history_every = '//to_text(schedule%steps/most_rows + 1))
   end subroutine check_schedule
 
-  !> Steps (iterations in relaxation) between rows of the history.
+  !> Steps between rows of the history; in relaxation, whose history has a row for each load step,
+  !> iterations between lines of `iterations.csv`.
   pure integer function history_interval(scene, plan) result(every)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
     every = scene%output%history_every
-    if (every == 0) every = max(1, merge(plan%relaxation%maximum_iterations, plan%steps, &
-      & plan%relaxes)/2000)
+    if (every == 0) every = merge(1, max(1, plan%steps/2000), plan%relaxes)
   end function history_interval
 
   !> The folder of the results: the one asked for, or out/ and the scene file's name.
