@@ -19,10 +19,14 @@ class Lattice:
     """Points of a cubic lattice with their bonds and the linear operator of their forces.
 
     points (n, dim) [m]; spacing [m]; horizon [m]; section: thickness [m] in 2D, area [m2] in 1D;
-    youngs_modulus [Pa]; poissons_ratio [-], in 2D for plane stress, without meaning in 1D.
+    youngs_modulus [Pa]; poissons_ratio [-], in 2D for plane stress, without meaning in 1D; both
+    may be arrays over the points (n): each end of a bond has its own material. `cut` (from, to):
+    bonds of points on different sides of these segments of the plane (m, 2) are broken from the
+    start; the factors of surfaces are those of the body before that.
     """
 
-    def __init__(self, points, spacing, horizon, youngs_modulus, poissons_ratio=0.0, section=1.0):
+    def __init__(self, points, spacing, horizon, youngs_modulus, poissons_ratio=0.0, section=1.0,
+                 cut=()):
         n, dim = points.shape
         self.n, self.dim = n, dim
         self.volume = spacing**dim * section
@@ -44,15 +48,15 @@ class Lattice:
         over_family = lambda power: sphere * dim * horizon**(dim + power) / (dim + power)
         if dim == 1:
             self.d_delta = 1 / over_family(0)
-            self.b_delta = youngs_modulus / 2 / over_family(1)
+            b_delta = youngs_modulus / 2 / over_family(1)
             self.a = 0.0
             uniaxial = youngs_modulus / 2
         else:
             self.d_delta = dim / over_family(0)
             # <(2 n1 n2)^2> = 4/(dim (dim + 2)) against an energy of mu gamma^2/2 at gamma = 2
-            self.b_delta = 2 * shear / (over_family(1) * 4 / (dim * (dim + 2)))
+            b_delta = 2 * shear / (over_family(1) * 4 / (dim * (dim + 2)))
             # Isotropic: s = 1, theta = dim; energy kappa dim^2/2
-            self.a = (bulk * dim**2 / 2 - self.b_delta * over_family(1)) / dim**2
+            self.a = (bulk * dim**2 / 2 - b_delta * over_family(1)) / dim**2
             uniaxial = (bulk + 2 * shear * (1 - 1 / dim)) / 2
         pairs = cKDTree(points).query_pairs(horizon * (1 + 1e-9), output_type="ndarray")
         bond = points[pairs[:, 1]] - points[pairs[:, 0]]
@@ -69,11 +73,20 @@ class Lattice:
         for c in range(dim):
             stretch = normal[:, c]**2
             theta = self.d_delta * both(stretch * weight)
-            stored = self.b_delta * both(stretch**2 * length * weight)
+            stored = b_delta * both(stretch**2 * length * weight)
             dilatation[:, c] = np.divide(1.0, theta, where=theta > 0, out=dilatation[:, c])
             energy[:, c] = np.divide(uniaxial - self.a, stored, where=stored > 0, out=energy[:, c])
         factor = lambda g: 1 / np.sqrt(((normal / (0.5 * (g[i] + g[j])))**2).sum(axis=1))
         self.dilatation_factor, self.energy_factor = factor(dilatation), factor(energy)
+        intact = np.ones(len(length), bool)
+        for start, end in cut:
+            intact &= ~crosses(points[i], points[j], np.asarray(start), np.asarray(end))
+        # both ends supply half of a bond's law, each with its own material
+        b_delta = np.broadcast_to(b_delta, n)
+        b_delta = (b_delta[i] + b_delta[j])[intact] / 2
+        i, j, length, normal, weight = (v[intact] for v in (i, j, length, normal, weight))
+        self.dilatation_factor = self.dilatation_factor[intact]
+        self.energy_factor = self.energy_factor[intact]
 
         # stretch of every bond = B u, dilatation of every point = T s, and by virtual work
         # V K = B' C B with C from the energy V sum(a theta^2 + b delta sum_bonds G s^2 |xi| w)
@@ -85,7 +98,7 @@ class Lattice:
                                       (np.concatenate([rows, rows]),
                                        np.concatenate([column(j), column(i)]))), shape=(m, n * dim))
         self.transposed = self.stretch.T.tocsr()
-        self.bond_law = 4 * self.b_delta * self.energy_factor * length * weight
+        self.bond_law = 4 * b_delta * self.energy_factor * length * weight
         theta_of = self.d_delta * self.dilatation_factor * weight
         self.theta = sp.csr_matrix((np.concatenate([theta_of, theta_of]),
                                     (np.concatenate([i, j]), np.tile(np.arange(m), 2))),
@@ -96,15 +109,16 @@ class Lattice:
         """K u: minus the force density of small displacements u (n dim, point by point) [N/m3]."""
         s = self.stretch @ u
         stress = self.bond_law * s
-        if self.a != 0.0:
-            stress = stress + 2 * self.a * (self.theta_transposed @ (self.theta @ s))
+        if np.any(self.a != 0.0):
+            stress = stress + self.theta_transposed @ (2 * self.a * (self.theta @ s))
         return self.transposed @ stress
 
     def matrix(self):
         """K as a sparse matrix; for few or short-ranged bonds."""
         law = sp.diags(self.bond_law)
-        if self.a != 0.0:
-            law = law + 2 * self.a * (self.theta_transposed @ self.theta)
+        if np.any(self.a != 0.0):
+            a = sp.diags(np.broadcast_to(2.0 * self.a, self.n))
+            law = law + self.theta_transposed @ a @ self.theta
         return (self.transposed @ law @ self.stretch).tocsc()
 
     def statics(self, load, held=None, imposed=None):
@@ -118,7 +132,10 @@ class Lattice:
         b = load.ravel() - self.apply(u)
         free = np.ones(b.size, bool) if held is None else ~held.ravel()
         if self.dim < 3 and held is not None:
-            u[free] = splu(self.matrix()[free][:, free]).solve(b[free])
+            factors = splu(self.matrix()[free][:, free])
+            # refined, for bodies whose parts differ much in stiffness
+            for _ in range(4):
+                u[free] += factors.solve((load.ravel() - self.apply(u))[free])
             return u.reshape(self.n, self.dim)
         def product(v):
             full = np.zeros(b.size)
@@ -135,6 +152,13 @@ class Lattice:
             raise RuntimeError("the conjugate gradients did not converge")
         u[free] = part
         return u.reshape(self.n, self.dim)
+
+
+def crosses(a, b, start, end):
+    """Whether the lines a b (m, 2) cross the segment from start to end."""
+    side = lambda p, q, r: ((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
+    return ((side(start, end, a) * side(start, end, b) < 0)
+            & (side(a, b, start) * side(a, b, end) < 0))
 
 
 def without_rigid_motion(points, u):

@@ -223,7 +223,7 @@ contains
   end subroutine examine
 
   !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
-  !> largest, without rows, whose number isn't known before.
+  !> largest.
   integer(i8) function bytes_of_checkpoint(scene, set_up) result(bytes)
     type(scene_type), intent(in) :: scene
     type(set_up_type), intent(inout) :: set_up

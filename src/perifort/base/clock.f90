@@ -326,6 +326,10 @@ contains
     write (percent, '(f5.1)') floor(1000.0_wp*real(step, wp)/real(max(total, 1_i8), wp))/10.0_wp
     text = trim(percent)//' %  step '//to_text(step)//'/'//to_text(total)//'  '// &
       & clock//'  broken bonds '//to_text(bonds_broken)
+    if (present(load) .and. step <= begun .and. elapsed > 0.0_wp) then
+      ! a load step may be all there is
+      if (load) text = text//'  for '//duration_text(elapsed)
+    end if
     if (step <= begun .or. elapsed <= 0.0_wp) return
     rate = real(step - begun, wp)/elapsed
     text = text//'  '//to_text(rate, 3)//' steps/s'

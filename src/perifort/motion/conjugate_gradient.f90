@@ -1,20 +1,25 @@
-!> Rest by Newton's method with a conjugate gradient inside (doc/theory.md, 7). The residual is the
-!> force as the model has it; the linear equations take a symmetric stiffness: at first that of the
-!> undeformed body with the bonds it has now, which the fast formulas give, and where that doesn't
-!> serve, the tangent at the present displacements. What doesn't come to rest so is left to dynamic
-!> relaxation.
+!> Static equilibrium by Newton's method with a conjugate gradient inside (doc/theory.md, 7). The
+!> residual is the force as the model has it; the linear equations take a symmetric stiffness: at
+!> first that of the undeformed body with the bonds it has now, which the fast formulas give, and
+!> where that doesn't serve, the tangent at the present displacements. Where no equilibrium is found
+!> so, dynamic relaxation goes on.
 module pd_motion_conjugate_gradient
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_force_forces, only: dilatation_pass, force_pass
+  use pd_motion_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
+    & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
+    & check_drowned, rounding_note
   use pd_motion_conditions, only: impose
   use pd_motion_krylov, only: make_room, linearise, take_residual, first_direction, &
-    & next_direction, take_direction, apply_stiffness, go_along, volume_inner, smallest_curvature
+    & next_direction, take_direction, apply_stiffness, go_along, volume_inner, note_length, &
+    & smallest_curvature
   use pd_motion_newton, only: newton_type, krylov_type, sums_type
-  use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_residual, only: relaxation_type, squared_force, fail_unconverged
+  use pd_motion_observer, only: observer_type, instant_type, add_note
+  use pd_motion_residual, only: relaxation_type, squared_force
   use pd_motion_rigid, only: rigid_type, remove_free_motions
+  use pd_motion_start, only: move_along
   use pd_motion_system, only: system_type, add_loads
   implicit none (type, external)
   private
@@ -25,6 +30,14 @@ module pd_motion_conjugate_gradient
   !> The forces are evaluated anew whenever the residual of the linear equations has fallen by this
   !> factor; a solve ends when what is not linear makes more than `told_apart` of what is left.
   real(wp), parameter :: between_looks = 0.1_wp, told_apart = 0.3_wp
+  !> ... and by this one after the tolerance has been reached, while something is still not known to
+  !> be in equilibrium.
+  real(wp), parameter :: between_last_looks = 0.3_wp
+  !> Solves that gain nothing any more end at a residual below this and in balance, if the tolerance
+  !> asks for more than the rounding of the forces lets them have.
+  real(wp), parameter :: stalled = 1.0e-5_wp
+  !> So many iterations tell how soft the stiffness is.
+  integer, parameter :: enough_iterations = 10
   !> A solve that leaves more than this of the residual makes the undeformed stiffness give way to
   !> the tangent.
   real(wp), parameter :: good_solve = 0.3_wp
@@ -66,11 +79,14 @@ contains
     logical, intent(out) :: gave_way
     type(error_type), allocatable, intent(out) :: error
     type(newton_type), allocatable :: newton
+    type(balance_type) :: balance
+    real(wp), allocatable :: change(:, :)
     integer :: ended
     logical :: amid
 
     gave_way = .false.
     instant%settled = .false.
+    call begin_balance(system, rigid, instant%time, balance)
     amid = allocated(system%memory%newton)
     if (amid) then
       call move_alloc(system%memory%newton, newton)
@@ -78,41 +94,71 @@ contains
     else
       allocate (newton)
       call make_room(system, relaxation%mass, newton%krylov)
-      call refer_to_loads(system, instant%time, newton, error)
+      call check_loads(balance, error)
       if (allocated(error)) return
-      call begin(system, instant%time, trend, .false., newton)
+      change = trend
+      call move_along(system, rigid, instant%time, change)
+      call begin(system, instant%time, change, .false., newton)
       newton%least = newton%sums%residual
     end if
+    if (.not. allocated(change)) change = trend(:0, :)
     do
       if (.not. amid) call begin_solve(system, rigid, newton)
       amid = .false.
-      call solve(system, relaxation, newton, instant, observer, ended, error)
+      call solve(system, relaxation, rigid, balance, newton, instant, observer, ended, error)
       if (allocated(error)) return
-      if (ended == at_rest) return
+      if (ended == at_rest) then
+        call add_note(instant, rounding_note(relaxation, balance))
+        exit
+      end if
       if (ended == used_up) then
-        call fail_unconverged(relaxation, instant%load_step, instant%residual, newton%change, error)
+        call fail_unconverged(system, relaxation, rigid, balance, instant%load_step, instant%time, &
+          & newton%change, error)
         return
       end if
-      call judge(system, instant%time, trend, ended, newton, gave_way)
+      if (has_stalled(system, relaxation, rigid, instant%time, newton, balance)) then
+        instant%residual = relative_residual(balance)
+        call add_note(instant, rounding_note(relaxation, balance))
+        exit
+      end if
+      call judge(system, instant%time, change, ended, newton, gave_way)
       if (gave_way) return
     end do
+    if (newton%iterations >= enough_iterations .and. newton%softness > 0.0_wp) &
+      & system%memory%softness = newton%softness
+    call check_drowned(system, rigid, balance, error)
   end subroutine relax_by_conjugate_gradient
 
-  !> What residuals are parts of, as far as the loads at `t` say.
-  subroutine refer_to_loads(system, t, newton, error)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t
-    type(newton_type), intent(inout) :: newton
+  !> An error if loads or thermal forces are beyond what can be squared.
+  subroutine check_loads(balance, error)
+    type(balance_type), intent(in) :: balance
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: loads(:, :)
 
-    allocate (loads, source=0.0_wp*system%state%u)
-    call add_loads(system, t, 1.0_wp, .false., loads)
-    newton%reference = squared_force(system, loads)
-    if (.not. newton%reference < largest_reference) call fail(error, 'no rest: the loads of up '// &
-      & 'to '//to_text(maxval(abs(loads)))//' N/m3 are so large that energies overflow', &
-      & status_no_answer)
-  end subroutine refer_to_loads
+    if (.not. balance%acting < largest_reference) call fail(error, 'no static equilibrium: the '// &
+      & 'loads or thermal forces of '//to_text(sqrt(balance%acting), 3)//' N (root sum of squares '// &
+      & 'over the points) are so large that energies overflow', status_no_answer)
+  end subroutine check_loads
+
+  !> Whether solves gain nothing any more, in a state that is in balance to what can be reached.
+  logical function has_stalled(system, relaxation, rigid, t, newton, balance)
+    type(system_type), intent(inout) :: system
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    real(wp), intent(in) :: t
+    type(newton_type), intent(in) :: newton
+    type(balance_type), intent(inout) :: balance
+    type(relaxation_type) :: loosened
+
+    has_stalled = .false.
+    if (newton%sums%residual < useful_solve**2*newton%least .or. newton%softness <= 0.0_wp) return
+    if (newton%ahead < most_ahead .and. .not. newton%strict) return
+    loosened%tolerance = max(stalled, relaxation%tolerance)
+    loosened%mass = relaxation%mass
+    call weigh(system, loosened, rigid, t, balance)
+    if (.not. balanced_but_for_error(loosened, rigid, balance)) return
+    call weigh_energies(system, rigid, balance)
+    has_stalled = error_is_known(balance, newton%softness, allowed_error(loosened, balance))
+  end function has_stalled
 
   !> The start of a relaxation: what is imposed now comes in as the linear equations have it, so
   !> that no row of bonds is torn, and the trend of the last load step as far as it helps.
@@ -128,8 +174,6 @@ contains
     associate (krylov => newton%krylov, sums => newton%sums)
       call linearise(system, deformed, krylov)
       call look(system, t, krylov, sums)
-      newton%reference = max(newton%reference, sums%support)
-      if (newton%reference <= 0.0_wp) newton%reference = sums%residual
       allocate (imposed, source=system%state%u)
       allocate (rate, source=system%state%v)
       call impose(system%motions, t, imposed, rate)
@@ -139,7 +183,6 @@ contains
         call go_along(system, 1/krylov%scale, krylov, sums)
         ! to the last digit
         where (system%held == 1_i1) system%state%u = imposed
-        newton%reference = max(newton%reference, sums%support)
       end if
       if (size(trend) == 0) return
       call take_direction(system, merge(trend, 0.0_wp, krylov%inverse > 0.0_wp), krylov)
@@ -165,6 +208,8 @@ contains
     gave_way = .false.
     deformed = .true.
     associate (krylov => newton%krylov, residual => newton%sums%residual)
+      if (newton%krylov%ritz%softness > 0.0_wp .and. ended /= no_stiffness) &
+        & newton%softness = max(newton%softness, krylov%ritz%softness)
       ! what isn't finite fails these comparisons, too
       if (residual < useful_solve**2*newton%least) then
         deformed = krylov%deformed .or. ended == no_stiffness .or. &
@@ -197,7 +242,6 @@ contains
       end if
       call linearise(system, deformed, krylov)
       newton%least = residual
-      newton%reference = max(newton%reference, newton%sums%support)
       newton%fresh = .false.
     end associate
     if (allocated(newton%best)) deallocate (newton%best)
@@ -211,6 +255,7 @@ contains
 
     newton%before = newton%sums%residual
     newton%linear = newton%sums
+    newton%asked = .false.
     call free_of_rigid_motion(system, rigid, newton%krylov)
     call first_direction(system, newton%krylov)
     newton%hopeless = diverged**2*newton%linear%residual
@@ -220,19 +265,24 @@ contains
   !> Conjugate gradient on the linear equations, which moves the system along and looks at the true
   !> forces now and then. At its end the forces, the residual and the sums are true. All that one
   !> iteration leaves to the next is in `newton`, so that it can end and go on between any two.
-  subroutine solve(system, relaxation, newton, instant, observer, ended, error)
+  subroutine solve(system, relaxation, rigid, balance, newton, instant, observer, ended, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(inout) :: balance
     type(newton_type), allocatable, intent(inout) :: newton
     type(instant_type), intent(inout) :: instant
     class(observer_type), intent(inout) :: observer
     integer, intent(out) :: ended
     type(error_type), allocatable, intent(out) :: error
+    real(wp) :: limit
 
     do
-      if (newton%linear%residual <= max(newton%next_look, relaxation%tolerance**2 &
-        & *max(newton%reference, newton%linear%support))) then
-        call compare(system, relaxation, instant, newton, ended)
+      limit = relaxation%tolerance**2*max(balance%acting, newton%linear%support)
+      if (newton%linear%residual <= newton%next_look .or. &
+        & (newton%linear%residual <= limit .and. .not. newton%asked)) then
+        newton%asked = newton%linear%residual <= limit
+        call compare(system, relaxation, rigid, balance, instant, newton, ended)
         if (ended /= under_way) return
       end if
       ended = used_up
@@ -240,41 +290,65 @@ contains
       call iterate(system, newton, ended)
       if (ended /= under_way) exit
       instant%step = instant%step + 1
+      instant%iteration = instant%step - system%memory%began
       instant%residual = relative(newton%linear%residual, &
-        & max(newton%reference, newton%linear%support))
+        & max(balance%acting, newton%linear%support))
+      instant%change = newton%change
       call show(system, newton, instant, observer, error)
       if (allocated(error)) return
     end do
     call look(system, instant%time, newton%krylov, newton%sums)
-    instant%residual = relative(newton%sums%residual, max(newton%reference, newton%sums%support))
+    instant%residual = relative(newton%sums%residual, max(balance%acting, newton%sums%support))
+    if (ended == used_up) call weigh(system, relaxation, rigid, instant%time, balance)
   end subroutine solve
 
-  !> Compare what the linear equations leave with the true forces.
-  subroutine compare(system, relaxation, instant, newton, ended)
+  !> Compare what the linear equations leave with the true forces, and these with what acts.
+  subroutine compare(system, relaxation, rigid, balance, instant, newton, ended)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(inout) :: balance
     type(instant_type), intent(inout) :: instant
     type(newton_type), intent(inout) :: newton
     integer, intent(out) :: ended
     real(wp), allocatable :: predicted(:, :)
-    real(wp) :: limit, reference
 
-    limit = relaxation%tolerance**2
     associate (krylov => newton%krylov, sums => newton%sums, linear => newton%linear)
       predicted = krylov%residual
       call look(system, instant%time, krylov, sums)
-      reference = max(newton%reference, sums%support)
-      instant%residual = relative(sums%residual, reference)
+      call weigh(system, relaxation, rigid, instant%time, balance)
+      instant%residual = relative_residual(balance)
       ended = at_rest
-      if (sums%residual <= limit*reference .and. linear%change <= limit*linear%displacement) return
+      if (linear%change <= relaxation%tolerance**2*linear%displacement) then
+        if (in_equilibrium(system, relaxation, rigid, newton, balance)) return
+      end if
       ended = go_on
       if (squared_force(system, predicted - krylov%residual) > told_apart**2*linear%residual) return
       ended = under_way
       ! the directions are conjugate with the linear residual
       krylov%residual = predicted
-      newton%next_look = between_looks**2*linear%residual
+      newton%next_look = merge(between_last_looks, between_looks, newton%asked)**2*linear%residual
     end associate
   end subroutine compare
+
+  !> Whether the state that was weighed is in equilibrium, and its displacements are known to be
+  !> near enough to it.
+  logical function in_equilibrium(system, relaxation, rigid, newton, balance)
+    type(system_type), intent(inout) :: system
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(newton_type), intent(inout) :: newton
+    type(balance_type), intent(inout) :: balance
+    real(wp) :: softness
+
+    in_equilibrium = balanced_but_for_error(relaxation, rigid, balance)
+    if (.not. in_equilibrium) return
+    newton%softness = max(newton%softness, newton%krylov%ritz%softness)
+    softness = newton%softness
+    if (newton%iterations < enough_iterations) softness = max(softness, system%memory%softness)
+    call weigh_energies(system, rigid, balance)
+    in_equilibrium = error_is_known(balance, softness, allowed_error(relaxation, balance))
+  end function in_equilibrium
 
   !> One iteration on the linear equations, up to the direction of the next one.
   subroutine iterate(system, newton, ended)
@@ -288,6 +362,7 @@ contains
       call apply_stiffness(system, krylov)
       curvature = volume_inner(system, krylov%direction, krylov%product)
       if (.not. curvature > smallest_curvature*krylov%norm) return
+      call note_length(curvature, krylov)
       call go_along(system, krylov%rho/curvature, krylov, linear)
       ! loose points: the equations have no solution
       if (.not. linear%residual <= newton%hopeless) return
@@ -303,7 +378,7 @@ contains
   subroutine show(system, newton, instant, observer, error)
     type(system_type), intent(inout) :: system
     type(newton_type), allocatable, intent(inout) :: newton
-    type(instant_type), intent(in) :: instant
+    type(instant_type), intent(inout) :: instant
     class(observer_type), intent(inout) :: observer
     type(error_type), allocatable, intent(out) :: error
 
@@ -311,6 +386,7 @@ contains
     system%memory%step = instant%step
     system%memory%load_step = instant%load_step
     call observer%observe(system, instant, error)
+    if (allocated(instant%note)) deallocate (instant%note)
     if (.not. allocated(error)) call move_alloc(system%memory%newton, newton)
   end subroutine show
 
@@ -374,7 +450,7 @@ contains
     type(rigid_type), intent(in) :: rigid
     type(krylov_type), intent(inout) :: krylov
 
-    if (rigid%number == 0 .or. krylov%deformed) return
+    if (all(rigid%piece%number == 0) .or. krylov%deformed) return
     call remove_free_motions(system, rigid, krylov%residual)
     where (.not. krylov%inverse > 0.0_wp) krylov%residual = 0.0_wp
   end subroutine free_of_rigid_motion
@@ -383,7 +459,7 @@ contains
   pure real(wp) function relative(squared, reference)
     real(wp), intent(in) :: squared, reference
     relative = 0.0_wp
-    if (squared > 0.0_wp) relative = sqrt(squared/reference)
+    if (squared > 0.0_wp) relative = sqrt(squared/max(reference, tiny(1.0_wp)))
   end function relative
 
 end module pd_motion_conjugate_gradient

@@ -4,14 +4,14 @@
 module pd_motion_krylov
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: block_length
-  use pd_motion_newton, only: krylov_type, sums_type
+  use pd_motion_newton, only: krylov_type, ritz_type, sums_type
   use pd_motion_system, only: system_type, add_loads
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
   public :: make_room, linearise, take_residual, first_direction
   public :: next_direction, take_direction, apply_stiffness, go_along, volume_inner
-  public :: smallest_curvature
+  public :: smallest_curvature, note_length
 
   !> Directions are kept this small over the horizon: there the forces are linear to the last digit,
   !> so that one evaluation at a direction itself is the product with the undeformed stiffness.
@@ -71,6 +71,7 @@ contains
     krylov%rho = volume_inner(system, krylov%residual, krylov%direction)
     krylov%norm = krylov%rho
     krylov%largest = largest
+    krylov%ritz = ritz_type()
     if (largest > 0.0_wp) call rescale(krylov, direction_size*system%family%rule%delta/largest)
   end subroutine first_direction
 
@@ -84,6 +85,7 @@ contains
 
     scaled = krylov%scale*rho
     beta = scaled/krylov%rho
+    krylov%ritz%beta = beta
     krylov%rho = scaled
     ! the preconditioned residual is conjugate with the old direction
     krylov%norm = krylov%scale*krylov%rho + beta**2*krylov%norm
@@ -101,6 +103,41 @@ contains
     if (largest > largest_size*system%family%rule%delta) &
       & call rescale(krylov, direction_size*system%family%rule%delta/largest)
   end subroutine next_direction
+
+  !> Note that the iteration under way goes so far along its direction that the `curvature` (direction
+  !> . stiffness . direction) asks for. The lengths make the Cholesky factor of the tridiagonal matrix
+  !> that the iterations have projected the preconditioned stiffness to; the norm of its inverse is
+  !> estimated by a column at a time (Duff and Voemel, BIT 42 (2002); Meurant and Tichy, Numer.
+  !> Algorithms 82 (2019)). It never exceeds the true one, and soon comes near it.
+  pure subroutine note_length(curvature, krylov)
+    real(wp), intent(in) :: curvature            !! [N m]
+    type(krylov_type), intent(inout) :: krylov   !! the solve; its estimate is brought up to date
+    real(wp) :: length, ratio, inner, column, half, root, norm, share, rest
+
+    associate (ritz => krylov%ritz)
+      length = krylov%rho*krylov%scale/curvature
+      if (.not. ritz%length > 0.0_wp) then
+        ritz%softness = length
+        ritz%inner = length
+        ritz%last = length
+      else
+        ratio = sqrt(ritz%beta*length/ritz%length)
+        column = ratio**2*ritz%last + length
+        inner = -ratio*ritz%inner
+        half = (ritz%softness - column)/2
+        root = sqrt(half**2 + inner**2)
+        ! the larger eigenvalue of [softness, inner; inner, column] and its vector (share, rest)
+        share = merge(half + root, inner, half >= 0.0_wp)
+        rest = merge(inner, root - half, half >= 0.0_wp)
+        norm = sqrt(share**2 + rest**2)
+        ritz%softness = (ritz%softness + column)/2 + root
+        ritz%inner = column
+        if (norm > 0.0_wp) ritz%inner = (share*inner + rest*column)/norm
+        ritz%last = column
+      end if
+      ritz%length = length
+    end associate
+  end subroutine note_length
 
   !> Take a displacement for the direction; `scale` is 0 if it is none.
   subroutine take_direction(system, displacement, krylov)

@@ -19,15 +19,19 @@ module pd_motion_memory
     real(wp), allocatable :: a(:, :, :)    !! accelerations then (n_slots, dim, 2) [m/s2]
     ! relaxation
     integer :: load_step = 0               !! the load step under way, or the last one settled
+    integer :: began = 0                   !! step at which the load step began
     integer :: iteration = 0               !! of the dynamic relaxation under way; 0: none is
     type(newton_type), allocatable :: newton  !! there while conjugate gradients are under way
     real(wp), allocatable :: rate(:, :)    !! displacement per iteration (n_slots, dim) [m]
+    real(wp), allocatable :: base(:, :)    !! displacements where dynamic relaxation began [m]
     real(wp), allocatable :: trend(:, :)   !! of the last load step, of 0 rows if of no use [m]
     real(wp), allocatable :: start(:, :)   !! displacements where the load step began [m]
-    real(wp) :: reference = 0.0_wp         !! square of the force that residuals are parts of [N2]
+    integer :: next_judgement = 0          !! iteration of dynamic relaxation that is judged next
+    real(wp) :: softness = 0.0_wp          !! of the preconditioned stiffness, as far as known [-]
     real(wp) :: residual = 0.0_wp          !! relative [-]
     real(wp) :: stiffness = 0.0_wp         !! U.K.U of 7.36
-    real(wp) :: displacement = 0.0_wp      !! U.U [m2]
+    real(wp) :: moved = 0.0_wp             !! U.U, both from `base` [m2]
+    real(wp) :: displacement = 0.0_wp      !! square of all displacements [m2]
     real(wp) :: change = 0.0_wp            !! dU.dU [m2]
   end type memory_type
 
@@ -44,14 +48,18 @@ contains
     call archive%keep('earlier velocities', memory%v)
     call archive%keep('earlier accelerations', memory%a)
     call archive%keep('load step', memory%load_step)
+    call archive%keep('begin of load step', memory%began)
     call archive%keep('iteration', memory%iteration)
     call archive%keep('rate', memory%rate)
+    call archive%keep('base', memory%base)
     call archive%keep('trend', memory%trend)
     call archive%keep('start of load step', memory%start)
-    call archive%keep('reference', memory%reference)
+    call archive%keep('next judgement', memory%next_judgement)
+    call archive%keep('softness', memory%softness)
     call archive%keep('residual', memory%residual)
     call archive%keep('U.K.U', memory%stiffness)
-    call archive%keep('U.U', memory%displacement)
+    call archive%keep('U.U', memory%moved)
+    call archive%keep('displacement', memory%displacement)
     call archive%keep('dU.dU', memory%change)
     conjugate = allocated(memory%newton)
     call archive%keep('conjugate gradients', conjugate)

@@ -5,7 +5,7 @@ module pd_motion_newton
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: newton_type, krylov_type, sums_type, keep_newton
+  public :: newton_type, krylov_type, ritz_type, sums_type, keep_newton
 
   !> What the loop along a direction sums up, squares over the free components.
   type :: sums_type
@@ -15,6 +15,16 @@ module pd_motion_newton
     real(wp) :: displacement = 0.0_wp
     real(wp) :: rho = 0.0_wp           !! residual . preconditioned residual, weighted with volume
   end type sums_type
+
+  !> The softest answer of the preconditioned stiffness that a solve has met: an estimate of the
+  !> largest eigenvalue of its inverse, from the lengths of the iterations alone.
+  type :: ritz_type
+    real(wp) :: softness = 0.0_wp             !! the estimate [-]; 0 before the first iteration
+    real(wp) :: inner = 0.0_wp                !! what the next update needs
+    real(wp) :: last = 0.0_wp
+    real(wp) :: length = 0.0_wp               !! of the last iteration
+    real(wp) :: beta = 0.0_wp                 !! share of the last direction in this one
+  end type ritz_type
 
   !> A solve of the linear equations.
   type :: krylov_type
@@ -27,6 +37,7 @@ module pd_motion_newton
     real(wp) :: rho = 0.0_wp                  !! residual . preconditioned residual
     real(wp) :: norm = 0.0_wp                 !! curvature if the preconditioner were the stiffness
     logical :: deformed = .false.             !! the tangent at `origin`, else at no displacement
+    type(ritz_type) :: ritz
     ! made anew wherever it goes on
     real(wp), allocatable :: inverse(:, :)    !! the preconditioner: 1/mass, 0 where held [m4/N]
     real(wp), allocatable :: product(:, :)    !! stiffness times direction [N/m3]
@@ -37,7 +48,7 @@ module pd_motion_newton
   type :: newton_type
     type(krylov_type) :: krylov
     integer :: iterations = 0         !! of all solves
-    real(wp) :: reference = 0.0_wp    !! square of what acts on the body, as far as it is known
+    real(wp) :: softness = 0.0_wp     !! the largest that solves with this kind of stiffness met
     real(wp) :: change = 0.0_wp       !! of displacement in the last iteration, over displacement
     type(sums_type) :: sums           !! of the last look at the true forces
     ! the solve
@@ -49,6 +60,7 @@ module pd_motion_newton
     real(wp) :: least = 0.0_wp        !! the smallest so far
     integer :: ahead = 0              !! solves that went uphill since then
     integer :: slow = 0               !! shortened steps that left much
+    logical :: asked = .false.        !! the solve's residual has been below the tolerance
     logical :: fresh = .true.         !! nothing has been gained yet
     logical :: strict = .false.       !! no solve may go uphill
     real(wp), allocatable :: best(:, :)  !! displacements of `least`, if `ahead` of them [m]
@@ -71,9 +83,14 @@ contains
       call archive%keep('rho', krylov%rho)
       call archive%keep('norm', krylov%norm)
       call archive%keep('deformed', krylov%deformed)
+      call archive%keep('softness of the solve', krylov%ritz%softness)
+      call archive%keep('inner product', krylov%ritz%inner)
+      call archive%keep('last column', krylov%ritz%last)
+      call archive%keep('last length', krylov%ritz%length)
+      call archive%keep('beta', krylov%ritz%beta)
     end associate
     call archive%keep('iterations', newton%iterations)
-    call archive%keep('reference', newton%reference)
+    call archive%keep('softness', newton%softness)
     call archive%keep('change', newton%change)
     call keep_sums(archive, newton%sums)
     call keep_sums(archive, newton%linear)
@@ -83,6 +100,7 @@ contains
     call archive%keep('least', newton%least)
     call archive%keep('ahead', newton%ahead)
     call archive%keep('slow', newton%slow)
+    call archive%keep('asked', newton%asked)
     call archive%keep('fresh', newton%fresh)
     call archive%keep('strict', newton%strict)
     call archive%keep('best', newton%best)

@@ -6,16 +6,20 @@ module pd_motion_observer
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
-  public :: observer_type, instant_type
+  public :: observer_type, instant_type, add_note
 
   !> One instant of a motion.
   type :: instant_type
     integer :: step = 0               !! complete steps (iterations in relaxation)
     integer :: load_step = 0          !! relaxation
+    integer :: iteration = 0          !! relaxation: iterations in this load step
+    logical :: dynamic = .false.      !! relaxation: they are those of dynamic relaxation
     real(wp) :: time = 0.0_wp         !! [s]; relaxation: 0 to 1 over the load steps
     real(wp) :: dt = 0.0_wp           !! step size [s]
     real(wp) :: kick = 0.0_wp         !! velocities at this instant are v + kick*force/rho [s]
     real(wp) :: residual = 0.0_wp     !! relaxation: relative residual force [-]
+    real(wp) :: change = 0.0_wp       !! relaxation: change of displacement over displacement [-]
+    character(:), allocatable :: note !! a warning for the user about this instant
     logical :: last = .false.         !! the final state
     logical :: settled = .true.       !! relaxation: a load step has converged
     logical :: gave_way = .false.     !! the conjugate gradient left this to dynamic relaxation
@@ -38,5 +42,22 @@ module pd_motion_observer
       type(error_type), allocatable, intent(out) :: error
     end subroutine observe_interface
   end interface
+
+contains
+
+  !> Add to what the user is to be told at this instant.
+  pure subroutine add_note(instant, text)
+    type(instant_type), intent(inout) :: instant
+    character(*), intent(in) :: text   !! '' adds nothing
+
+    if (text == '') return
+    if (allocated(instant%note)) then
+      if (instant%note /= '') then
+        instant%note = instant%note//'; '//text
+        return
+      end if
+    end if
+    instant%note = text
+  end subroutine add_note
 
 end module pd_motion_observer

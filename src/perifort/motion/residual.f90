@@ -1,13 +1,11 @@
-!> What both ways to rest share: how to relax, the force that is out of balance, and what to say
-!> when it doesn't vanish.
+!> What both ways to static equilibrium share: how to relax, and the norm of the force that is out of
+!> balance.
 module pd_motion_residual
   use pd_base_kinds, only: wp, i1
-  use pd_base_error, only: error_type, fail, status_no_answer
-  use pd_base_text, only: to_text
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
-  public :: relaxation_type, squared_force, fail_unconverged
+  public :: relaxation_type, squared_force
 
   !> How to relax.
   type :: relaxation_type
@@ -30,20 +28,5 @@ contains
       squared = squared + sum((density(:, c)*system%body%volume)**2, mask=system%held(:, c) == 0_i1)
     end do
   end function squared_force
-
-  !> The error of a relaxation whose iterations are used up; `residual` and `change` are where it
-  !> stands.
-  subroutine fail_unconverged(relaxation, load_step, residual, change, error)
-    type(relaxation_type), intent(in) :: relaxation
-    integer, intent(in) :: load_step
-    real(wp), intent(in) :: residual, change
-    type(error_type), allocatable, intent(out) :: error
-
-    call fail(error, 'not converged: after '//to_text(relaxation%maximum_iterations)// &
-      & ' iterations of load step '//to_text(load_step)//' the residual force is '// &
-      & to_text(residual)//' and the change of displacement '//to_text(change)//' (tolerance '// &
-      & to_text(relaxation%tolerance)// &
-      & '). Raise maximum_iterations or tolerance, or use more load steps', status_no_answer)
-  end subroutine fail_unconverged
 
 end module pd_motion_residual

@@ -98,6 +98,7 @@ contains
     if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
     if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
     schedule%history_every = history_interval(scene, plan, bonds)
+    schedule%tolerance = plan%relaxation%tolerance
   end function schedule_of
 
   !> An error if a run would write more outputs, or rows of its history, than anybody can look at:
@@ -130,7 +131,8 @@ contains
       & ' are allowed: history_every = '//to_text(schedule%steps/most_rows + 1))
   end subroutine check_schedule
 
-  !> Steps (iterations in relaxation) between rows of the history. Without the user's word there are
+  !> Steps between rows of the history; in relaxation, whose history has a row for each load step,
+  !> iterations between lines of `iterations.csv`. Without the user's word there are
   !> at most about 2000, and so few that they take a twentieth of the time of the steps at most: for
   !> the strain energy, a row takes 1.4 to 2 evaluations of the forces over all `bonds` (ordered
   !> pairs). Rows that cost next to nothing, those of small bodies, may be more. The number follows
@@ -147,7 +149,7 @@ contains
     every = scene%output%history_every
     if (every > 0) return
     if (plan%relaxes) then
-      every = max(1, plan%relaxation%maximum_iterations/2000)
+      every = 1
     else
       affordable = row/(share*evaluations(plan%integrator))
       free = real(plan%steps, wp)*bonds/no_cost

@@ -40,7 +40,8 @@ module pd_output_recorder
     integer :: steps = 0                 !! explicit: steps of the run; relaxation: load steps
     integer :: every = 1                 !! outputs: steps or load steps
     real(wp) :: interval = 0.0_wp        !! outputs: time between them [s], if > 0 instead of every
-    integer :: history_every = 1         !! rows: steps, or iterations
+    integer :: history_every = 1         !! rows: steps; relaxation: lines about iterations
+    real(wp) :: tolerance = 0.0_wp       !! relaxation: of the residual [-]
   end type schedule_type
 
   !> A point whose values stand in every row of the history.
@@ -153,10 +154,10 @@ contains
     if (.not. output_due(schedule, schedule%steps, dt)) number = number + 1
   end function planned_outputs
 
-  !> Number of rows of a run; 0 if that isn't known beforehand.
+  !> Number of rows of a run.
   pure integer function planned_rows(schedule) result(number)
     type(schedule_type), intent(in) :: schedule
-    number = 0
+    number = schedule%steps + 1
     if (schedule%relaxation) return
     number = schedule%steps/schedule%history_every + 1
     if (mod(schedule%steps, schedule%history_every) /= 0) number = number + 1
@@ -205,11 +206,11 @@ contains
       observer%steps_done = instant%step
       observer%time = instant%time
       if (schedule%relaxation) then
-        row_due = instant%settled .or. mod(instant%step, schedule%history_every) == 0
+        row_due = instant%settled
         output_due_now = instant%settled .and. mod(instant%load_step, schedule%every) == 0
         call observer%progress%update(int(instant%load_step, i8) &
           & - merge(0_i8, 1_i8, instant%settled .or. instant%load_step == 0), instant%time, &
-          & system%broken, relaxation_note(instant))
+          & system%broken, relaxation_note(instant, schedule%tolerance))
       else
         row_due = mod(instant%step, schedule%history_every) == 0
         output_due_now = output_due(schedule, instant%step, instant%dt)
@@ -217,6 +218,15 @@ contains
       end if
     end associate
     if (instant%gave_way) call note_giving_way(observer, instant)
+    if (allocated(instant%note)) then
+      if (instant%note /= '') call observer%warn('equilibrium', 'load step '// &
+        & to_text(instant%load_step)//': '//instant%note)
+    end if
+    if (observer%schedule%relaxation .and. .not. instant%settled .and. &
+      & mod(instant%step, observer%schedule%history_every) == 0) then
+      call observer%results%add_iteration(iteration_line(system, instant), observer%first_step, error)
+      if (allocated(error)) return
+    end if
     may_stop = .not. instant%last
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
@@ -351,13 +361,31 @@ contains
   end subroutine warn
 
   !> What the progress line adds in relaxation.
-  pure function relaxation_note(instant) result(note)
+  pure function relaxation_note(instant, tolerance) result(note)
     type(instant_type), intent(in) :: instant
+    real(wp), intent(in) :: tolerance
     character(:), allocatable :: note
-    character(48) :: text
-    write (text, '("iteration ",i0,", residual ",es8.1)') instant%step, instant%residual
+    character(96) :: text
+    write (text, '("load step ",i0,": iteration ",i0,", residual",es8.1," (tolerance",es8.1,")")') &
+      & instant%load_step, instant%iteration, instant%residual, tolerance
     note = trim(text)
   end function relaxation_note
+
+  !> A line of `iterations.csv`.
+  pure function iteration_line(system, instant) result(line)
+    type(system_type), intent(in) :: system
+    type(instant_type), intent(in) :: instant
+    character(:), allocatable :: line
+    character(160) :: text
+    character(18) :: solver
+
+    solver = 'conjugate_gradient'
+    if (instant%dynamic) solver = 'dynamic_relaxation'
+    write (text, '(i0,",",i0,",",es13.6e3,",",i0,",",a,",",es13.6e3,",",es13.6e3,",",i0)') &
+      & instant%step, instant%load_step, instant%time, instant%iteration, trim(solver), &
+      & instant%residual, instant%change, system%broken
+    line = trim(text)
+  end function iteration_line
 
   !> One row of the history.
   subroutine write_row(recorder, system, instant, v, error)

@@ -19,6 +19,7 @@ module pd_output_results
   use pd_output_earlier, only: existing_results, mark_complete, mark_unfinished, refuse_existing
   use pd_output_files, only: file_exists, in_directory, make_directory, remove_file
   use pd_output_history, only: csv_type, history_type
+  use pd_output_iterations, only: iterations_type
   use pd_output_sink, only: sink_type
   use pd_output_types, only: column_type, field_type, kept_type, label_length
   use pd_output_vtkhdf, only: vtkhdf_file
@@ -38,6 +39,7 @@ module pd_output_results
     type(vtu_series) :: vtu
     type(history_type) :: history
     type(csv_type) :: csv
+    type(iterations_type) :: iterations
     integer :: points = 0
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
@@ -63,6 +65,7 @@ module pd_output_results
     generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     procedure :: end_output
     procedure :: add_row
+    procedure :: add_iteration
     procedure :: put_warnings
     procedure :: close => close_results
     procedure :: sync
@@ -350,6 +353,7 @@ contains
     end if
     if (allocated(error)) return
     call remove_series(self%directory, self%stem, merge(1, 0, self%use_vtu))
+    call remove_file(in_directory(self%directory, 'iterations.csv'))
     if (size(self%columns) > 0) then
       call self%csv%open(in_directory(self%directory, 'history.csv'), self%columns, error)
     else
@@ -373,6 +377,21 @@ contains
     if (allocated(error) .or. .not. self%started .or. self%in_output) return
     if (self%history%is_due()) call write_rows(self, error)
   end subroutine add_row
+
+  !> Add a line about an iteration of a relaxation to `iterations.csv`. Of a run that goes on, lines
+  !> up to step `last` stay.
+  subroutine add_iteration(self, line, last, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: line
+    integer, intent(in) :: last
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%started .or. self%failed) return
+    if (.not. self%iterations%has_begun()) call self%iterations%begin( &
+      & in_directory(self%directory, 'iterations.csv'), self%resumed, last, error)
+    if (.not. allocated(error)) call self%iterations%add(line, error)
+    if (allocated(error)) call explain_need(self, 'iterations.csv', int(len(line), i8), error)
+  end subroutine add_iteration
 
   !> Keep the warnings so far, a line for each, in place of those of an earlier call: at once in
   !> `warnings.txt`, and in the HDF5 file when the results are complete. What goes wrong with them
@@ -447,6 +466,7 @@ contains
     if (self%use_vtkhdf .and. .not. allocated(error)) call self%vtkhdf%sync(error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%sync(error)
     if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
+    if (.not. allocated(error)) call self%iterations%sync(error)
   end subroutine sync
 
   !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
@@ -483,7 +503,9 @@ contains
     if (present(keep_mark)) complete = complete .and. .not. keep_mark
     self%open = .false.
     if (self%use_vtu) call self%vtu%abandon()
-    if (.not. self%failed) then
+    call self%iterations%close(ignored)
+    if (allocated(ignored) .and. .not. self%failed) call move_alloc(ignored, error)
+    if (.not. (self%failed .or. allocated(error))) then
       if (.not. self%started .and. self%history%has_rows()) call start_files(self, error)
       if (self%started .and. .not. allocated(error)) call write_rows(self, error)
     end if

@@ -425,9 +425,9 @@ contains
     call keys%key('interval', group%interval, 's', 'time between outputs, instead of every', &
       & above=0.0_wp)
     call keys%key('history_every', group%history_every, '', &
-      & 'steps (relaxation: iterations) between rows of the history', &
-      & at_least=1, default='max(1, steps/2000), and so many that rows take at most 5 % of the '// &
-      & 'time; relaxation: max(1, maximum_iterations/2000)', &
+      & 'steps between rows of the history (relaxation: iterations between lines of '// &
+      & 'iterations.csv)', at_least=1, default='max(1, steps/2000), and so many that rows '// &
+      & 'take at most 5 % of the time; relaxation: 1', &
       & hidden=group%history_every == 0)
     call keys%list('fields', group%fields, 'fields to write', field_names, &
       & default="'displacement', 'velocity', 'damage'")
