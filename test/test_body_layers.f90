@@ -375,6 +375,11 @@ contains
     call expect_true(error, counts(1)%columns == 12 .and. counts(1)%covered == 4, 'columns')
     call expect(error, minval(body%x(:, 2), mask=body%layer == 1 .and. body%body == 1), 4.5_wp, &
       & 1.0e-12_wp, 'begin of the coarse layer')
+    ! too wide by the digits that its corner lacks, it covers no fifth column
+    scene%bodies(2)%upper(1) = 4.003_wp
+    call generate(scene, body, counts, error)
+    if (allocated(error)) return
+    call expect_true(error, counts(1)%columns == 12 .and. counts(1)%covered == 4, 'a sliver')
     ! shifted by half a fine cell, the fine body covers a part of a fifth column
     scene%bodies(2)%lower(1) = 0.25_wp
     scene%bodies(2)%upper(1) = 4.25_wp

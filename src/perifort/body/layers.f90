@@ -17,6 +17,8 @@ module pd_body_layers
   public :: add_layers, layer_rows, layer_count_type, layer_count_text
 
   real(wp), parameter :: same_place = 1.0e-6_wp  !! of faces [spacings]
+  !> Overlap of columns of two bodies that touch up to the digits of their corners [spacings].
+  real(wp), parameter :: sliver = 1.0e-2_wp
 
   !> How many columns of a side have the layer and why the others have none. Bodies without a column
   !> that has it are not counted.
@@ -79,13 +81,14 @@ contains
   !> The layer of one boundary.
   subroutine make_layer(scene, delta, depth, body, n_body, claimed, owner, tally, layer, error)
     type(scene_type), intent(in) :: scene
-    real(wp), intent(in) :: delta, depth
+    real(wp), intent(in) :: delta                 !! horizon [m]
+    real(wp), intent(in) :: depth                 !! what makes dx^dim a volume
     type(body_type), intent(in) :: body           !! its first `n_body` points are no layer
-    integer, intent(in) :: n_body
+    integer, intent(in) :: n_body                 !! points of bodies
     type(lookup_type), intent(inout) :: claimed   !! cells that layers have
     integer(i2), allocatable, intent(inout) :: owner(:)  !! the boundary of each of these
-    type(layer_count_type), intent(inout) :: tally
-    type(body_type), intent(out) :: layer
+    type(layer_count_type), intent(inout) :: tally  !! with the boundary's number; is filled in
+    type(body_type), intent(out) :: layer         !! its points, on the grids of `body`
     type(error_type), allocatable, intent(out) :: error
     type(side_type), allocatable :: sides(:)
     type(body_type) :: part
@@ -141,14 +144,16 @@ contains
     type(scene_type), intent(in) :: scene
     character(*), intent(in) :: name       !! of the body, '' for all
     type(body_type), intent(in) :: body
-    integer, intent(in) :: n_body
-    integer, intent(in) :: axis, outward   !! 1, 2, 3; 1 or -1
-    real(wp), intent(in) :: delta
-    type(side_type), allocatable, intent(out) :: sides(:)
-    type(side_type) :: all_sides(size(scene%bodies))
-    integer :: b, c(2), k, cell(3), points(3)
+    integer, intent(in) :: n_body          !! its first points, which are no layer
+    integer, intent(in) :: axis            !! across the side: 1, 2, 3
+    integer, intent(in) :: outward         !! 1 at an upper side, -1 at a lower one
+    real(wp), intent(in) :: delta          !! horizon [m]
+    type(side_type), allocatable, intent(out) :: sides(:)  !! in the order of the bodies
+    type(side_type), allocatable :: all_sides(:)
+    integer :: b, c(2), k, n, cell(3), points(3)
 
     c = across(axis)
+    allocate (all_sides(size(scene%bodies)))
     do k = 1, n_body
       b = body%body(k)
       if (body%grid(k) == 0) cycle
@@ -169,7 +174,13 @@ contains
         side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), outward*cell(axis))
       end associate
     end do
-    sides = pack(all_sides, all_sides%number /= 0_i2)
+    allocate (sides(count(all_sides%number /= 0_i2)))
+    n = 0
+    do b = 1, size(all_sides)
+      if (all_sides(b)%number == 0_i2) cycle
+      n = n + 1
+      sides(n) = all_sides(b)
+    end do
   end subroutine find_sides
 
   !> The axes across an axis, in ascending order.
@@ -181,10 +192,11 @@ contains
 
   !> Mark the columns that get the layer, and count.
   subroutine choose_columns(dim, axis, outward, delta, sides, tally)
-    integer, intent(in) :: dim, axis, outward
-    real(wp), intent(in) :: delta
-    type(side_type), intent(inout) :: sides(:)
-    type(layer_count_type), intent(inout) :: tally
+    integer, intent(in) :: dim                      !! of the scene
+    integer, intent(in) :: axis, outward            !! as in `find_sides`
+    real(wp), intent(in) :: delta                   !! horizon [m]
+    type(side_type), intent(inout) :: sides(:)      !! `has` is set
+    type(layer_count_type), intent(inout) :: tally  !! columns are added
     logical, allocatable :: hidden(:, :)
     real(wp) :: outer(size(sides)), outermost
     integer :: i, j
@@ -212,7 +224,7 @@ contains
     !> Mark the columns of one side that get the layer, and count.
     subroutine mark(side, hidden)
       type(side_type), intent(inout) :: side
-      logical, intent(in) :: hidden(:, :)
+      logical, intent(in) :: hidden(:, :)  !! its columns that another body covers
       integer :: m, n, farther, empty, covered
 
       farther = 0
@@ -240,19 +252,22 @@ contains
     end subroutine mark
   end subroutine choose_columns
 
-  !> How far out the outer face of a level lies [m].
+  !> How far out the outer face of a level lies [m], growing outwards.
   pure real(wp) function face_of(side, axis, outward, level) result(face)
     type(side_type), intent(in) :: side
-    integer, intent(in) :: axis, outward, level
+    integer, intent(in) :: axis, outward  !! as in `find_sides`
+    integer, intent(in) :: level          !! of a cell
     face = outward*side%grid%origin(axis) + (level + merge(1, 0, outward < 0)) &
       & *side%grid%spacing
   end function face_of
 
   !> Mark the columns of a side before which cells of `other` stand, seen from outside.
   subroutine hide(side, other, dim, axis, outward, hidden)
-    type(side_type), intent(in) :: side, other
-    integer, intent(in) :: dim, axis, outward
-    logical, intent(inout) :: hidden(:, :)
+    type(side_type), intent(in) :: side      !! whose columns are looked at
+    type(side_type), intent(in) :: other     !! of another body
+    integer, intent(in) :: dim               !! of the scene
+    integer, intent(in) :: axis, outward     !! as in `find_sides`
+    logical, intent(inout) :: hidden(:, :)   !! the columns of `side`; marks are added
     real(wp) :: edge, face
     integer :: c(2), m, n, i, low(2), high(2)
 
@@ -260,16 +275,16 @@ contains
     do n = 1, size(other%top, 2)
       do m = 1, size(other%top, 1)
         if (other%top(m, n) == nothing) cycle
-        ! the columns that this one overlaps by more than rounding
+        ! the columns that this one overlaps
         low = 1
         high = 1
         do i = 1, 2
           if (c(i) > dim) cycle
           edge = (other%grid%origin(c(i)) - side%grid%origin(c(i)) &
             & + (merge(m, n, i == 1) - 1)*other%grid%spacing)/side%grid%spacing
-          low(i) = floor(max(-1.0_wp, min(edge, size(side%top, i) + 1.0_wp)) + same_place) + 1
+          low(i) = floor(max(-1.0_wp, min(edge, size(side%top, i) + 1.0_wp)) + sliver) + 1
           edge = edge + other%grid%spacing/side%grid%spacing
-          high(i) = ceiling(max(-1.0_wp, min(edge, size(side%top, i) + 1.0_wp)) - same_place)
+          high(i) = ceiling(max(-1.0_wp, min(edge, size(side%top, i) + 1.0_wp)) - sliver)
         end do
         low = max(low, 1)
         high = min(high, shape(side%top))
@@ -295,9 +310,9 @@ contains
 
   !> The box of cells first..last around the layer at one side, which some column has.
   pure subroutine box_of_layer(side, axis, outward, first, last)
-    type(side_type), intent(in) :: side
-    integer, intent(in) :: axis, outward
-    integer, intent(out) :: first(3), last(3)
+    type(side_type), intent(in) :: side        !! with a column that has the layer
+    integer, intent(in) :: axis, outward       !! as in `find_sides`
+    integer, intent(out) :: first(3), last(3)  !! cells; last < first if it has no rows
     integer :: low, high
 
     first = 1
@@ -312,7 +327,8 @@ contains
   !> Which cells of the box first..last, x fastest, belong to the layer at one side.
   pure function cells_of_layer(side, axis, outward, first, last) result(chosen)
     type(side_type), intent(in) :: side
-    integer, intent(in) :: axis, outward, first(3), last(3)
+    integer, intent(in) :: axis, outward      !! as in `find_sides`
+    integer, intent(in) :: first(3), last(3)  !! of `box_of_layer`
     logical, allocatable :: chosen(:)
     integer :: c(2), i, j, k, n, level, at(3)
 
@@ -338,13 +354,13 @@ contains
   !> bodies, must not meet like that; there the cells remain, and are found to overlap.
   subroutine claim_cells(scene, boundary, body, side, first, last, claimed, owner, chosen)
     type(scene_type), intent(in) :: scene
-    integer, intent(in) :: boundary
-    type(body_type), intent(in) :: body
+    integer, intent(in) :: boundary               !! number of the group
+    type(body_type), intent(in) :: body           !! for its grids
     type(side_type), intent(in) :: side
     integer, intent(in) :: first(3), last(3)      !! the box of cells, x fastest
-    type(lookup_type), intent(inout) :: claimed
-    integer(i2), allocatable, intent(inout) :: owner(:)
-    logical, intent(inout) :: chosen(:)
+    type(lookup_type), intent(inout) :: claimed   !! cells that layers have
+    integer(i2), allocatable, intent(inout) :: owner(:)  !! the boundary of each of these
+    logical, intent(inout) :: chosen(:)           !! the layer's cells in the box
     logical :: is_new
     integer :: i, j, k, n, number, shift(3)
     integer(i8) :: key
@@ -377,7 +393,7 @@ contains
   !> What the user reads of a layer that does not cover its side; '' if it does.
   function layer_count_text(scene, tally) result(text)
     type(scene_type), intent(in) :: scene
-    type(layer_count_type), intent(in) :: tally
+    type(layer_count_type), intent(in) :: tally  !! of one layer
     character(:), allocatable :: text
 
     text = ''

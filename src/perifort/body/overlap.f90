@@ -104,7 +104,8 @@ contains
   pure subroutine sort_by_body(body, number, first, order)
     type(body_type), intent(in) :: body
     integer, intent(in) :: number(:)                 !! points of each body
-    integer, allocatable, intent(out) :: first(:), order(:)
+    integer, allocatable, intent(out) :: first(:)    !! place in `order` (bodies + 1)
+    integer, allocatable, intent(out) :: order(:)    !! points, body by body
     integer :: next(size(number)), b, k
 
     allocate (first(size(number) + 1), order(body%n_points))
@@ -124,8 +125,8 @@ contains
   subroutine place_points(scene, body, points, cells, error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
-    integer, intent(in) :: points(:)
-    type(cells_type), intent(inout) :: cells
+    integer, intent(in) :: points(:)                 !! of one body, its layers included
+    type(cells_type), intent(inout) :: cells         !! with its box; `point` is made
     type(error_type), allocatable, intent(out) :: error
     integer :: i, at(3)
 
@@ -149,8 +150,8 @@ contains
   subroutine look_for_points(scene, body, points, cells, error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
-    integer, intent(in) :: points(:)
-    type(cells_type), intent(in) :: cells
+    integer, intent(in) :: points(:)                 !! of another body
+    type(cells_type), intent(in) :: cells            !! of `place_points`
     type(error_type), allocatable, intent(out) :: error
     real(wp) :: place
     integer :: i, c, low(3), high(3), inside, corners, other, x, y, z

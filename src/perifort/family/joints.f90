@@ -23,8 +23,8 @@ contains
   !> their bodies.
   subroutine count_joints(body, family, joints)
     type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    type(joint_type), allocatable, intent(out) :: joints(:)
+    class(family_type), intent(in) :: family                 !! its families, cracks cut
+    type(joint_type), allocatable, intent(out) :: joints(:)  !! none for a single body
     type(lookup_type) :: pairs
     type(bonds_type) :: bonds
     integer(i4), allocatable :: foreign(:)
@@ -85,8 +85,8 @@ contains
   !> them.
   pure subroutine find_boxes(body, distance, low, high)
     type(body_type), intent(in) :: body
-    real(wp), intent(in) :: distance
-    real(wp), allocatable, intent(out) :: low(:, :), high(:, :)
+    real(wp), intent(in) :: distance                          !! [m]
+    real(wp), allocatable, intent(out) :: low(:, :), high(:, :)  !! corners (dim, body) [m]
     integer :: k
 
     allocate (low(body%dim, maxval(body%body)), source=huge(1.0_wp))
