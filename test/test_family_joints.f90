@@ -56,7 +56,7 @@ contains
         call expect_true(error, joints(1)%bonds == wanted(1, 3) .and. joints(2)%bonds &
           & == wanted(2, 3) .and. wanted(1, 2) == 0_i8, 'their bonds')
         call expect_true(error, index(set_up%warnings%text(), to_text(wanted(1, 3))// &
-          & ' bonds join body 1 ''right'' and body 3 ''middle''') > 0, set_up%warnings%text())
+          & ' bonds join the body ''right'' and the body ''middle''') > 0, set_up%warnings%text())
       end do
     end do
   end subroutine test_count

@@ -1,6 +1,7 @@
 !> The texts of `--help`.
 module pd_command_help
   use pd_base_text, only: join, newline
+  use pd_base_error, only: internal_fault
   implicit none (type, external)
   private
   public :: help_text
@@ -133,7 +134,7 @@ contains
         & 'memory), or a target missed; 2 wrong command line; 3 no valid answer (unstable or not', &
         & 'converged); 4 interrupted, with a checkpoint.'], newline)
     case default
-      error stop 'internal error: help_text does not know a command of command_names'
+      call internal_fault('help_text does not know a command of command_names')
     end select
     text = text//newline
   end function help_text

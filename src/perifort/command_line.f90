@@ -1,6 +1,6 @@
 !> What the user typed: one command, its file or name, and options.
 module pd_command_line
-  use pd_base_error, only: error_type, fail, status_usage
+  use pd_base_error, only: error_type, fail, internal_fault, status_usage
   use pd_base_kinds, only: wp
   use pd_base_shell, only: program_command, quoted
   use pd_base_text, only: join, nearest_name, newline, to_text
@@ -212,7 +212,7 @@ contains
     case ('template', 'reference')
       continue  ! an argument or none; their names are checked where they are looked up
     case default
-      error stop 'internal error: check_whole does not know a command of command_names'
+      call internal_fault('check_whole does not know a command of command_names')
     end select
   end subroutine check_whole
 
@@ -298,7 +298,7 @@ contains
     case ('--help')
       line%help = .true.
     case default
-      error stop 'internal error: set_option does not know an option of option_names'
+      call internal_fault('set_option does not know an option of option_names')
     end select
   end subroutine set_option
 
@@ -374,7 +374,7 @@ contains
     case ('--output', '--overwrite', '--quiet')
       belongs = any(command == [character(6) :: 'run', 'study', 'choose'])
     case default
-      error stop 'internal error: belongs does not know an option of option_names'
+      call internal_fault('belongs does not know an option of option_names')
     end select
   end function belongs
 

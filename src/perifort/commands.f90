@@ -2,7 +2,7 @@
 module pd_commands
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_set_num_threads
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_threads, only: default_threads
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
@@ -65,7 +65,7 @@ contains
       case ('limits')
         call run_limits(scene, options, line%seconds, error)
       case default
-        error stop 'internal error: execute does not know a command that reads a scene'
+        call internal_fault('execute does not know a command that reads a scene')
       end select
     case ('template')
       call write_template(output_unit, line%argument, error)
@@ -76,7 +76,7 @@ contains
     case ('version')
       call write_version()
     case default
-      error stop 'internal error: execute does not know a command of command_names'
+      call internal_fault('execute does not know a command of command_names')
     end select
   end subroutine execute
 

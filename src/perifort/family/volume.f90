@@ -2,6 +2,7 @@
 !> horizon.
 module pd_family_volume
   use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
   implicit none (type, external)
   private
   public :: volume_rule_type, volume_correction, reach, covered_fraction
@@ -27,7 +28,7 @@ contains
     case ('linear'); number = volume_linear
     case ('linear_extended'); number = volume_linear_extended
     case ('exact'); number = volume_exact
-    case default; error stop 'internal: unknown volume correction'
+    case default; call internal_fault('unknown volume correction')
     end select
   end function volume_rule_number
 
@@ -59,7 +60,7 @@ contains
     case (volume_linear, volume_linear_extended)
       vc = max(0.0_wp, min(1.0_wp, (rule%delta + spacing/2 - length)/spacing))
     case default
-      error stop 'internal: unknown volume correction'
+      call internal_fault('unknown volume correction')
     end select
   end function volume_correction
 

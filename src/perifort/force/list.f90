@@ -14,7 +14,7 @@ module pd_force_list
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
   private
-  public :: prepare_list, list_dilatation, list_force, list_energy
+  public :: prepare_list, forget_model, list_dilatation, list_force, list_energy
 
   !> How far a cluster is strained (`large` of the family): within the narrow polynomial, within the
   !> wide one, beyond.
@@ -40,6 +40,18 @@ contains
     call survey(family, model)
     call store_weights(family, model)
   end subroutine prepare_list
+
+  !> Drop what the family keeps of the model, which is about to change or has changed: the next pass
+  !> makes it anew.
+  pure subroutine forget_model(family)
+    type(list_family_type), intent(inout) :: family  !! of any model, or of none yet
+
+    if (.not. allocated(family%given)) return
+    deallocate (family%given, family%plain)
+    if (allocated(family%stored)) deallocate (family%stored)
+    if (allocated(family%weight_D)) deallocate (family%weight_D)
+    if (allocated(family%weight_S)) deallocate (family%weight_S)
+  end subroutine forget_model
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
   !> intact bond beyond its limit.

@@ -5,7 +5,7 @@
 !> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
 module pd_motion_explicit
   use pd_base_kinds, only: wp
-  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_error, only: error_type, fail, internal_fault, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
@@ -187,7 +187,7 @@ contains
     case ('runge_kutta')
       if (late) part = 1.0_wp/6
     case default
-      error stop 'internal: unknown integrator'
+      call internal_fault('unknown integrator')
     end select
     pairing%offset = 2*part*dt
     if (n > 0) pairing%held = -dt
@@ -249,7 +249,7 @@ contains
     case ('runge_kutta')
       call runge_kutta(system, t, dt, start)
     case default
-      error stop 'internal: unknown integrator'
+      call internal_fault('unknown integrator')
     end select
   end subroutine advance
 

@@ -1,7 +1,7 @@
 !> What a run will do in time: the step and its number, or the relaxation's mass.
 module pd_motion_plan
   use pd_base_kinds, only: wp
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_text, only: to_text
   use pd_scene_rules, only: scene_fault
   use pd_scene_types, only: scene_type, is_set
@@ -142,7 +142,7 @@ contains
         relaxation%mass(:, c) = safety*bound/2
       end do
     case default
-      error stop 'internal: unknown density matrix'
+      call internal_fault('unknown density matrix')
     end select
   end subroutine plan_relaxation
 

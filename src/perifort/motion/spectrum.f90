@@ -7,12 +7,15 @@
 !> it does not harm the value itself nor its residual (C. C. Paige, J. Inst. Maths Applics 18 (1976)
 !> 341).
 module pd_motion_spectrum
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i2, i4
   use pd_base_numbers, only: inner, noise, pi
   use pd_body_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_lattice, only: lattice_family_type
+  use pd_family_list, only: list_family_type
   use pd_family_surface, only: bond_factor
+  use pd_force_list, only: forget_model
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   implicit none (type, external)
@@ -163,11 +166,19 @@ contains
     type is (lattice_family_type)
       tables = family%weights
       family%weights = 0_i4
+    type is (list_family_type)
+      call forget_model(family)
+    class default
+      call internal_fault('a family without a rule for changed stiffness')
     end select
     call largest_frequency(system, accuracy, spectrum)
     select type (family => system%family)
     type is (lattice_family_type)
       family%weights = tables
+    type is (list_family_type)
+      call forget_model(family)
+    class default
+      call internal_fault('a family without a rule for changed stiffness')
     end select
     system%model%material = material
     deallocate (system%model%materials)

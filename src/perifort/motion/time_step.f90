@@ -1,6 +1,7 @@
 !> The stable time step (7.25 in the form of doc/theory.md, 6).
 module pd_motion_time_step
   use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
   use pd_base_numbers, only: pi
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
@@ -248,7 +249,7 @@ contains
     case ('adams_moulton'); limit = 1.29_wp
     case ('runge_kutta'); limit = 2.83_wp
     case ('forward_backward', 'velocity_verlet'); limit = 2.0_wp
-    case default; error stop 'internal: unknown integrator'
+    case default; call internal_fault('unknown integrator')
     end select
   end function integrator_limit
 
@@ -259,7 +260,7 @@ contains
     case ('runge_kutta'); evaluations = 4
     case ('adams_moulton'); evaluations = 2
     case ('forward_backward', 'velocity_verlet', 'adams_bashforth'); evaluations = 1
-    case default; error stop 'internal: unknown integrator'
+    case default; call internal_fault('unknown integrator')
     end select
   end function evaluations
 

@@ -3,6 +3,7 @@
 !> A form fits or is refused with the reason: what is compared with must be this scene's answer.
 module pd_study_analytic
   use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
   use pd_base_numbers, only: pi
   use pd_base_text, only: newline, to_text
   use pd_body_generate, only: horizon_of
@@ -85,7 +86,7 @@ contains
     case ('linear_field')
       call fit_linear(scene, form, reason)
     case default
-      error stop 'internal error: fit does not know a closed form of closed_forms'
+      call internal_fault('fit does not know a closed form of closed_forms')
     end select
   end subroutine fit
 

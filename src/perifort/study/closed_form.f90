@@ -3,6 +3,7 @@
 !> A form is plain numbers; `pd_study_analytic` takes them from a scene.
 module pd_study_closed_form
   use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
   implicit none (type, external)
   private
   public :: closed_form_type, field_at, form_wave, form_linear, form_hole, form_chain, &
@@ -74,7 +75,7 @@ contains
     case (form_linear)
       call linear(form, field, x, values, known)
     case default
-      error stop 'internal error: field_at does not know a closed form'
+      call internal_fault('field_at does not know a closed form')
     end select
   end subroutine field_at
 

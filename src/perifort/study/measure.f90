@@ -4,7 +4,7 @@
 !> the rows of the history, a field many places in the final state, and a column of the history has
 !> no place at all.
 module pd_study_measure
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: join, nearest_name
   use pd_scene_groups, only: field_names
@@ -178,7 +178,7 @@ contains
     case ('relative')
       error = sqrt(squares/max(answer, tiny(1.0_wp)))
     case default
-      error stop 'internal error: unknown norm of a study'
+      call internal_fault('unknown norm of a study')
     end select
   end function difference
 

@@ -1,7 +1,7 @@
 !> One run of a study: a scene computed in memory, measured and timed. No files are written.
 module pd_study_trial
   use pd_base_clock, only: progress_type, wall_time
-  use pd_base_error, only: error_type, fail, status_interrupted
+  use pd_base_error, only: error_type, fail, internal_fault, status_interrupted
   use pd_base_interrupt, only: interrupted
   use pd_base_kinds, only: wp, i8
   use pd_base_numbers, only: median
@@ -239,7 +239,7 @@ contains
         end do
         if (watcher%column == 0) call fail(error, "the history has no column '"//measure%name//"'")
       case default
-        error stop 'internal error: unknown kind of a measure'
+        call internal_fault('unknown kind of a measure')
       end select
       if (allocated(error)) return
       watcher%slots = pack([(k, k=1, body%n_slots)], chosen)
@@ -255,7 +255,7 @@ contains
         case (of_column)
           record%place = 1
         case default
-          error stop 'internal error: unknown kind of a measure'
+          call internal_fault('unknown kind of a measure')
         end select
         record%spacing = maxval(body%spacing, mask=body%point > 0)
         k = 1
