@@ -36,6 +36,7 @@ program main
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_conjugate_gradient, only: collect_motion_conjugate_gradient
   use test_motion_explicit, only: collect_motion_explicit
+  use test_motion_equilibrium, only: collect_motion_equilibrium
   use test_motion_newton, only: collect_motion_newton
   use test_motion_relaxation, only: collect_motion_relaxation
   use test_motion_spectrum, only: collect_motion_spectrum
@@ -105,6 +106,7 @@ program main
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_conjugate_gradient', collect_motion_conjugate_gradient)
   call register('motion_explicit', collect_motion_explicit)
+  call register('motion_equilibrium', collect_motion_equilibrium)
   call register('motion_newton', collect_motion_newton)
   call register('motion_relaxation', collect_motion_relaxation)
   call register('motion_spectrum', collect_motion_spectrum)
