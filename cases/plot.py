@@ -217,9 +217,8 @@ def middle_cut(results, name, output):
 def history_pictures(results, folder):
     """Energies with their balance, one picture for probes and one for reactions."""
     h = results.history
-    # In relaxation time stands still while the body comes to rest
     if "residual" in h:
-        across, label = h["step"], "iteration"
+        across, label = h["load_step"], "load step"
     else:
         across, label = h["time"], "time [s]"
     figure, axes = plt.subplots(2, 1, figsize=(7.5, 6), sharex=True, height_ratios=(3, 1))

@@ -43,6 +43,7 @@ program main
   use test_motion_conjugate_gradient, only: collect_motion_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
   use test_motion_explicit, only: collect_motion_explicit
+  use test_motion_equilibrium, only: collect_motion_equilibrium
   use test_motion_heating, only: collect_motion_heating
   use test_motion_newton, only: collect_motion_newton
   use test_motion_relaxation, only: collect_motion_relaxation
@@ -122,6 +123,7 @@ program main
   call register('motion_conjugate_gradient', collect_motion_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)
   call register('motion_explicit', collect_motion_explicit)
+  call register('motion_equilibrium', collect_motion_equilibrium)
   call register('motion_heating', collect_motion_heating)
   call register('motion_newton', collect_motion_newton)
   call register('motion_relaxation', collect_motion_relaxation)

@@ -424,7 +424,8 @@ contains
       if (allocated(error)) return
       call run_in_pieces(scene, 'pieces', 1, pieces, error)
       call expect_true(error, pieces > 10, 'it is cut at load steps alone')
-      call expect_same_results(error, 'whole', 'pieces', 3)
+      call expect_same_results(error, 'whole', 'pieces', 2)
+      call expect_same_file(error, here//'/whole/iterations.csv', here//'/pieces/iterations.csv')
     end do
   end subroutine test_relaxation
 
@@ -439,7 +440,7 @@ contains
     scene%cracks(1)%from(2) = 3*spacing
     scene%cracks(1)%to(:2) = [2.0_wp, 3.0_wp]*spacing
     scene%time%method = 'relaxation'
-    scene%relaxation%load_steps = 2
+    scene%relaxation%load_steps = 1
     scene%relaxation%tolerance = 0.1_wp
     scene%output%every = 1
     scene%output%history_every = 5

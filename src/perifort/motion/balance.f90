@@ -45,10 +45,10 @@ module pd_motion_balance
   real(wp), parameter :: left_over = 2.0e-4_wp
   !> Rounding of a force: so many units in the last place of a displacement times the stiffness of a
   !> point, which bounds its row (doc/theory.md, 6).
-  real(wp), parameter :: last_places = 2.0_wp
+  real(wp), parameter :: last_places = 8.0_wp
   !> That is a bound. What rounding does leave is nearer to this part of it, since the errors of a
   !> point's bonds are of either sign: so far a residual can be brought beside what acts.
-  real(wp), parameter :: likely = 0.05_wp
+  real(wp), parameter :: likely = 0.0125_wp
   !> What acts must be so many times the bound: then what is left is a thousandth.
   real(wp), parameter :: audible = 1.0e3_wp*likely
 

@@ -234,7 +234,10 @@ contains
         call weigh_energies(system, rigid, balance)
         instant%residual = relative_residual(balance)
         if (balanced_but_for_error(relaxation, rigid, balance) .and. error_is_known(balance, &
-          & 0.0_wp, allowed_error(relaxation, balance))) return
+          & 0.0_wp, allowed_error(relaxation, balance))) then
+          call check_drowned(system, rigid, balance, error)
+          return
+        end if
       end if
       call fictitious_acceleration(system, relaxation, instant%time, a)
       if (memory%iteration == 0) rate = a/2                        ! 7.30

@@ -24,7 +24,6 @@ module pd_motion_rigid
     real(wp) :: combination(6, 6) = 0.0_wp  !! columns 1..number, orthonormal in the volume
     logical :: held = .false.               !! some component is constrained
     logical :: loaded = .false.             !! a load acts on it, at whatever time
-    logical :: heated = .false.             !! its temperature changes
   end type piece_type
 
   !> All pieces of a body.
@@ -76,7 +75,6 @@ contains
         & - minval(system%body%x(slots, c)))
     end do
     piece%held = any(system%held(slots, :) == 1_i1)
-    if (system%model%thermal) piece%heated = any(abs(system%model%expansion(slots)) > 0.0_wp)
     resistance = 0.0_wp
     mass = 0.0_wp
     do n = 1, size(slots)
@@ -328,7 +326,7 @@ contains
 
   !> Move a piece as a rigid body on from displacements `u` so that it comes as near as it can to
   !> `target` (n_slots, dim) [m] in the least squares of `weight` (n_slots, dim), by Newton's
-  !> iterations on the finite motion. Motions that no weighted component sees are left alone.
+  !> iterations on the finite motion, to the last digit of what is left of the displacements. Motions that no weighted component sees are left alone.
   subroutine fit_rigid_motion(system, rigid, p, target, weight, u)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
@@ -368,7 +366,7 @@ contains
           ! at most a radian at a time
           mode = mode/max(1.0_wp, norm2(mode(4:))/piece%size)
           call move_rigidly(system, piece, slots, mode, u)
-          if (norm2(mode) <= negligible*maxval(abs(target(slots, :)))) exit
+          if (norm2(mode) <= negligible*maxval(abs(u(slots, :)))) exit
         end do
       end associate
     end associate

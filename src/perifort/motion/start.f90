@@ -6,7 +6,7 @@ module pd_motion_start
   use pd_motion_conditions, only: impose
   use pd_motion_pieces, only: piece_text
   use pd_motion_rigid, only: rigid_type, fit_rigid_motion
-  use pd_motion_system, only: system_type
+  use pd_motion_system, only: system_type, add_loads
   implicit none (type, external)
   private
   public :: move_along, loose_text
@@ -35,10 +35,12 @@ contains
     real(wp), intent(in) :: t
     real(wp), intent(inout) :: trend(:, :)
     real(wp), allocatable :: imposed(:, :), rate(:, :), moved(:, :), weight(:, :)
+    logical, allocatable :: acted(:)
     real(wp) :: before, after
     integer :: p
     logical :: done
 
+    call find_acted(system, rigid, t, acted)
     allocate (imposed, source=system%state%u)
     allocate (rate, source=system%state%v)
     call impose(system%motions, t, imposed, rate)
@@ -50,7 +52,7 @@ contains
           if (size(slots) == 1 .and. .not. piece%held) cycle
           before = sum((imposed(slots, :) - system%state%u(slots, :))**2)
           done = .false.
-          if (.not. (piece%loaded .or. piece%heated)) call put_to_rest(p, slots, done)
+          if (.not. acted(p)) call put_to_rest(p, slots, done)
           if (.not. done) then
             if (.not. before > 0.0_wp) cycle
             weight(slots, :) = real(system%held(slots, :), wp)
@@ -94,6 +96,26 @@ contains
       if (.not. done) moved(slots, :) = system%state%u(slots, :)
     end subroutine put_to_rest
   end subroutine move_along
+
+  !> On which pieces a load or heat acts at time `t`.
+  subroutine find_acted(system, rigid, t, acted)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    real(wp), intent(in) :: t
+    logical, allocatable, intent(out) :: acted(:)
+    real(wp), allocatable :: loads(:, :)
+    integer :: k
+
+    allocate (acted(rigid%pieces%number), source=.false.)
+    allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
+    call add_loads(system, t, 1.0_wp, .false., loads)
+    do k = 1, system%body%n_slots
+      if (rigid%pieces%of(k) == 0) cycle
+      if (any(abs(loads(k, :)) > 0.0_wp)) acted(rigid%pieces%of(k)) = .true.
+      if (.not. system%model%thermal) cycle
+      if (abs(system%model%expansion(k)) > 0.0_wp) acted(rigid%pieces%of(k)) = .true.
+    end do
+  end subroutine find_acted
 
   !> Sum of squares of what the constrained components miss [m2].
   pure real(wp) function misfit(system, slots, imposed, moved) result(squares)
