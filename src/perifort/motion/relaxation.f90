@@ -36,6 +36,10 @@ module pd_motion_relaxation
   !> Iterations that an estimate of the error may take.
   integer, parameter :: most_estimating = 20000
 
+  !> A residual that is rounding alone: in a state without displacements, as of a heated body that
+  !> is held, their change has nothing to be compared with.
+  real(wp), parameter :: at_rounding = 1.0e-13_wp
+
   !> Sums over the free components, one pass for all.
   type :: sums_type
     real(wp) :: stiffness = 0.0_wp      !! U.K.U
@@ -48,8 +52,8 @@ module pd_motion_relaxation
 
 contains
 
-  !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if its
-  !> memory says that it has begun, it goes on from there.
+  !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if
+  !> its memory says that it has begun, it goes on from there.
   subroutine run_relaxation(system, relaxation, observer, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
@@ -278,7 +282,8 @@ contains
         if (iteration >= memory%next_judgement .and. &
           & (memory%residual <= worth_judging*relaxation%tolerance .or. &
           & mod(iteration, judged_anyway) == 0) .and. &
-          & memory%change <= relaxation%tolerance**2*memory%displacement) then
+          & (memory%change <= relaxation%tolerance**2*memory%displacement .or. &
+          & memory%residual <= at_rounding)) then
           call judge(system, relaxation, rigid, instant%time, balance, accepted)
           if (accepted) then
             instant%residual = relative_residual(balance)
