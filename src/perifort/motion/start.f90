@@ -17,6 +17,7 @@ module pd_motion_start
   !> Supports move as a rigid body if they miss it by no more than this part of the largest
   !> displacement.
   real(wp), parameter :: exact = 1.0e-13_wp
+  integer, parameter :: most_passes = 50   !! down to the smallest numbers
 
 contains
 
@@ -34,7 +35,7 @@ contains
     type(rigid_type), intent(in) :: rigid
     real(wp), intent(in) :: t
     real(wp), intent(inout) :: trend(:, :)
-    real(wp), allocatable :: imposed(:, :), rate(:, :), moved(:, :), weight(:, :)
+    real(wp), allocatable :: imposed(:, :), rate(:, :), moved(:, :), weight(:, :), goal(:, :)
     logical, allocatable :: acted(:)
     real(wp) :: before, after
     integer :: p
@@ -45,7 +46,7 @@ contains
     allocate (rate, source=system%state%v)
     call impose(system%motions, t, imposed, rate)
     allocate (moved, source=system%state%u)
-    allocate (weight, mold=imposed)
+    allocate (weight, goal, mold=imposed)
     do p = 1, rigid%pieces%number
       associate (piece => rigid%piece(p), pieces => rigid%pieces)
         associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
@@ -76,21 +77,27 @@ contains
     subroutine put_to_rest(p, slots, done)
       integer, intent(in) :: p, slots(:)
       logical, intent(out) :: done
-      real(wp) :: largest
-      integer :: i
+      real(wp) :: largest, before
+      integer :: i, pass
 
       done = .false.
       largest = max(maxval(abs(imposed(slots, :))), maxval(abs(system%state%u(slots, :))))
       if (.not. largest > 0.0_wp) return
-      moved(slots, :) = 0.0_wp
-      do i = 1, size(slots)
-        weight(slots(i), :) = system%body%volume(slots(i))
-      end do
-      call fit_rigid_motion(system, rigid, p, system%state%u, weight, moved)
-      if (rigid%piece(p)%held) then
+      goal(slots, :) = system%state%u(slots, :)
+      do pass = 1, most_passes
+        before = maxval(abs(goal(slots, :)))
+        moved(slots, :) = 0.0_wp
+        do i = 1, size(slots)
+          weight(slots(i), :) = system%body%volume(slots(i))
+        end do
+        call fit_rigid_motion(system, rigid, p, goal, weight, moved)
+        if (.not. rigid%piece(p)%held) exit
         weight(slots, :) = real(system%held(slots, :), wp)
         call fit_rigid_motion(system, rigid, p, imposed, weight, moved)
-      end if
+        ! a motion that comes back leaves the rounding of what it was: again, from where it is
+        if (.not. maxval(abs(moved(slots, :))) < before/2) exit
+        goal(slots, :) = moved(slots, :)
+      end do
       done = misfit(system, slots, imposed, moved) &
         & <= (exact*largest)**2*size(slots)
       if (.not. done) moved(slots, :) = system%state%u(slots, :)
