@@ -58,6 +58,7 @@ program main
   use test_output_contact, only: collect_output_contact
   use test_output_files, only: collect_output_files
   use test_output_layout, only: collect_output_layout
+  use test_output_overview, only: collect_output_overview
   use test_output_restart, only: collect_output_restart
   use test_output_results, only: collect_output_results
   use test_scene_change, only: collect_scene_change
@@ -138,6 +139,7 @@ program main
   call register('output_contact', collect_output_contact)
   call register('output_files', collect_output_files)
   call register('output_layout', collect_output_layout)
+  call register('output_overview', collect_output_overview)
   call register('output_restart', collect_output_restart)
   call register('output_results', collect_output_results)
   call register('scene_change', collect_scene_change)

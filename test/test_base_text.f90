@@ -1,7 +1,7 @@
 !> Text: numbers as words, units, nearest names.
 module test_base_text
   use pd_base_kinds, only: wp, i8
-  use pd_base_text, only: edit_distance, join, lower_case, nearest_name, to_text, with_unit
+  use pd_base_text, only: counted, edit_distance, join, lower_case, nearest_name, to_text, with_unit
   use testdrive, only: check, error_type, new_unittest, unittest_type
   implicit none (type, external)
   private
@@ -21,6 +21,7 @@ contains
       & new_unittest('a distance is symmetric', test_symmetry), &
       & new_unittest('the nearest name is found', test_nearest), &
       & new_unittest('a far name has no neighbour', test_far), &
+      & new_unittest('things are counted', test_counted), &
       & new_unittest('names are joined', test_join)]
   end subroutine collect_base_text
 
@@ -129,6 +130,13 @@ contains
     character(*), parameter :: known(2) = ['integrator', 'duration  ']
     call check(error, len(nearest_name('poissons_ratio', known)), 0)
   end subroutine test_far
+
+  subroutine test_counted(error)
+    type(error_type), allocatable, intent(out) :: error
+    call check(error, counted(1, 'point'), '1 point')
+    if (allocated(error)) return
+    call check(error, counted(0, 'point')//', '//counted(12, 'step'), '0 points, 12 steps')
+  end subroutine test_counted
 
   subroutine test_join(error)
     type(error_type), allocatable, intent(out) :: error

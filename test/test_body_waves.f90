@@ -17,7 +17,7 @@ contains
   subroutine collect_body_waves(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('longitudinal and shear waves', test_body_speeds), &
+      & new_unittest('waves within a body', test_body_speeds), &
       & new_unittest('surface waves', test_rayleigh), &
       & new_unittest('the energy of a critical stretch', test_energy)]
   end subroutine collect_body_waves

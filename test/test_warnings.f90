@@ -107,7 +107,7 @@ contains
     scene%cracks(1)%from(:2) = [0.0_wp, 3.5_wp]*spacing
     scene%cracks(1)%to(:2) = [4.0_wp, 3.5_wp]*spacing
     call expect_told(error, scene, 'runs through 4 points', .true., 'a crack along a row')
-    call expect_told(error, scene, 'half a spacing (5 mm)', .true., 'a crack along a row')
+    call expect_told(error, scene, 'spacing (5 mm)', .true., 'a crack along a row')
     scene%cracks(1)%from(2) = 4.0_wp*spacing
     scene%cracks(1)%to(2) = 4.0_wp*spacing
     call expect_told(error, scene, 'runs through', .false., 'a crack between rows')

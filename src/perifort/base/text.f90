@@ -4,7 +4,7 @@ module pd_base_text
   implicit none (type, external)
   private
   public :: to_text, lower_case, nearest_name, edit_distance, join, with_unit, newline
-  public :: is_control, printable, labelled_line
+  public :: is_control, printable, labelled_line, counted
 
   character(*), parameter :: newline = new_line('a')
 
@@ -100,6 +100,15 @@ contains
     text = real_to_text(value/10.0_wp**(3*step), digits)//' '//trim(prefixes(step))//unit
     if (step == 0) text = real_to_text(value, digits)//' '//unit
   end function with_unit
+
+  !> A number of things: `1 point`, `12 points`.
+  pure function counted(number, thing) result(text)
+    integer, intent(in) :: number
+    character(*), intent(in) :: thing  !! in the singular; the plural has an s more
+    character(:), allocatable :: text
+    text = to_text(number)//' '//thing
+    if (number /= 1) text = text//'s'
+  end function counted
 
   !> A line of a summary: a label, its content in a column of its own, a newline.
   pure function labelled_line(label, content) result(text)

@@ -4,7 +4,7 @@
 module pd_family_warnings
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
-  use pd_base_text, only: to_text, with_unit
+  use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_scene_types, only: scene_type
   use pd_body_body, only: body_type
@@ -45,8 +45,8 @@ contains
     call warn_of_joints(scene, body, family, warnings)
   end subroutine warn_of_points
 
-  !> Warn if a body of a 2D or 3D scene has one layer of points only and no neighbour across it: it
-  !> deforms as a chain or a sheet of bonds, not as a plate or a block of its material.
+  !> Warn if a body of a 2D or 3D scene has one layer of points only and no neighbour across it: no
+  !> bond tells of its contraction, and it deforms as if that were prevented.
   subroutine warn_of_thickness(body, family, number, name, warnings)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
@@ -76,8 +76,9 @@ contains
       end do
       if (.not. thin) cycle
       call warnings%add('thin body '//to_text(number)//' '//to_text(c), name// &
-        & ' is one point thick in '//achar(iachar('x') + c - 1)//': its stiffness can be wrong '// &
-        & 'by 21 %; use more points across it, or a scene of fewer dimensions', tell=.false.)
+        & ' is one point thick in '//achar(iachar('x') + c - 1)//': it cannot contract across, '// &
+        & 'and is too stiff in tension by a factor of 1/(1 - nu^2) or more; use more points '// &
+        & 'across it, or a scene of fewer dimensions', tell=.false.)
     end do
   end subroutine warn_of_thickness
 
@@ -152,10 +153,10 @@ contains
     points = points_on(scene%cracks(number), body)
     if (points == 0) return
     call warnings%add('crack through points '//to_text(number), '&crack number '// &
-      & to_text(number)//' runs through '//to_text(points)//' points, which count as lying on '// &
-      & 'one side of it: the cut is not symmetric; shift the crack by half a spacing ('// &
-      & with_unit(minval(body%spacing, mask=body%point > 0)/2, 'm', 4)//') across its plane', &
-      & tell=.false.)
+      & to_text(number)//' runs through '//counted(points, 'point')//'; points on a crack '// &
+      & 'count as lying on one side of it, so that the cut is not symmetric: shift it by half a '// &
+      & 'spacing ('//with_unit(minval(body%spacing, mask=body%point > 0)/2, 'm', 4)// &
+      & ') across its plane', tell=.false.)
   end subroutine warn_of_crack
 
   !> A body as it is told of: by its name, or by its number.

@@ -3,7 +3,7 @@
 !> beside bodies and cracks.
 module pd_output_overview
   use pd_base_kinds, only: wp
-  use pd_base_text, only: line => labelled_line, to_text, with_unit
+  use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
   use pd_scene_types, only: scene_type
   use pd_body_material, only: material_type, energy_from_critical_stretch, never
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
@@ -105,23 +105,23 @@ contains
     text = ''
     do i = 1, size(scene%regions)
       text = text//line('region '//to_text(i), trim(scene%regions(i)%name)//': '// &
-        & to_text(count(region_mask(scene, system%body, scene%regions(i)%name)))//' points')
+        & counted(count(region_mask(scene, system%body, scene%regions(i)%name)), 'point'))
     end do
     do i = 1, size(system%motions)
       associate (group => scene%boundaries(i))
-        text = text//line('boundary '//to_text(i), named(group%name)//to_text(size( &
-          & system%motions(i)%slots))//' points, '//place(group%side, group%region))
+        text = text//line('boundary '//to_text(i), named(group%name)//counted(size( &
+          & system%motions(i)%slots), 'point')//', '//place(group%side, group%region))
       end associate
     end do
     do i = 1, size(system%loads)
       associate (group => scene%loads(i))
-        text = text//line('load '//to_text(i), to_text(size(system%loads(i)%slots))// &
-          & ' points, '//place(group%side, group%region))
+        text = text//line('load '//to_text(i), counted(size(system%loads(i)%slots), &
+          & 'point')//', '//place(group%side, group%region))
       end associate
     end do
     do i = 1, size(scene%no_fail)
       text = text//line('no-fail zone '//to_text(i), &
-        & to_text(count(no_fail_mask(scene, system%body, i)))//' points')
+        & counted(count(no_fail_mask(scene, system%body, i)), 'point'))
     end do
   end function counts
 

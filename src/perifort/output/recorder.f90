@@ -9,7 +9,7 @@ module pd_output_recorder
   use pd_base_numbers, only: pi
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
-  use pd_base_text, only: newline, to_text
+  use pd_base_text, only: counted, newline, to_text
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: point_dilatation, point_energy, reference_dilatation
@@ -624,7 +624,7 @@ contains
     call find_large_strains(system, number, point, stretch)
     if (number == 0) return
     call recorder%warn('strain', 'at t = '//to_text(instant%time)//' s intact bonds of '// &
-      & to_text(number)//' points are strained by more than '//to_text(nint(100*large_strain))// &
+      & counted(number, 'point')//' are strained by more than '//to_text(nint(100*large_strain))// &
       & ' %, the most by '//to_text(100*stretch, 3)//' % (point '//to_text(point)// &
       & '): the material is linear in the strain and not meant for that')
   end subroutine warn_of_strain

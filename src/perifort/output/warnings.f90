@@ -2,7 +2,7 @@
 !> its plan and its conditions. Notes tell what is right and may surprise.
 module pd_output_warnings
   use pd_base_kinds, only: wp
-  use pd_base_text, only: to_text, with_unit
+  use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_scene_types, only: scene_type, is_set
   use pd_scene_warnings, only: warnings_of_scene
@@ -34,8 +34,8 @@ contains
     call warnings_of_scene(scene, edges_of(system%body), warnings)
     call warn_of_points(scene, system%body, system%family, warnings)
     call warn_of_courses(scene, system, plan, warnings)
-    if (isolated > 0) call warnings%add('isolated', to_text(isolated)// &
-      & ' points have no neighbour within the horizon: no bond holds them', tell=.false.)
+    if (isolated > 0) call warnings%add('isolated', counted(isolated, 'point')// &
+      & ' without a neighbour within the horizon: no bond holds them', tell=.false.)
     if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &
       & 'the time step is above the stable one', tell=.false.)
     if (plan%lowest < 0.0_wp) call warnings%add('unstable body', &

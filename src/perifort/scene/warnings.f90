@@ -44,8 +44,8 @@ contains
     end associate
     if (scene%time%method == 'relaxation') then
       call warn_of_keys('time', [character(20) :: 'integrator', 'step', 'safety', 'steps', &
-        & 'duration', 'breaking'], .true., "with method = 'relaxation'; "// &
-        & '&relaxation has its settings')
+        & 'duration', 'breaking'], .true., &
+        & "with method = 'relaxation'; &relaxation has its settings")
     else
       call warn_of_keys('relaxation', [character(20) :: 'density_matrix', 'safety', 'tolerance', &
         & 'maximum_iterations', 'load_steps'], .true., "with &time method = 'explicit'")
