@@ -565,8 +565,8 @@ contains
   end subroutine test_unconverged
 
   !> A piece that a crack has parted from its support, pulled away: no equilibrium, which is said
-  !> before the first iteration. A load beyond anything: none either. Both end in words, and not with
-  !> NaN.
+  !> before the first iteration. A load beyond anything: none either. Both end in words, and not
+  !> with NaN.
   subroutine test_no_rest(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

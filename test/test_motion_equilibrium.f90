@@ -105,9 +105,9 @@ contains
     end if
   end subroutine relax
 
-  !> A slender strip bears 1 N across its end, whether its foot stays or is moved by 1 mm (2000 times
-  !> what the load does) or by its length: the reaction is the load (statics), and the end moves by
-  !> as much beside the foot. Both to 1e-3, as promised at the default tolerance.
+  !> A slender strip bears 1 N across its end, whether its foot stays or is moved by 1 mm (2000
+  !> times what the load does) or by its length: the reaction is the load (statics), and the end
+  !> moves by as much beside the foot. Both to 1e-3, as promised at the default tolerance.
   subroutine test_moved(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: moves(3) = [0.0_wp, 1.0e-3_wp, 24*spacing]
@@ -218,7 +218,8 @@ contains
             & 'the plate, '//trim(solvers(s)))
         end do
       end associate
-      call expect_true(error, listener%iterations <= 50 .and. listener%settled == 1, 'iterations '//trim(solvers(s)))
+      call expect_true(error, listener%iterations <= 50 .and. listener%settled == 1, &
+        & 'iterations '//trim(solvers(s)))
     end do
   end subroutine test_turned
 
@@ -292,8 +293,8 @@ contains
     end do
   end subroutine test_loose
 
-  !> A strip that is pulled beyond its strength tears, and its loaded end can go nowhere: status 3, and
-  !> it is said which piece, after few iterations. With `loaded` = 0 nothing pulls the piece.
+  !> A strip that is pulled beyond its strength tears, and its loaded end can go nowhere: status 3,
+  !> and it is said which piece, after few iterations.
   subroutine test_torn_off(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -318,8 +319,8 @@ contains
     end do
   end subroutine test_torn_off
 
-  !> A strip is drawn apart by its ends in three load steps and tears: each half is carried by its end
-  !> without strain, and the run goes on to its last load step.
+  !> A strip is drawn apart by its ends in three load steps and tears: each half is carried by its
+  !> end without strain, and the run goes on to its last load step.
   subroutine test_goes_on(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -350,9 +351,8 @@ contains
     end do
   end subroutine test_goes_on
 
-  !> A strip whose lower half is heated curls, unsupported, in the plane and in space: the state that
-  !> is left has the residual that was asked for, no mean rotation, and the strain energy of its
-  !> displacements turned by any angle, which for the unprojected dilatation doesn't depend on it.
+  !> A strip whose lower half is heated curls, unsupported, in the plane and in space: the state
+  !> that is left has the residual that was asked for, and no mean displacement or rotation.
   subroutine test_curl(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

@@ -47,8 +47,8 @@ module pd_motion_relaxation
 
 contains
 
-  !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if its
-  !> memory says that it has begun, it goes on from there.
+  !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if
+  !> its memory says that it has begun, it goes on from there.
   subroutine run_relaxation(system, relaxation, observer, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation

@@ -1,5 +1,5 @@
-!> What both ways to static equilibrium share: how to relax, and the norm of the force that is out of
-!> balance.
+!> What both ways to static equilibrium share: how to relax, and the norm of the force that is out
+!> of balance.
 module pd_motion_residual
   use pd_base_kinds, only: wp, i1
   use pd_motion_system, only: system_type

@@ -247,8 +247,8 @@ contains
   !> Take the mean motion out of displacements `u` (n_slots, dim) [m] where nothing holds it,
   !> without straining anything: a piece without any constraint is moved and turned back as a rigid
   !> body until its mean displacement and mean rotation vanish (the best fit to where its points
-  !> were in the least squares of volume). Of a piece that is held in part, and of all pieces without
-  !> `turning`, a free translation is taken back, and a free rotation left as it is.
+  !> were in the least squares of volume). Of a piece that is held in part, and of all pieces
+  !> without `turning`, a free translation is taken back, and a free rotation left as it is.
   subroutine turn_back(system, rigid, turning, u)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
@@ -326,7 +326,8 @@ contains
 
   !> Move a piece as a rigid body on from displacements `u` so that it comes as near as it can to
   !> `target` (n_slots, dim) [m] in the least squares of `weight` (n_slots, dim), by Newton's
-  !> iterations on the finite motion, to the last digit of what is left of the displacements. Motions that no weighted component sees are left alone.
+  !> iterations on the finite motion, to the last digit of what is left of the displacements.
+  !> Motions that no weighted component sees are left alone.
   subroutine fit_rigid_motion(system, rigid, p, target, weight, u)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid

@@ -1,6 +1,6 @@
-!> The way of a relaxation to equilibrium, `iterations.csv`: a line for each iteration that is looked
-!> at. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes on, and
-!> adds to them.
+!> The way of a relaxation to equilibrium, `iterations.csv`: a line for each iteration that is
+!> looked at. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes
+!> on, and adds to them.
 module pd_output_iterations
   use pd_base_error, only: error_type
   use pd_base_kinds, only: i8
@@ -12,7 +12,8 @@ module pd_output_iterations
   private
   public :: iterations_type
 
-  character(*), parameter :: head = 'step,load_step,time,iteration,solver,residual,change,broken_bonds'
+  character(*), &
+    & parameter :: head = 'step,load_step,time,iteration,solver,residual,change,broken_bonds'
 
   type :: iterations_type
     private
