@@ -218,7 +218,8 @@ contains
             & 'the plate, '//trim(solvers(s)))
         end do
       end associate
-      call expect_true(error, listener%iterations <= 50 .and. listener%settled == 1, 'iterations '//trim(solvers(s)))
+      call expect_true(error, listener%iterations <= 50 .and. listener%settled == 1, &
+        & 'iterations '//trim(solvers(s)))
     end do
   end subroutine test_turned
 
@@ -293,7 +294,7 @@ contains
   end subroutine test_loose
 
   !> A strip that is pulled beyond its strength tears, and its loaded end can go nowhere: status 3,
-  !> and it is said which piece, after few iterations. With `loaded` = 0 nothing pulls the piece.
+  !> and it is said which piece, after few iterations.
   subroutine test_torn_off(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -351,9 +352,7 @@ contains
   end subroutine test_goes_on
 
   !> A strip whose lower half is heated curls, unsupported, in the plane and in space: the state
-  !> that is left has the residual that was asked for, no mean rotation, and the strain energy of
-  !> its displacements turned by any angle, which for the unprojected dilatation doesn't depend on
-  !> it.
+  !> that is left has the residual that was asked for, and no mean displacement or rotation.
   subroutine test_curl(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

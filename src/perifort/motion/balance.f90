@@ -1,5 +1,6 @@
-!> Whether a state is in static equilibrium, piece by piece (doc/theory.md, 7): what is out of balance
-!> beside what acts, whether reactions and loads balance, and how far the displacements may be off.
+!> Whether a state is in static equilibrium, piece by piece (doc/theory.md, 7): what is out of
+!> balance beside what acts, whether reactions and loads balance, and how far the displacements may
+!> be off.
 module pd_motion_balance
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: error_type, fail, status_no_answer
@@ -38,7 +39,7 @@ module pd_motion_balance
     type(tally_type), allocatable :: piece(:)
     real(wp), allocatable :: thermal(:)         !! as in `tally_type`
     real(wp), allocatable :: thermal_energy(:)  !! twice the energy of the undeformed body, heated
-    real(wp) :: acting = 0.0_wp                 !! squared norm of loads or thermal forces, all pieces
+    real(wp) :: acting = 0.0_wp  !! squared norm of loads or thermal forces, all pieces
   end type balance_type
 
   !> Share of the largest net force, and moment, that reactions and loads may leave over.
@@ -254,8 +255,8 @@ contains
     balanced = norm2(piece%left) <= force .and. norm2(piece%moment) <= moment
   end function piece_balanced
 
-  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how far
-  !> off its displacements are.
+  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how
+  !> far off its displacements are.
   pure logical function balanced_but_for_error(relaxation, rigid, balance) result(balanced)
     type(relaxation_type), intent(in) :: relaxation
     type(rigid_type), intent(in) :: rigid
@@ -396,11 +397,13 @@ contains
     associate (tally => balance%piece(piece))
       text = piece_text(system%body, rigid%pieces, piece)//' has '// &
         & to_text(sqrt(tally%residual), 3)//' N out of balance, most of it at point '// &
-        & to_text(int(system%body%point(at)))//' at ('//place(system, at)//'); its supports bear '// &
+        & to_text(int(system%body%point(at)))//' at ('//place(system, at)// &
+          & '); its supports bear '// &
         & to_text(sqrt(tally%support), 3)//' N, its loads are '//to_text(sqrt(tally%load), 3)// &
         & ' N (root sums of squares over the points), and together they leave a force of ('// &
         & vector(tally%left(:system%body%dim))//') N'
-      if (system%body%dim == 2) text = text//' and a moment of '//to_text(tally%moment(3), 3)//' N m'
+      if (system%body%dim == 2) text = text//' and a moment of '//to_text(tally%moment(3), 3)// &
+        & ' N m'
       if (system%body%dim == 3) text = text//' and a moment of ('//vector(tally%moment)//') N m'
     end associate
   end function describe_left_over

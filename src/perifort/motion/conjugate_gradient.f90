@@ -135,7 +135,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. balance%acting < largest_reference) call fail(error, 'no static equilibrium: the '// &
-      & 'loads or thermal forces of '//to_text(sqrt(balance%acting), 3)//' N (root sum of squares '// &
+      & 'loads or thermal forces of '//to_text(sqrt(balance%acting), 3)// &
+        & ' N (root sum of squares '// &
       & 'over the points) are so large that energies overflow', status_no_answer)
   end subroutine check_loads
 

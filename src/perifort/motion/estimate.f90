@@ -1,5 +1,5 @@
-!> How far the displacements of a state are from equilibrium, which its residual alone does not tell:
-!> a slender beam, or a stiff block on a soft pad, has a small residual long before.
+!> How far the displacements of a state are from equilibrium, which its residual alone does not
+!> tell: a slender beam, or a stiff block on a soft pad, has a small residual long before.
 module pd_motion_estimate
   use pd_base_kinds, only: wp, i1
   use pd_motion_krylov, only: make_room, linearise, take_residual, first_direction, &

@@ -104,8 +104,9 @@ contains
       & call rescale(krylov, direction_size*system%family%rule%delta/largest)
   end subroutine next_direction
 
-  !> Note that the iteration under way goes so far along its direction that the `curvature` (direction
-  !> . stiffness . direction) asks for. The lengths make the Cholesky factor of the tridiagonal matrix
+  !> Note that the iteration under way goes so far along its direction that the `curvature`
+  !> (direction . stiffness . direction) asks for. The lengths make the Cholesky factor of the
+  !> tridiagonal matrix
   !> that the iterations have projected the preconditioned stiffness to; the norm of its inverse is
   !> estimated by a column at a time (Duff and Voemel, BIT 42 (2002); Meurant and Tichy, Numer.
   !> Algorithms 82 (2019)). It never exceeds the true one, and soon comes near it.

@@ -164,7 +164,8 @@ contains
       end associate
     end do
     if (loose == 0) return
-    text = to_text(points)//' points torn off in '//to_text(loose)//' piece(s) can move freely ('// &
+    text = to_text(points)//' points torn off in '//to_text(loose)// &
+      & ' piece(s) can move freely ('// &
       & piece_text(system%body, rigid%pieces, first)
     if (loose > 1) text = text//' is the first'
     text = text//'): without a load they stay in their mean place, without strain'

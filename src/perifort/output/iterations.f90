@@ -12,7 +12,8 @@ module pd_output_iterations
   private
   public :: iterations_type
 
-  character(*), parameter :: head = 'step,load_step,time,iteration,solver,residual,change,broken_bonds'
+  character(*), &
+    & parameter :: head = 'step,load_step,time,iteration,solver,residual,change,broken_bonds'
 
   type :: iterations_type
     private

@@ -224,7 +224,8 @@ contains
     end if
     if (observer%schedule%relaxation .and. .not. instant%settled .and. &
       & mod(instant%step, observer%schedule%history_every) == 0) then
-      call observer%results%add_iteration(iteration_line(system, instant), observer%first_step, error)
+      call observer%results%add_iteration(iteration_line(system, instant), observer%first_step, &
+        & error)
       if (allocated(error)) return
     end if
     may_stop = .not. instant%last
