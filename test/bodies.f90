@@ -10,6 +10,7 @@ module bodies
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
   use pd_scene_types, only: scene_type, name_length
+  use comparisons, only: expect => close_number, text_of
   use testdrive, only: error_type, test_failed
   implicit none (type, external)
   private
@@ -88,18 +89,6 @@ contains
     call ready(scene, set_up, error)
   end subroutine ready_alone
 
-  !> Fail unless |actual - expected| <= tolerance; a failure that stands is kept.
-  subroutine expect(error, actual, expected, tolerance, what)
-    type(error_type), allocatable, intent(inout) :: error
-    real(wp), intent(in) :: actual, expected, tolerance
-    character(*), intent(in) :: what
-
-    if (allocated(error)) return
-    if (abs(actual - expected) <= tolerance) return
-    call test_failed(error, what//': '//text_of(actual)//', expected '//text_of(expected)// &
-      & ' within '//text_of(tolerance))
-  end subroutine expect
-
   !> Fail unless it is so; a failure that stands is kept.
   subroutine expect_true(error, is_so, what)
     type(error_type), allocatable, intent(inout) :: error
@@ -109,16 +98,6 @@ contains
     if (allocated(error)) return
     if (.not. is_so) call test_failed(error, what)
   end subroutine expect_true
-
-  !> A number as text.
-  function text_of(value) result(text)
-    real(wp), intent(in) :: value
-    character(:), allocatable :: text
-    character(24) :: buffer
-
-    write (buffer, '(es24.15e3)') value
-    text = trim(adjustl(buffer))
-  end function text_of
 
   !> Displacements of all points: a given gradient and a random part, its components up to `size`
   !> [m].

@@ -12,6 +12,7 @@ module test_base_threads
   use pd_output_files, only: make_directory, remove_file
   use pd_output_sink, only: sink_type
   use pd_scene_types, only: scene_type
+  use comparisons, only: max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, expect_true
   implicit none (type, external)
@@ -212,7 +213,7 @@ contains
     if (allocated(fault)) then
       call test_failed(error, fault%message)
     else
-      call expect_true(error, maxval(abs(u)) > 0.0_wp .and. &
+      call expect_true(error, max_abs(u) > 0.0_wp .and. &
         & all(abs(u - set_up%system%state%u) <= 0.0_wp), 'other bits')
     end if
   end subroutine test_bits

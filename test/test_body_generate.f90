@@ -6,6 +6,7 @@ module test_body_generate
   use pd_body_generate, only: generate_body
   use pd_body_layers, only: layer_rows
   use pd_scene_types, only: scene_type, body_group, boundary_group
+  use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect, expect_true
   implicit none (type, external)
@@ -52,7 +53,7 @@ contains
             n = n + 1
             associate (place => 7 + ([i, j, k] - 0.5_wp)*0.25_wp)
               ! sums of small binary fractions are exact
-              call expect(error, maxval(abs(body%x(n, :) - place(:dim))), 0.0_wp, 0.0_wp, &
+              call expect_close(error, body%x(n, :), place(:dim), 0.0_wp, &
                 & 'position')
             end associate
           end do
@@ -150,7 +151,7 @@ contains
     end if
     call expect_true(error, body%n_points == 2, 'points of the cloud')
     if (allocated(error)) return
-    call expect(error, maxval(abs(body%x(2, :) - [1.0_wp, 0.25_wp])), 0.0_wp, 0.0_wp, 'position')
+    call expect_close(error, body%x(2, :), [1.0_wp, 0.25_wp], 0.0_wp, 'position')
     call expect(error, body%volume(2), 8.0e-3_wp, 0.0_wp, 'volume')
     call expect(error, body%spacing(1), 1.0_wp, 1.0e-15_wp, 'spacing of the first')
     call expect(error, body%spacing(2), 2.0_wp, 1.0e-15_wp, 'spacing of the second')
@@ -238,13 +239,13 @@ contains
     if (allocated(error)) return
     call expect_true(error, all(body%layer(:20) == 0) .and. all(body%layer(21:35) == 1) &
       & .and. all(body%layer(36:) == 3), 'layers are numbered by their groups')
-    call expect(error, maxval(abs(body%x(21, :) - [0.5_wp, 4.5_wp])), 0.0_wp, 0.0_wp, &
+    call expect_close(error, body%x(21, :), [0.5_wp, 4.5_wp], 0.0_wp, &
       & 'first of the top')
-    call expect(error, maxval(abs(body%x(35, :) - [4.5_wp, 6.5_wp])), 0.0_wp, 0.0_wp, &
+    call expect_close(error, body%x(35, :), [4.5_wp, 6.5_wp], 0.0_wp, &
       & 'last of the top')
-    call expect(error, maxval(abs(body%x(36, :) - [-2.5_wp, 0.5_wp])), 0.0_wp, 0.0_wp, &
+    call expect_close(error, body%x(36, :), [-2.5_wp, 0.5_wp], 0.0_wp, &
       & 'first at the left')
-    call expect(error, maxval(abs(body%x(47, :) - [-0.5_wp, 3.5_wp])), 0.0_wp, 0.0_wp, &
+    call expect_close(error, body%x(47, :), [-0.5_wp, 3.5_wp], 0.0_wp, &
       & 'last at the left')
     call expect_true(error, all(body%material == 1) .and. all(body%body == 1) .and. &
       & all(body%grid == body%grid(1)), 'a layer continues its body')

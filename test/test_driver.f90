@@ -12,6 +12,7 @@ module test_driver
   use pd_scene_file, only: line_type, read_text_file, split_lines
   use pd_scene_types, only: scene_type
   use pd_scene_write, only: scene_text
+  use comparisons, only: expect_close
   use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
   use bodies, only: box_scene, density_of_steel, expect, expect_true, text_of
   implicit none (type, external)
@@ -133,7 +134,7 @@ contains
     if (allocated(error)) return
     call check(error, size(column), size(expected), 'rows of '//name)
     if (allocated(error)) return
-    call expect(error, maxval(abs(column - expected)), 0.0_wp, tolerance, name)
+    call expect_close(error, column, expected, tolerance, name)
   end subroutine expect_column
 
   !> The lines of a text file.
@@ -193,12 +194,12 @@ contains
     call read_rows(file, '/VTKHDF/Steps/Values', 0_i8, at, fault)
     if (.not. allocated(error)) call check(error, int(n), size(outputs), 'outputs')
     if (.not. allocated(error)) then
-      call expect(error, maxval(abs(at - outputs)), 0.0_wp, 1.0e-18_wp, 'times of outputs')
+      call expect_close(error, at, outputs, 1.0e-18_wp, 'times of outputs')
       do k = 1, size(outputs)
         call read_rows(file, '/VTKHDF/PointData/displacement', (k - 1)*30_i8, u, fault)
-        call expect(error, maxval(abs(u(1, :) - 3*outputs(k))), 0.0_wp, 1.0e-17_wp, 'u_x')
-        call expect(error, maxval(abs(u(2, :) + 2*outputs(k))), 0.0_wp, 1.0e-17_wp, 'u_y')
-        call expect(error, maxval(abs(u(3, :))), 0.0_wp, 0.0_wp, 'u_z')
+        call expect_close(error, u(1, :), 3*outputs(k), 1.0e-17_wp, 'u_x')
+        call expect_close(error, u(2, :) + 2*outputs(k), 0.0_wp, 1.0e-17_wp, 'u_y')
+        call expect_close(error, u(3, :), 0.0_wp, 0.0_wp, 'u_z')
       end do
       call expect_true(error, object_exists(file, '/points/region_left') .and. &
         & object_exists(file, '/VTKHDF/PointData/velocity') .and. &

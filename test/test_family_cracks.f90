@@ -5,6 +5,7 @@ module test_family_cracks
   use pd_driver, only: set_up_type
   use pd_family_cracks, only: crack_type, crosses, new_crack
   use pd_scene_types, only: scene_type, crack_group
+  use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: at_point, box_scene, expect, expect_true, ready, rotation_matrix
   implicit none (type, external)
@@ -305,8 +306,8 @@ contains
     if (allocated(error)) return
     call expect_true(error, once%cut > 0 .and. once%cut == twice%cut, &
       & 'bonds cut by two cracks in one place')
-    call expect(error, maxval(abs(once%system%state%damage - twice%system%state%damage)), &
-      & 0.0_wp, 0.0_wp, 'damage')
+    call expect_close(error, once%system%state%damage, twice%system%state%damage, &
+      & 0.0_wp, 'damage')
   end subroutine test_twice
 
 end module test_family_cracks

@@ -19,6 +19,7 @@ module test_family_lattice
   use pd_output_files, only: make_directory
   use pd_output_sink, only: sink_type
   use pd_scene_types, only: scene_type
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, diary_type, expect, expect_true, noise, ready, shake, &
     & youngs_modulus
@@ -287,8 +288,8 @@ contains
       end do
       if (run == 1) first = u
     end do
-    call expect_true(error, maxval(abs(u)) > 1.0e-3_wp*spacing, 'nothing moved')
-    call expect(error, maxval(abs(u - first)), 0.0_wp, 1.0e-12_wp*maxval(abs(u)), &
+    call expect_true(error, max_abs(u) > 1.0e-3_wp*spacing, 'nothing moved')
+    call expect_close(error, u, first, 1.0e-12_wp*max_abs(u), &
       & 'displacements by lattices and lists')
   end subroutine test_motion
 
@@ -392,9 +393,9 @@ contains
       call shake(subject%body, some_gradient(strains(i)), 0.3_wp*strains(i)*spacing, 7, u)
       call fast_force(subject, u, force, p)
       call reference_force(subject%family, subject%model, u, expected)
-      call expect_true(error, maxval(abs(expected)) > 0.0_wp, 'no force: '//what)
-      call expect(error, maxval(abs(force - expected)), 0.0_wp, &
-        & 1.0e-12_wp*maxval(abs(expected)), 'force: '//what)
+      call expect_true(error, max_abs(expected) > 0.0_wp, 'no force: '//what)
+      call expect_close(error, force, expected, &
+        & 1.0e-12_wp*max_abs(expected), 'force: '//what)
     end do
   end subroutine expect_theory
 
@@ -473,9 +474,9 @@ contains
         & 10*broken < 9*subject%family%n_bonds/2, 'too few bonds broke, or too many')
       call expect_true(error, broken == broken_before, 'numbers of broken bonds')
       call expect(error, dissipated, dissipated_before, 1.0e-12_wp*dissipated, 'dissipated')
-      call expect(error, maxval(abs(ordered(:, :3) - first(:, :3))), 0.0_wp, &
-        & 1.0e-12_wp*maxval(abs(first(:, :3))), 'forces of lattices and lists')
-      call expect(error, maxval(abs(ordered(:, 4) - first(:, 4))), 0.0_wp, 1.0e-12_wp, 'damage')
+      call expect_close(error, ordered(:, :3), first(:, :3), &
+        & 1.0e-12_wp*max_abs(first(:, :3)), 'forces of lattices and lists')
+      call expect_close(error, ordered(:, 4), first(:, 4), 1.0e-12_wp, 'damage')
       select type (family => subject%family)
       type is (lattice_family_type)
         do w = 1, family%words

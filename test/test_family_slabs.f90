@@ -8,6 +8,7 @@ module test_family_slabs
   use pd_force_reference, only: reference_force
   use pd_motion_system, only: system_type
   use pd_scene_types, only: scene_type
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, expect, expect_true, ready, shake, text_of
   use force_subjects, only: some_gradient
@@ -159,8 +160,8 @@ contains
               & 'no slot, or every one, is strained')
           end if
           ! differences of equal bits are exactly zero
-          call expect(error, maxval(abs(system%state%force - force)), 0.0_wp, 0.0_wp, 'force')
-          call expect(error, maxval(abs(system%state%p - p)), 0.0_wp, 0.0_wp, 'dilatation')
+          call expect_close(error, system%state%force, force, 0.0_wp, 'force')
+          call expect_close(error, system%state%p, p, 0.0_wp, 'dilatation')
           call expect_true(error, all(system%strained == strained), 'marks')
         end do
       end associate
@@ -194,8 +195,8 @@ contains
           call both_passes(system)
           allocate (f_ref, mold=system%state%force)
           call reference_force(system%family, system%model, system%state%u, f_ref)
-          call expect(error, maxval(abs(system%state%force - f_ref)), 0.0_wp, &
-            & 1.0e-12_wp*maxval(abs(f_ref)), 'force')
+          call expect_close(error, system%state%force, f_ref, &
+            & 1.0e-12_wp*max_abs(f_ref), 'force')
           deallocate (f_ref)
         end do
       end associate

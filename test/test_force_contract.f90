@@ -13,6 +13,7 @@ module test_force_contract
   use pd_force_model, only: model_type
   use pd_force_polynomial, only: fast_limit, fast_ranges, narrow, wide, single
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: expect, expect_true, rotation_matrix, shake, text_of
   use force_subjects, only: subject_type, kinds, tolerance, spacing, build, build_pair, &
@@ -69,22 +70,22 @@ contains
             & 3 + number, u)
           call fast_force(subject, u, force, p)
           call reference_force(subject%family, subject%model, u, f_ref)
-          largest = maxval(abs(f_ref))
+          largest = max_abs(f_ref)
           call expect_true(error, largest > 0.0_wp, 'no force: '//name_of(subject, number))
-          call expect(error, maxval(abs(force - f_ref)), 0.0_wp, &
+          call expect_close(error, force, f_ref, &
             & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*largest, 'force, '//name_of(subject, &
             & number))
           if (subject%model%dilatation) then
             call reference_dilatation(subject%family, subject%model, u, theta)
             theta = theta*subject%model%materials(subject%model%material)%p
-            call expect(error, maxval(abs(p - theta)), 0.0_wp, &
-              & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*maxval(abs(theta)), 'dilatation, &
+            call expect_close(error, p, theta, &
+              & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*max_abs(theta), 'dilatation, &
               & '//name_of(subject, number))
           end if
           call energy_pass(subject%family, subject%model, u, w)
           call reference_energy(subject%family, subject%model, u, w_ref)
-          call expect(error, maxval(abs(w - w_ref)), 0.0_wp, &
-            & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-7_wp)*maxval(abs(w_ref)), 'energy, &
+          call expect_close(error, w, w_ref, &
+            & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-7_wp)*max_abs(w_ref), 'energy, &
             & '//name_of(subject, number))
         end do
         if (allocated(error)) return
@@ -132,13 +133,13 @@ contains
             end do
             call fast_force(subject, u, force, p)
             call reference_force(subject%family, subject%model, u, f_ref)
-            call expect_true(error, all(abs(force - f_ref) <= 1.0e-11_wp*maxval(abs(f_ref))), &
+            call expect_true(error, all(abs(force - f_ref) <= 1.0e-11_wp*max_abs(f_ref)), &
               & 'force of a turned body, '//name_of(subject, number)//', degrees ' &
               & //text_of(degrees(a)))
             if (subject%model%dilatation) then
               call reference_dilatation(subject%family, subject%model, u, theta)
               theta = theta*subject%model%materials(subject%model%material)%p
-              call expect_true(error, all(abs(p - theta) <= 1.0e-11_wp*maxval(abs(theta))), &
+              call expect_true(error, all(abs(p - theta) <= 1.0e-11_wp*max_abs(theta)), &
                 & 'dilatation of a turned body, '//name_of(subject, number))
             end if
           end do
@@ -182,10 +183,10 @@ contains
           applied = applied + sum(abs(f))
         end do
         arm = 20*spacing
-        call expect(error, maxval(abs(net)), 0.0_wp, tolerance(kinds(kind), 1.0e-13_wp, &
+        call expect_close(error, net, 0.0_wp, tolerance(kinds(kind), 1.0e-13_wp, &
           & 1.0e-7_wp)*applied, &
           & 'net force, '//name_of(subject, number))
-        call expect(error, maxval(abs(moment)), 0.0_wp, &
+        call expect_close(error, moment, 0.0_wp, &
           & tolerance(kinds(kind), 1.0e-13_wp, 1.0e-7_wp)*applied*arm, &
           & 'net moment, '//name_of(subject, number))
         if (allocated(error)) return
@@ -220,13 +221,13 @@ contains
           u(k, :) = subject%body%x(k, :)*merge(1.0_wp, 0.0_wp, subject%body%point(k) > 0)
         end do
         call fast_force(subject, u, force, p)
-        unit_force = maxval(abs(force))
+        unit_force = max_abs(force)
         u = 0.0_wp
         do k = 1, subject%body%n_slots
           if (subject%body%point(k) > 0) u(k, :) = far(:subject%dim)
         end do
         call fast_force(subject, u, force, p)
-        call expect(error, maxval(abs(force)), 0.0_wp, 0.0_wp, 'translation, '//name_of(subject, &
+        call expect_close(error, force, 0.0_wp, 0.0_wp, 'translation, '//name_of(subject, &
           & number))
         do a = 1, size(degrees)
           if (subject%dim == 1) exit
@@ -239,7 +240,7 @@ contains
               & :)) - subject%body%x(k, :)
           end do
           call fast_force(subject, u, force, p)
-          call expect(error, maxval(abs(force)), 0.0_wp, tolerance(kinds(kind), &
+          call expect_close(error, force, 0.0_wp, tolerance(kinds(kind), &
             & 300*epsilon(1.0_wp), 10*real(epsilon(1.0_sp), wp))*unit_force, &
             & 'rotation, '//name_of(subject, number)//', degrees '//text_of(degrees(a)))
         end do
@@ -277,7 +278,7 @@ contains
           allocate (u(subject%body%n_slots, dim))
           call shake(subject%body, some_gradient(strains(way)), strains(way)*spacing, 21, u)
           call fast_force(subject, u, force, p)
-          largest = maxval(abs(force))*maxval(subject%body%volume)
+          largest = max_abs(force)*maxval(subject%body%volume)
           h = 1.0e-5_wp*spacing
           do i = 1, size(chosen)
             k = subject%body%slot(chosen(i))
@@ -347,8 +348,8 @@ contains
           call fast_force(subject, image, mirrored, p)
           do i = 1, body%n_points
             k = body%slot(i)
-            call expect(error, maxval(abs(mirrored(partner(k), :) + force(k, :))), 0.0_wp, &
-              & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*maxval(abs(force)), 'mirror image, &
+            call expect_close(error, mirrored(partner(k), :) + force(k, :), 0.0_wp, &
+              & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*max_abs(force), 'mirror image, &
               & '//name_of(subject, i))
           end do
         end associate
@@ -438,7 +439,7 @@ contains
             & //name_of(subject, way))
           call expect_true(error, all(abs(w) < 1.0e30_wp) .and. sum(w) > 0.0_wp, &
             & 'energy of crushed bonds, '//name_of(subject, way))
-          if (way == 1) call expect(error, maxval(abs(force)), 0.0_wp, 0.0_wp, &
+          if (way == 1) call expect_close(error, force, 0.0_wp, 0.0_wp, &
             & 'bonds without direction pull nowhere, '//name_of(subject, way))
         end do
         if (allocated(error)) return
@@ -481,7 +482,7 @@ contains
         call expect(error, real(broken, wp), real(broken_by_definition(subject, u), wp), 0.0_wp, &
           & 'broken bonds, '//name_of(subject, 0))
         call damage_of(subject%body, subject%family, again)
-        call expect(error, maxval(abs(damage - again)), 0.0_wp, 0.0_wp, 'damage, ' &
+        call expect_close(error, damage, again, 0.0_wp, 'damage, ' &
           & //name_of(subject, 0))
         ! a second look at the same state finds nothing more
         call mark(subject, u, strained)
@@ -565,9 +566,9 @@ contains
             p_first = p
           end if
           ! differences of equal bits are exactly zero
-          call expect(error, maxval(abs(force - first)), 0.0_wp, 0.0_wp, 'force, ' &
+          call expect_close(error, force, first, 0.0_wp, 'force, ' &
             & //name_of(subject, threads(t)))
-          call expect(error, maxval(abs(p - p_first)), 0.0_wp, 0.0_wp, 'dilatation, ' &
+          call expect_close(error, p, p_first, 0.0_wp, 'dilatation, ' &
             & //name_of(subject, threads(t)))
         end do
       end do

@@ -12,6 +12,7 @@ module test_force_frame
   use pd_motion_explicit, only: run_explicit
   use pd_output_rotation, only: turned_part, rotation_angle
   use pd_scene_types, only: scene_type
+  use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, diary_type, expect, expect_true, ready_alone, rotation_matrix, &
     & shake, text_of
@@ -88,7 +89,7 @@ contains
           end associate
           call shake(subject%body, identity(), 0.0_wp, 1, u)
           call fast_force(subject, u, force, p)
-          unit_force = maxval(abs(force))
+          unit_force = max_abs(force)
           call energy_pass(subject%family, subject%model, u, w)
           unit_energy = maxval(w)
           do i = 1, size(strains)
@@ -140,11 +141,11 @@ contains
       call fast_force(subject, u, force, p)
       call turn(subject, rotation_matrix(axis_of(2), pi/2), u, turned)
       call fast_force(subject, turned, force, p_turned)
-      call expect_true(error, all(abs(p_turned) <= 2*strain*maxval(abs(p))), 'at 90 degrees, ' &
+      call expect_true(error, all(abs(p_turned) <= 2*strain*max_abs(p)), 'at 90 degrees, ' &
         & //trim(kinds(kind)))
       call turn(subject, rotation_matrix(axis_of(2), pi/3), u, turned)
       call fast_force(subject, turned, force, p_turned)
-      call expect_true(error, all(abs(p_turned - p/2) <= 2*strain*maxval(abs(p))), &
+      call expect_true(error, all(abs(p_turned - p/2) <= 2*strain*max_abs(p)), &
         & 'at 60 degrees, '//trim(kinds(kind)))
     end do
   end subroutine test_projected
@@ -184,9 +185,9 @@ contains
           allowed = 5.0e-7_wp*(1 + abs(lengths(i))/10)
           ! in double, eps |u|/|xi| of the strain, and roundings
           if (dim == 1) allowed = 1.0e-12_wp + 4*epsilon(1.0_wp)*11*abs(lengths(i))/1.0e-5_wp
-          call expect_true(error, all(abs(force - f_ref) <= allowed*maxval(abs(f_ref))), 'force, ' &
+          call expect_true(error, all(abs(force - f_ref) <= allowed*max_abs(f_ref)), 'force, ' &
             & //name_of(subject, way)//', lengths away '//text_of(lengths(i))//', off by ' &
-            & //text_of(maxval(abs(force - f_ref))/maxval(abs(f_ref))))
+            & //text_of(max_abs(force - f_ref)/max_abs(f_ref)))
         end do
         if (allocated(error)) return
       end do

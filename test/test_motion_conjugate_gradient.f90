@@ -10,6 +10,7 @@ module test_motion_conjugate_gradient
   use pd_motion_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, add_loads
   use pd_scene_types, only: scene_type
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: at_point, box_scene, expect, expect_true, noise, ready, youngs_modulus
   implicit none (type, external)
@@ -260,8 +261,8 @@ contains
       found = set_up%system%state%u
       call direct(set_up%system, 1.0_wp, u, error)
       if (allocated(error)) return
-      call expect_true(error, maxval(abs(u)) > 1.0e-16_wp, 'nothing moved: '//name)
-      call expect(error, maxval(abs(found - u)), 0.0_wp, 1.0e-8_wp*maxval(abs(u)), name)
+      call expect_true(error, max_abs(u) > 1.0e-16_wp, 'nothing moved: '//name)
+      call expect_close(error, found, u, 1.0e-8_wp*max_abs(u), name)
       call expect_true(error, witness%gave_way == 0 .and. witness%settled == 1 .and. &
         & witness%falls, 'the way to rest: '//name)
     end do
@@ -343,13 +344,13 @@ contains
       state = 4711
       do k = 1, system%body%n_slots
         if (system%held(k, 1) == 0_i1 .and. system%body%point(k) > 0) &
-          & system%state%u(k, :) = wanted(k, :) + 0.2_wp*spacing*maxval(abs(H)) &
+          & system%state%u(k, :) = wanted(k, :) + 0.2_wp*spacing*max_abs(H) &
           & *[noise(state), noise(state)]
       end do
       call run_relaxation(system, set_up%plan%relaxation, witness, fault)
       if (allocated(fault)) call test_failed(error, fault%message)
-      call expect(error, maxval(abs(system%state%u - wanted)), 0.0_wp, &
-        & 1.0e-8_wp*maxval(abs(wanted)), 'a uniform field')
+      call expect_close(error, system%state%u, wanted, &
+        & 1.0e-8_wp*max_abs(wanted), 'a uniform field')
       call expect_true(error, witness%gave_way == 0, 'the conjugate gradient gave way')
     end associate
   end subroutine one_uniform
@@ -402,8 +403,8 @@ contains
       scene%relaxation%solver = 'dynamic_relaxation'
       call relax(scene, set_up, witness, error)
       if (allocated(error)) return
-      call expect(error, maxval(abs(found - set_up%system%state%u)), 0.0_wp, &
-        & 1.0e-5_wp*maxval(abs(found)), name)
+      call expect_close(error, found, set_up%system%state%u, &
+        & 1.0e-5_wp*max_abs(found), name)
     end do
   end subroutine test_same_rest
 
@@ -439,7 +440,7 @@ contains
     call relax(scene, set_up, witness, error)
     if (allocated(error)) return
     call expect_true(error, set_up%system%broken == broken, 'number of broken bonds')
-    call expect(error, maxval(abs(set_up%system%state%damage - damage)), 0.0_wp, 0.0_wp, 'damage')
+    call expect_close(error, set_up%system%state%damage, damage, 0.0_wp, 'damage')
     call expect(error, set_up%system%dissipated, dissipated, 1.0e-4_wp*dissipated, 'dissipated')
   end subroutine test_breaking
 
@@ -514,8 +515,8 @@ contains
     call relax(scene, set_up, witness, error)
     if (allocated(error)) return
     ! the turn has the stiffness of the load alone, a thousandth of the body's: 1e-8 over that
-    call expect(error, maxval(abs(found - set_up%system%state%u)), 0.0_wp, &
-      & 1.0e-4_wp*maxval(abs(found)), 'the same rest')
+    call expect_close(error, found, set_up%system%state%u, &
+      & 1.0e-4_wp*max_abs(found), 'the same rest')
   end subroutine test_unsupported
 
   !> Nine more load steps of a body that is all but linear cost less than the first.
@@ -613,7 +614,7 @@ contains
     call relax(scene, set_up, witness, error)
     if (allocated(error)) return
     call expect_true(error, witness%iterations == 0 .and. witness%settled == 1, 'iterations')
-    call expect(error, maxval(abs(set_up%system%state%u)), 0.0_wp, 0.0_wp, 'displacement')
+    call expect_close(error, set_up%system%state%u, 0.0_wp, 0.0_wp, 'displacement')
   end subroutine test_nothing
 
   !> Several blocks of the sums, and strains at which the tangent serves.
@@ -639,7 +640,7 @@ contains
     end do
     if (allocated(error)) return
     call expect_true(error, witness%iterations == iterations .and. iterations > 0, 'iterations')
-    call expect(error, maxval(abs(first - set_up%system%state%u)), 0.0_wp, 0.0_wp, 'bits')
+    call expect_close(error, first, set_up%system%state%u, 0.0_wp, 'bits')
   end subroutine test_threads
 
 end module test_motion_conjugate_gradient

@@ -10,6 +10,7 @@ module test_motion_equilibrium
   use pd_motion_rigid, only: rigid_type, find_free_motions, turn_back
   use pd_motion_system, only: system_type, energies_type, energies_of
   use pd_scene_types, only: scene_type
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: at_point, box_scene, expect, expect_true, ready_alone, rotation_matrix
   implicit none (type, external)
@@ -214,7 +215,7 @@ contains
         do i = 1, system%body%n_points
           k = system%body%slot(i)
           to = [-system%body%x(k, 2), system%body%x(k, 1)] - system%body%x(k, :)
-          call expect(error, maxval(abs(system%state%u(k, :) - to)), 0.0_wp, 1.0e-12_wp*spacing, &
+          call expect_close(error, system%state%u(k, :), to, 1.0e-12_wp*spacing, &
             & 'the plate, '//trim(solvers(s)))
         end do
       end associate
@@ -287,7 +288,7 @@ contains
         do i = 1, system%body%n_points
           k = system%body%slot(i)
           if (system%body%x(k, 1) > 8*spacing) call expect(error, &
-            & maxval(abs(system%state%u(k, :))), 0.0_wp, 0.0_wp, 'a loose point')
+            & max_abs(system%state%u(k, :)), 0.0_wp, 0.0_wp, 'a loose point')
         end do
       end associate
     end do
@@ -379,7 +380,7 @@ contains
       call expect_true(error, listener%residual >= 0.0_wp .and. listener%residual <= 1.0e-6_wp, &
         & 'residual')
       associate (u => set_up%system%state%u, x => set_up%system%body%x)
-        call expect_true(error, maxval(abs(u)) > 0.3_wp*spacing, 'it does not curl')
+        call expect_true(error, max_abs(u) > 0.3_wp*spacing, 'it does not curl')
         do c = 1, dim
           call expect(error, sum(u(:, c)), 0.0_wp, 1.0e-10_wp*sum(abs(u)), 'mean displacement')
           do d = c + 1, dim
@@ -430,7 +431,7 @@ contains
           turned = matmul(y, transpose(R(:dim, :dim))) + 0.3_wp - body%x
           where (spread(body%point == 0, 2, dim)) turned = 0.0_wp
           call turn_back(set_up%system, rigid, .true., turned)
-          call expect(error, maxval(abs(turned - start)), 0.0_wp, 1.0e-13_wp, 'the way back')
+          call expect_close(error, turned, start, 1.0e-13_wp, 'the way back')
         end do
       end associate
     end do

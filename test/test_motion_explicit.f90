@@ -7,6 +7,7 @@ module test_motion_explicit
   use pd_motion_explicit, only: run_explicit
   use pd_motion_time_step, only: integrator_limit
   use pd_scene_types, only: scene_type
+  use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: at_point, box_scene, density_of_steel, diary_type, expect, expect_true, ready, &
     & text_of, youngs_modulus
@@ -169,7 +170,7 @@ contains
         call begin(diary, right)
         call run_explicit(set_up%system, trim(integrators(i)), merge(0.99_wp, 1.02_wp, trial == 1) &
           & *integrator_limit(trim(integrators(i)))/omega, 3000, diary, fault)
-        largest = maxval(abs(diary%u))
+        largest = max_abs(diary%u)
         if (trial == 1) then
           call expect_true(error, .not. allocated(fault), trim(integrators(i)) &
             & //' stops below its limit')

@@ -8,6 +8,7 @@ module test_motion_heating
   use pd_motion_relaxation, only: run_relaxation
   use pd_scene_read, only: read_scene_text
   use pd_scene_types, only: scene_type
+  use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, diary_type, expect, expect_true, ready, ready_alone, youngs_modulus
   implicit none (type, external)
@@ -153,7 +154,7 @@ contains
         if (allocated(fault)) call test_failed(error, fault%message)
         if (allocated(error)) return
         off = diary%kinetic + diary%strain - diary%work
-        worst(i) = maxval(abs(off))/maxval(diary%strain)
+        worst(i) = max_abs(off)/maxval(diary%strain)
         call expect_true(error, all(abs(off) <= 1.0e-2_wp*maxval(diary%strain)), 'imbalance')
       end do
       call expect_true(error, diary%work(diary%n) > 0.1_wp*maxval(diary%strain), 'nothing works')

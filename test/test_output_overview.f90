@@ -37,7 +37,8 @@ contains
 
   !> A plate of 8 x 6 points of steel (E = 200 GPa, nu = 1/3, 7850 kg/m3), the horizon three
   !> spacings of 1 cm: a plate wave runs at sqrt(E/(rho 8/9)) = 5354 m/s, a shear wave at
-  !> sqrt(3 E/(8 rho)) = 3091 m/s, a surface wave at 0.9194 of that; Gc = 9 E s_c^2 delta/(4 pi) = 4297 J/m2.
+  !> sqrt(3 E/(8 rho)) = 3091 m/s, a surface wave at 0.9194 of that; Gc = 9 E s_c^2 delta/(4 pi) =
+  !> 4297 J/m2.
   subroutine test_overview(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

@@ -14,6 +14,7 @@ module test_study_study
   use pd_study_lines, only: line_notes
   use pd_study_study, only: begin_study, run_all, run_study, session_type
   use pd_study_table, only: put_file
+  use comparisons, only: expect_close, max_abs
   use bodies, only: expect, expect_true
   use test_scene_expect, only: line
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
@@ -138,7 +139,7 @@ contains
     call studied('error', bar//points//"norm = 'maximum' /", session, fault)
     call accept(error, fault)
     if (allocated(error)) return
-    call expect(error, session%outcomes(3)%error, maxval(abs(found - exact)), 1.0e-7_wp, 'maximum')
+    call expect(error, session%outcomes(3)%error, max_abs(found - exact), 1.0e-7_wp, 'maximum')
     call studied('error', bar//points//"norm = 'relative' /", session, fault)
     call accept(error, fault)
     if (allocated(error)) return
@@ -155,7 +156,7 @@ contains
     stored = table%values(column_of(table, 'kinetic_energy'), :) &
       & + table%values(column_of(table, 'strain_energy'), :)
     work = table%values(column_of(table, 'external_work'), :)
-    balance = maxval(abs(stored - stored(1) - work))/max(maxval(abs(stored)), maxval(abs(work)))
+    balance = max_abs(stored - stored(1) - work)/max(max_abs(stored), max_abs(work))
   end function balance
 
   !> Column by column, in the words of the user guide.
@@ -210,7 +211,7 @@ contains
     call studied('threads', bar//points//'/', two, fault, threads=2)
     call accept(error, fault)
     if (allocated(error)) return
-    call expect(error, maxval(abs(one%outcomes%error - two%outcomes%error)), 0.0_wp, 0.0_wp, &
+    call expect_close(error, one%outcomes%error, two%outcomes%error, 0.0_wp, &
       & 'errors')
   end subroutine test_threads
 

@@ -154,8 +154,8 @@ contains
     if (points == 0) return
     call warnings%add('crack through points '//to_text(number), '&crack number '// &
       & to_text(number)//' runs through '//counted(points, 'point')//'; points on a crack '// &
-      & 'count as lying on one side of it, so that the cut is not symmetric: shift it by half a '// &
-      & 'spacing ('//with_unit(minval(body%spacing, mask=body%point > 0)/2, 'm', 4)// &
+      & 'count as lying on one side of it, so that the cut is not symmetric: shift it by half '// &
+      & 'a spacing ('//with_unit(minval(body%spacing, mask=body%point > 0)/2, 'm', 4)// &
       & ') across its plane', tell=.false.)
   end subroutine warn_of_crack
 
