@@ -569,8 +569,8 @@ contains
     end subroutine refused
   end subroutine test_misfits
 
-  !> An error that no listed run has, met beyond the finest of them; the same once more with the
-  !> horizon as a choice: it must take the nearest-neighbour chain, three times as accurate here.
+  !> An error that no listed run has, met beyond the finest of them, with the horizon as a choice.
+  !> Which one is cheaper is a matter of measured times, and of no test.
   subroutine test_choice(error)
     type(error_type), allocatable, intent(out) :: error
     type(run_options_type) :: options
@@ -591,7 +591,8 @@ contains
       call expect_true(error, n >= 7, 'the chosen run is in the table')
       call expect_true(error, table%values(3, n) <= target .and. table%values(3, n) > target/2, &
         & 'it meets the error, not by far')
-      call expect(error, table%values(2, n), 1.015_wp, 0.0_wp, 'with the cheaper horizon')
+      call expect_true(error, any(abs(table%values(2, n) - [1.015_wp, 3.015_wp]) <= 0.0_wp), &
+        & 'with one of the horizons')
       call expect_true(error, table%values(1, n) > 80, 'and more points than listed')
     end associate
   end subroutine test_choice
