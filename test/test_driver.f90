@@ -547,7 +547,6 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
     type(fault_type), allocatable :: fault
-    type(line_type), allocatable :: lines(:)
     character(*), parameter :: kept = here//'/dissipation/warnings.txt'
 
     call box_scene([12, 10], 1.0e-3_wp, 0.25_wp, scene)
@@ -642,7 +641,6 @@ contains
     character(*), parameter :: kept = here//'/rotation/warnings.txt'
     type(scene_type) :: scene
     type(fault_type), allocatable :: fault
-    type(line_type), allocatable :: lines(:)
     real(wp) :: spin
     integer :: way
 

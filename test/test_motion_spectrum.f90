@@ -214,13 +214,13 @@ contains
     state = 17
     do i = 1, 6
       if (i <= 4) then
-        call box_scene([16, 14], spacing, nu(i), scene)
+        call box_scene([16, 14], spacing, nu(min(i, 4)), scene)
         scene%horizon%surface_correction = 'energy'
-        name = 'nu = '//text_of(nu(i))
+        name = 'nu = '//text_of(nu(min(i, 4)))
       else
         call two_materials([16, 14], 0.33_wp, 0.49_wp, scene)
-        scene%horizon%family = families(i - 4)
-        name = 'two materials, '//families(i - 4)
+        scene%horizon%family = families(max(1, i - 4))
+        name = 'two materials, '//families(max(1, i - 4))
       end if
       scene%materials%critical_stretch = 0.1_wp
       call ready(scene, set_up, error)
