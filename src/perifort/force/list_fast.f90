@@ -57,9 +57,13 @@ module pd_force_list_fast
       ! allow(C071): the loops know the members, not how many slots there are.
       real(wp), intent(in) :: at(8, *)            !! what slots have: position, volume,
                                                   !! displacement, p
+      ! allow(C071): as above.
       real(wp), intent(in) :: given(8, *)         !! and q, half the spacing, factors D and S
+      ! allow(C071): as above.
       real(wp), intent(in) :: fraction(lanes, *)  !! vc, if stored
+      ! allow(C071): as above.
       real(wp), intent(in) :: weight_D(lanes, *)  !! Gd vc V of each lane, if stored
+      ! allow(C071): as above.
       real(wp), intent(in) :: weight_S(lanes, *)  !! (q_k + q_j) Gb vc V |xi|, if stored
       real(wp), intent(in) :: own(lanes, 16)      !! `at` and `given` of the lanes
       type(task_type), intent(in) :: task
