@@ -5,7 +5,7 @@ module pd_driver
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_clock, only: phase_timer_type
-  use pd_base_error, only: error_type, status_input, status_interrupted
+  use pd_base_error, only: error_type, internal_fault, status_input, status_interrupted
   use pd_base_interrupt, only: let_writes_fail, watch_for_interrupt
   use pd_base_threads, only: is_worth_threads, team_type
   use pd_base_warnings, only: warnings_type
@@ -392,6 +392,8 @@ contains
       call build_weights(family, system%model)
     type is (list_family_type)
       call prepare_list(family, system%model)
+    class default
+      call internal_fault('finish_family does not know a kind of family')
     end select
   end subroutine finish_family
 

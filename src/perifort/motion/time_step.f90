@@ -37,6 +37,8 @@ contains
         call lattice_bound(family, model, bound)
         return
       end if
+    class default  ! below, bond by bond, which suits any family
+      continue
     end select
     allocate (inverse(body%n_slots), source=0.0_wp)
     !$omp parallel default(none) shared(body, family, model, bound, inverse) &
@@ -132,7 +134,7 @@ contains
     select type (family)
     type is (lattice_family_type)
       call lattice_printed_bound(family, model, printed)
-    class default
+    class default  ! bond by bond, which suits any family
       call printed_bound(body, family, model, printed)
     end select
   end subroutine printed_stiffness

@@ -97,7 +97,8 @@ contains
     case ('velocity'); field%components = 3; field%unit = 'm/s'
     case ('force_density'); field%components = 3; field%unit = 'N/m3'
     case ('energy_density'); field%unit = 'J/m3'
-    case default; field%unit = '1'
+    case default  ! damage, dilatation; check_fields refuses what is none
+      field%unit = '1'
     end select
   end function field_of
 

@@ -154,6 +154,8 @@ contains
     select type (family => system%family)
     type is (lattice_family_type)
       if (family%mixed) text = 'mixed: bonds in single precision, state in double'
+    class default  ! others have double precision alone
+      continue
     end select
     if (text /= 'double' .or. scene%header%precision /= 'mixed') return
     text = text//': mixed precision is not available for '

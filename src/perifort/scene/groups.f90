@@ -4,6 +4,7 @@
 !> Defaults are those of the types in `pd_scene_types`.
 module pd_scene_groups
   use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
   use pd_scene_keys, only: keys_type, mode_describe, mode_write
   use pd_scene_types, only: header_type, body_group, shape_group, material_group, horizon_group, &
     & crack_group, initial_group, boundary_group, load_group, time_group, relaxation_group, &
@@ -48,8 +49,12 @@ contains
     select case (name)
     case ('scene', 'horizon', 'time', 'relaxation', 'output')
       repeatable = .false.
-    case default
+    case ('body', 'remove', 'region', 'material', 'crack', 'no_fail', 'initial', 'boundary', &
+      & 'load', 'probe', 'study')
       repeatable = .true.
+    case default
+      repeatable = .false.
+      call internal_fault('group_repeatable does not know the group '//name)
     end select
   end function group_repeatable
 
@@ -98,6 +103,7 @@ contains
         & '`run` ignores it.'
     case default
       purpose = ''
+      call internal_fault('group_purpose does not know the group '//name)
     end select
   end function group_purpose
 
@@ -155,7 +161,7 @@ contains
     case ('study')
       call visit_study(keys, study)
     case default
-      continue  ! callers know the names of all groups
+      call internal_fault('describe_group does not know the group '//name)
     end select
   end subroutine describe_group
 

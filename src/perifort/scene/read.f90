@@ -1,6 +1,6 @@
 !> A scene from a file or a text: scan, read every group, check the whole.
 module pd_scene_read
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_text, only: join, nearest_name
   use pd_scene_check, only: check_scene
   use pd_scene_file, only: read_text_file
@@ -164,7 +164,7 @@ contains
     case ('study')
       call visit_study(keys, scene%studies(number))
     case default
-      continue  ! callers know the names of all groups
+      call internal_fault('read_group does not know the group '//source%sections(section)%name)
     end select
     call keys%finish_reading(error)
   end subroutine read_group

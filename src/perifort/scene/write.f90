@@ -2,6 +2,7 @@
 !>
 !> The text reads back to the same scene, bit for bit.
 module pd_scene_write
+  use pd_base_error, only: internal_fault
   use pd_base_text, only: newline
   use pd_scene_groups, only: describe_group, group_purpose, group_names, visit_scene_header, &
     & visit_body, visit_remove, visit_region, visit_material, visit_horizon, visit_crack, &
@@ -85,8 +86,10 @@ contains
       if (allocated(scene%probes)) number = size(scene%probes)
     case ('study')
       if (allocated(scene%studies)) number = size(scene%studies)
-    case default
+    case ('scene', 'horizon', 'time', 'relaxation', 'output')
       number = 1
+    case default
+      call internal_fault('number_of_groups does not know the group '//name)
     end select
   end function number_of_groups
 
@@ -131,7 +134,7 @@ contains
     case ('study')
       call visit_study(keys, scene%studies(i))
     case default
-      continue  ! callers know the names of all groups
+      call internal_fault('visit_one does not know the group '//name)
     end select
   end subroutine visit_one
 

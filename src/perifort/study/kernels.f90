@@ -3,7 +3,7 @@
 module pd_study_kernels
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_clock, only: wall_time
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp, i8
   use pd_base_numbers, only: median, pi
   use pd_driver, only: prepare, set_up_type
@@ -275,6 +275,7 @@ contains
       if (both_ends(d, family%mixed)) flops = (flops + merge(d + 1, d, dilatation))/2
     class default
       flops = 0.0_wp
+      call internal_fault('flops_of_bond does not know a kind of family')
     end select
   end function flops_of_bond
 

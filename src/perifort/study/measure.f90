@@ -228,7 +228,8 @@ contains
     case ('velocity'); unit = 'm/s'
     case ('force_density'); unit = 'N/m3'
     case ('energy_density'); unit = 'J/m3'
-    case default; unit = ''
+    case default  ! numbers without a unit
+      unit = ''
     end select
   end function quantity_unit
 

@@ -66,7 +66,7 @@ contains
         & family%grids(1)%alignment > lanes, lattice, error)
       if (allocated(error)) return
       call move_alloc(lattice, twin%family)
-    class default
+    class default  ! a list holds any points
       allocate (list)
       call new_list_family(twin%body, rule, list)
       call move_alloc(list, twin%family)
@@ -79,6 +79,8 @@ contains
     select type (family => twin%family)
     type is (lattice_family_type)
       call build_weights(family, twin%model)
+    class default  ! lists prepare themselves in their first pass
+      continue
     end select
     if (cut) call copy_cuts(system, twin)
     call hold(system, twin)
