@@ -17,6 +17,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.collections import PolyCollection  # noqa: E402
 from matplotlib.ticker import MaxNLocator  # noqa: E402
 
 from common import Results  # noqa: E402
@@ -97,10 +98,13 @@ def draw_points(axis, positions, values, spacing, colours, size):
     """
     low, high = positions.min(axis=0) - spacing / 2, positions.max(axis=0) + spacing / 2
     inches = min(size[0] / (high[0] - low[0]), size[1] / (high[1] - low[1]))
-    side = max(72 * inches * spacing * 1.1, 0.8)
-    drawn = axis.scatter(positions[:, 0], positions[:, 1], c=values, s=side**2, marker="s",
-                         linewidths=0,
-                         rasterized=True, **colours)
+    # In units of the axis: markers are rounded to pixels and would leave white lines between them
+    side = max(spacing * 1.02, 0.8 / 72 / inches)
+    corners = side / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    drawn = PolyCollection(positions[:, None, :2] + corners, array=values, cmap=colours["cmap"],
+                           linewidths=0, antialiaseds=False, rasterized=True)
+    drawn.set_clim(colours["vmin"], colours["vmax"])
+    axis.add_collection(drawn)
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     return drawn
 
