@@ -29,8 +29,13 @@ class Results:
     def __init__(self, folder):
         folder = Path(folder)
         files = [folder] if folder.is_file() else sorted(folder.glob("*.vtkhdf"))
-        if len(files) != 1:
-            raise FileNotFoundError(f"{folder} holds {len(files)} files *.vtkhdf; one is needed")
+        if not folder.exists():
+            raise FileNotFoundError(f"there is no folder or file {folder}")
+        if not files:
+            raise FileNotFoundError(f"{folder} holds no results: no file *.vtkhdf")
+        if len(files) > 1:
+            raise FileNotFoundError(f"{folder} holds {len(files)} files *.vtkhdf; name one of them: "
+                                    f"{', '.join(file.name for file in files)}")
         self.path = files[0]
         with h5py.File(self.path, "r") as file:
             root = file["VTKHDF"]

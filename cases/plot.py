@@ -3,8 +3,8 @@
     ./pf plot DIR [--field NAME ...] [--step N | all] [--magnify FACTOR] [--to FOLDER]
 
 writes a picture of every field (1D: a curve over x; 2D: coloured points; 3D: all points and a cut
-through the middle) and the curves of the history: energies with their balance, probes, reactions.
-Of a study it draws error against time with the Pareto front, and error against each varied key. DIR
+through the middle) and the curves of the history: energies, probes, reactions; of explicit runs the
+balance of energies, of a relaxation the residual over its iterations. Of a study it draws error against time with the Pareto front, and error against each varied key. DIR
 is the folder of the results or of the study, or the .vtkhdf or study.csv file.
 """
 import argparse
@@ -17,6 +17,8 @@ import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+from matplotlib.collections import PolyCollection  # noqa: E402
+from matplotlib.ticker import MaxNLocator  # noqa: E402
 
 from common import Results  # noqa: E402
 
@@ -96,10 +98,13 @@ def draw_points(axis, positions, values, spacing, colours, size):
     """
     low, high = positions.min(axis=0) - spacing / 2, positions.max(axis=0) + spacing / 2
     inches = min(size[0] / (high[0] - low[0]), size[1] / (high[1] - low[1]))
-    side = max(72 * inches * spacing * 1.1, 0.8)
-    drawn = axis.scatter(positions[:, 0], positions[:, 1], c=values, s=side**2, marker="s",
-                         linewidths=0,
-                         rasterized=True, **colours)
+    # In units of the axis: markers are rounded to pixels and would leave white lines between them
+    side = max(spacing * 1.02, 0.8 / 72 / inches)
+    corners = side / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    drawn = PolyCollection(positions[:, None, :2] + corners, array=values, cmap=colours["cmap"],
+                           linewidths=0, antialiaseds=False, rasterized=True)
+    drawn.set_clim(colours["vmin"], colours["vmax"])
+    axis.add_collection(drawn)
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     return drawn
 
@@ -178,7 +183,10 @@ def save(figure, path, dpi=90):
 def field_picture(results, name, output, magnify, path):
     """The picture of one field at one output."""
     dim = dimension_of(results.points)
-    title = f"{results.path.stem}, t = {results.times[output]:.6g} s"
+    time = f"{results.times[output]:.6g}"
+    # In relaxation the time is the part of the load steps, not seconds
+    title = f"{results.path.stem}, " + (f"load steps done: {100 * float(time):.6g} %"
+                                        if "residual" in results.history else f"t = {time} s")
     if dim == 1:
         figure_of_fields([(results, name, title, output)], path, panel=(7.0, 3.6))
         return
@@ -215,27 +223,32 @@ def middle_cut(results, name, output):
 
 
 def history_pictures(results, folder):
-    """Energies with their balance, one picture for probes and one for reactions."""
+    """Energies, of explicit runs with their balance; one picture for probes, one for reactions, and
+    of a relaxation one of its iterations.
+    """
     h = results.history
-    if "residual" in h:
-        across, label = h["load_step"], "load step"
+    relaxation = "residual" in h
+    if relaxation:
+        # One row for each load step: too few for a line alone
+        across, label, style = h["load_step"], "load step", {"marker": "o", "markersize": 3}
+        figure, axes = plt.subplots(figsize=(7.5, 4.5))
+        axes = [axes]
+        iterations_picture(results, folder)
     else:
-        across, label = h["time"], "time [s]"
-    figure, axes = plt.subplots(2, 1, figsize=(7.5, 6), sharex=True, height_ratios=(3, 1))
+        across, label, style = h["time"], "time [s]", {}
+        figure, axes = plt.subplots(2, 1, figsize=(7.5, 6), sharex=True, height_ratios=(3, 1))
     for name in ENERGIES:
-        axes[0].plot(across, h[name], label=name.replace("_", " "))
+        if not (relaxation and name == "kinetic_energy"):
+            axes[0].plot(across, h[name], label=name.replace("_", " "), **style)
     axes[0].set(ylabel="energy [J]")
     axes[0].legend(fontsize=8)
-    if "residual" in h:
-        positive = h["residual"] > 0
-        axes[1].semilogy(across[positive], h["residual"][positive])
-        axes[1].set(xlabel=label, ylabel="residual")
-    else:
+    if not relaxation:
         stored = h["kinetic_energy"] + h["strain_energy"] + h["dissipated_energy"]
         axes[1].plot(across, stored - stored[0] - h["external_work"] + h["external_work"][0])
-        axes[1].set(xlabel=label, ylabel="balance [J]")
+        axes[1].set(ylabel="balance [J]")
     for axis in axes:
         axis.grid(alpha=0.3)
+    finish_history(axes[-1], label, relaxation)
     save(figure, folder / "energies.png")
 
     reactions = [name for name in h if "_reaction_" in name]
@@ -251,12 +264,46 @@ def history_pictures(results, folder):
                                     sharex=True, squeeze=False)
         for axis, (unit, names) in zip(axes[:, 0], panels):
             for name in names:
-                axis.plot(across, h[name], linewidth=1, label=name.replace("_", " "))
+                axis.plot(across, h[name], linewidth=1, label=name.replace("_", " "), **style)
             axis.set(ylabel=f"[{unit}]")
             axis.grid(alpha=0.3)
             axis.legend(fontsize=8)
-        axes[-1, 0].set(xlabel=label)
+        finish_history(axes[-1, 0], label, relaxation)
         save(figure, folder / f"{title}.png")
+
+
+def finish_history(axis, label, relaxation):
+    """The axis that the panels of a history share: time, or whole numbers of load steps."""
+    axis.set(xlabel=label)
+    if relaxation:
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def iterations_picture(results, folder):
+    """The way of a relaxation to its tolerance: residual and change of displacement over all
+    iterations of iterations.csv. Where a load step begins there is a vertical line.
+    """
+    path = results.path.parent / "iterations.csv"
+    if not path.is_file():
+        return
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    if not rows:
+        return
+    columns = {name: np.array([float(row[name]) for row in rows])
+               for name in ("step", "load_step", "residual", "change")}
+    figure, axis = plt.subplots(figsize=(7.5, 3.6))
+    for name, label in (("residual", "residual"), ("change", "change of displacement")):
+        shown = columns[name] > 0
+        axis.semilogy(columns["step"][shown], columns[name][shown], linewidth=1, label=label)
+    begins = np.flatnonzero(np.diff(columns["load_step"]) > 0) + 1
+    for number in begins if len(begins) <= 60 else ():
+        axis.axvline(columns["step"][number], color="0.7", linewidth=0.6, zorder=0)
+    axis.set(xlabel="iteration, of all load steps" if len(begins) else "iteration",
+             ylabel="relative [-]")
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize=8)
+    save(figure, folder / "iterations.png")
 
 
 RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "energy_drift", "pareto",

@@ -18,7 +18,7 @@ contains
       & new_unittest('the clock runs forward', test_clock), &
       & new_unittest('a phase counts only its own time', test_phases), &
       & new_unittest('many phases are kept apart', test_many_phases), &
-      & new_unittest('the table names phases, rest and total', test_table), &
+      & new_unittest('the table names phases, other time and total', test_table), &
       & new_unittest('the progress line tells all', test_progress_text), &
       & new_unittest('100 % is said only at the end', test_not_yet), &
       & new_unittest('a log gets few lines and the last one', test_log), &
@@ -120,9 +120,9 @@ contains
     call timer%stop('families')
     waited = wait_for(0.01_wp)
     text = timer%table()
-    call check(error, index(text, 'families') > 0 .and. index(text, 'rest') > 0, text)
+    call check(error, index(text, 'families') > 0 .and. index(text, 'other') > 0, text)
     if (allocated(error)) return
-    call check(error, index(text, 'total') > index(text, 'rest'), text)
+    call check(error, index(text, 'total') > index(text, 'other'), text)
     if (allocated(error)) return
     call check(error, index(text, '100.0 %') > index(text, 'total'), text)
   end subroutine test_table

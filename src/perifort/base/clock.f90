@@ -184,23 +184,23 @@ contains
   end function total_seconds
 
   !> The phases in the order of their first start: a line each with time and share of the total,
-  !> then the rest that no phase covers and the total. Lines are parted by `new_line`; '' if no
+  !> then the time that no phase covers and the total. Lines are parted by `new_line`; '' if no
   !> phase was ever started.
   function table_of_phases(self) result(text)
     class(phase_timer_type), intent(in) :: self
     character(:), allocatable :: text
-    real(wp) :: total, rest
+    real(wp) :: total, other
     integer :: i
 
     text = ''
     if (self%count == 0) return
     total = self%total()
-    rest = total
+    other = total
     do i = 1, self%count
       text = text//row(self%names(i), self%seconds(trim(self%names(i))), total)//new_line('a')
-      rest = rest - self%seconds(trim(self%names(i)))
+      other = other - self%seconds(trim(self%names(i)))
     end do
-    if (rest > 0.005_wp*total) text = text//row('rest', rest, total)//new_line('a')
+    if (other > 0.005_wp*total) text = text//row('other', other, total)//new_line('a')
     text = text//row('total', total, total)
   end function table_of_phases
 
@@ -311,7 +311,7 @@ contains
     integer(i8), intent(in), optional :: first !! step at which the clock was started, default 0
     logical, intent(in), optional :: load      !! `time` is the part of the load, 0 to 1
     character(:), allocatable :: text
-    character(:), allocatable :: clock
+    character(:), allocatable :: clock, what
     character(8) :: percent
     real(wp) :: rate
     integer(i8) :: begun
@@ -319,12 +319,14 @@ contains
     begun = 0
     if (present(first)) begun = first
     clock = with_unit(time, 's', 4)
+    what = ' step'
     if (present(load)) then
-      if (load) clock = 'load '//to_text(time, 4)
+      if (load) what = ' load step'
+      if (load) clock = 'load factor '//to_text(time, 4)
     end if
     ! Rounded down: 100 % is only said when all is done.
     write (percent, '(f5.1)') floor(1000.0_wp*real(step, wp)/real(max(total, 1_i8), wp))/10.0_wp
-    text = trim(percent)//' %  step '//to_text(step)//'/'//to_text(total)//'  '// &
+    text = trim(percent)//' % '//what//' '//to_text(step)//'/'//to_text(total)//'  '// &
       & clock//'  broken bonds '//to_text(bonds_broken)
     if (present(load) .and. step <= begun .and. elapsed > 0.0_wp) then
       ! a load step may be all there is
@@ -332,7 +334,7 @@ contains
     end if
     if (step <= begun .or. elapsed <= 0.0_wp) return
     rate = real(step - begun, wp)/elapsed
-    text = text//'  '//to_text(rate, 3)//' steps/s'
+    text = text//'  '//to_text(rate, 3)//what//'s/s'
     if (step < total) text = text//'  left '//duration_text(real(total - step, wp)/rate)
     if (step >= total) text = text//'  took '//duration_text(elapsed)
   end function progress_text

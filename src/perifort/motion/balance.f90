@@ -350,7 +350,7 @@ contains
     p = drowned(balance)
     if (p == 0) return
     associate (tally => balance%piece(p))
-      call fail(error, 'no static equilibrium can be told: the forces that act on '// &
+      call fail(error, 'no static equilibrium can be computed: the forces that act on '// &
         & piece_text(system%body, rigid%pieces, p)//', '//to_text(sqrt(scale_of(tally)), 3)// &
         & ' N, vanish in the rounding of its forces, '//to_text(sqrt(tally%rounding), 2)// &
         & ' N at displacements of up to '//to_text(maxval(abs(system%state%u)), 3)// &

@@ -85,12 +85,26 @@ contains
       text = line('run time', between(least, most)//' with history and output (predicted)')// &
         & line('a step', with_unit(step, 's', 3)//' (measured); '//to_text(plan%steps)//' steps')
     end if
-    text = text//line('a history row', with_unit(row, 's', 3)//' (measured); one every '// &
-      & to_text(schedule%history_every)//trim(merge(' iterations', ' steps     ', plan%relaxes)))
+    text = text//line('a history row', with_unit(row, 's', 3)//' (measured); one after every '// &
+      & due(schedule))
     text = text//line('an output', with_unit(bytes, 'B', 3)//'; '// &
       & with_unit(output, 's', 3)//' (measured) before it is written; '// &
       & to_text(planned_outputs(schedule, plan%step))//' outputs')
   end subroutine estimate
+
+  !> When rows of the history are due. In relaxation `history_every` is about `iterations.csv`.
+  pure function due(schedule) result(text)
+    type(schedule_type), intent(in) :: schedule
+    character(:), allocatable :: text
+
+    if (schedule%relaxation) then
+      text = 'load step'
+    else if (schedule%history_every == 1) then
+      text = 'step'
+    else
+      text = to_text(schedule%history_every)//' steps'
+    end if
+  end function due
 
   !> Time the step that is over, and end the motion when enough are timed.
   subroutine observe(observer, system, instant, error)

@@ -3,7 +3,7 @@ module pd_output_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
   use pd_base_warnings, only: warnings_type
-  use pd_base_text, only: line => labelled_line, newline, to_text, with_unit
+  use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_scene_types, only: scene_type
   use pd_family_lattice, only: lattice_family_type
   use pd_motion_plan, only: plan_type
@@ -75,8 +75,8 @@ contains
     type(plan_type), intent(in) :: plan
     character(:), allocatable :: text
 
-    text = line('relaxation', 'static equilibrium after each of '// &
-      & to_text(plan%relaxation%load_steps)//' load step(s)')
+    text = line('relaxation', 'static equilibrium in '// &
+      & counted(plan%relaxation%load_steps, 'load step'))
     if (scene%relaxation%solver == 'dynamic_relaxation') then
       text = text//line('solver', 'dynamic relaxation, density matrix '// &
         & trim(scene%relaxation%density_matrix))
@@ -206,10 +206,11 @@ contains
     if (steps > 0) text = text//line('speed', &
       & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
       & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
-      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)//' steps/s')
+      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
+      & trim(merge(' iterations/s', ' steps/s     ', recorder%schedule%relaxation)))
     if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
-    if (recorder%gave_way > 0) text = text//line('solver', to_text(recorder%gave_way)// &
-      & ' load step(s) were left to dynamic relaxation by the conjugate gradient')
+    if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
+      & 'load step')//' left to dynamic relaxation by the conjugate gradient')
     associate (now => recorder%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))

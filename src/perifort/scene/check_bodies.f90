@@ -66,8 +66,8 @@ contains
       if (allocated(error)) return
       if (any(body%points(:d) < 1) .or. any(body%points(d + 1:) > 1)) then
         call rule_fault(error, 'body', number, 'points', "'points' needs "//to_text(d)// &
-          & ' counts in a scene of dimension '//to_text(d), 'one count along each direction', &
-          & source)
+          & trim(merge(' count ', ' counts', d == 1))//' in a scene of dimension '//to_text(d), &
+          & 'one count along each direction', source)
         return
       end if
       if (product(real(body%points(:d), wp)) > most_points) then
@@ -173,7 +173,8 @@ contains
     if (allocated(scene_file)) path = resolve_path(trim(name), scene_file)
     inquire (file=path, exist=exists)
     if (.not. exists) call rule_fault(error, group, number, 'file', "cannot find the file '"// &
-      & trim(name)//"'", "looked for '"//path//"' and in the working directory", source)
+      & trim(name)//"'", "looked for '"//path//"', then for that name in the working directory", &
+      & source)
   end subroutine check_file
 
   !> The shape keys of `&remove`, `&region` and `&no_fail`: those of its kind and no others.

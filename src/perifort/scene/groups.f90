@@ -90,9 +90,9 @@ contains
     case ('load')
       purpose = 'A force on the outermost points of a side of a body, or on a region.'
     case ('time')
-      purpose = 'How the state moves: explicit steps in time, or relaxation to rest.'
+      purpose = 'How the state moves: explicit steps in time, or relaxation to static equilibrium.'
     case ('relaxation')
-      purpose = "How a body comes to rest (time method = 'relaxation')."
+      purpose = "How static equilibrium is found (time method = 'relaxation')."
     case ('output')
       purpose = 'What is written, and how often.'
     case ('probe')
@@ -380,8 +380,8 @@ contains
     type(keys_type), intent(inout) :: keys
     type(time_group), intent(inout) :: group
 
-    call keys%key('method', group%method, 'explicit steps in time, or relaxation to rest', &
-      & allowed=[character(10) :: 'explicit', 'relaxation'])
+    call keys%key('method', group%method, 'explicit steps in time, or relaxation to '// &
+      & 'static equilibrium', allowed=[character(10) :: 'explicit', 'relaxation'])
     call keys%key('integrator', group%integrator, 'explicit: rule of the steps', &
       & allowed=[character(16) :: 'forward_backward', 'velocity_verlet', 'adams_bashforth', &
       & 'adams_moulton', 'runge_kutta'])
