@@ -132,7 +132,8 @@ contains
   end subroutine check_schedule
 
   !> Steps between rows of the history; in relaxation, whose history has a row for each load step,
-  !> iterations between lines of `iterations.csv`. Without the user's word there are
+  !> iterations between lines of `iterations.csv` (`iteration_due` adds those that meet the
+  !> tolerance). Without the user's word there are
   !> at most about 2000, and so few that they take a twentieth of the time of the steps at most: for
   !> the strain energy, a row takes 1.4 to 2 evaluations of the forces over all `bonds` (ordered
   !> pairs). Rows that cost next to nothing, those of small bodies, may be more. The number follows

@@ -1,5 +1,5 @@
 !> The way of a relaxation to equilibrium, `iterations.csv`: a line for each iteration that is
-!> looked at. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes
+!> due. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes
 !> on, and adds to them.
 module pd_output_iterations
   use pd_base_error, only: error_type

@@ -223,8 +223,7 @@ contains
       if (instant%note /= '') call observer%warn('equilibrium', 'load step '// &
         & to_text(instant%load_step)//': '//instant%note)
     end if
-    if (observer%schedule%relaxation .and. .not. instant%settled .and. &
-      & mod(instant%step, observer%schedule%history_every) == 0) then
+    if (iteration_due(observer%schedule, instant)) then
       call observer%results%add_iteration(iteration_line(system, instant), observer%first_step, &
         & error)
       if (allocated(error)) return
@@ -260,8 +259,8 @@ contains
     end if
     if (keeping) call observer%keep_state(system, finished=.false.)
     call observer%timer%start('time stepping')
-    if (stopping) call fail(error, reason_to_stop(observer)//' at step '// &
-      & to_text(instant%step)//', t = '//to_text(instant%time)// &
+    if (stopping) call fail(error, reason_to_stop(observer)//' at '// &
+      & place_of(instant, observer%schedule%relaxation)// &
       & ': this state is the last output'//newline//'  to go on: '//observer%command, &
       & status_interrupted)
   end subroutine observe
@@ -361,6 +360,33 @@ contains
     call recorder%progress%finish()
     call recorder%warnings%add(subject, text, tell=.not. recorder%quiet)
   end subroutine warn
+
+  !> Whether `iterations.csv` has a line for this iteration: those that are due, and those whose
+  !> residual meets the tolerance, so that the last one of a load step is among them.
+  pure logical function iteration_due(schedule, instant) result(due)
+    type(schedule_type), intent(in) :: schedule
+    type(instant_type), intent(in) :: instant
+
+    due = schedule%relaxation .and. .not. instant%settled
+    if (due) due = mod(instant%step, schedule%history_every) == 0 .or. &
+      & instant%residual <= schedule%tolerance
+  end function iteration_due
+
+  !> Where a run is, for a message: step and time, or iteration and load step.
+  pure function place_of(instant, relaxation) result(text)
+    type(instant_type), intent(in) :: instant
+    logical, intent(in) :: relaxation
+    character(:), allocatable :: text
+
+    if (.not. relaxation) then
+      text = 'step '//to_text(instant%step)//', t = '//to_text(instant%time)//' s'
+    else if (instant%settled) then
+      text = 'the end of load step '//to_text(instant%load_step)
+    else
+      text = 'iteration '//to_text(instant%iteration)//' of load step '// &
+        & to_text(instant%load_step)//', which is not in equilibrium yet'
+    end if
+  end function place_of
 
   !> What the progress line adds in relaxation.
   pure function relaxation_note(instant, tolerance) result(note)
