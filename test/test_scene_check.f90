@@ -294,6 +294,10 @@ contains
       & "the ramp does not end|a/b.nml:4|from 0 to 1")
     call expect_fault(error, still//'&initial velocity_x = 1 ramp_time = 1 /', &
       & 'a course in time without a temperature_change|a/b.nml:4')
+    call expect_scene(error, load//'times = 0 1 values = 0 1e-40 /', scene)
+    if (allocated(error)) return
+    call check(error, abs(scene%loads(1)%values(2)) <= 0.0_wp, 'a tiny number of a table is not 0')
+    if (allocated(error)) return
     call expect_scene(error, still//'&initial temperature_change = 1 /', scene)
     if (allocated(error)) return
     call check(error, scene%initial(1)%ramp_time, 1.0_wp)

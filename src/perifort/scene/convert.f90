@@ -19,17 +19,19 @@ contains
 
   !> A real in `unit` within the open bounds `above`, `below` and the closed ones `at_least`,
   !> `at_most`.
-  subroutine to_real(token, name, unit, value, message, note, above, below, at_least, at_most)
+  subroutine to_real(token, name, unit, value, message, note, above, below, at_least, at_most, &
+    & tiny_is_zero)
     type(token_type), intent(in) :: token
     character(*), intent(in) :: name, unit
     real(wp), intent(inout) :: value
     character(:), allocatable, intent(out) :: message, note
     real(wp), intent(in), optional :: above, below, at_least, at_most
+    logical, intent(in), optional :: tiny_is_zero  !! see `parse_real`
     real(wp) :: found
     logical :: inside
 
     message = ''
-    call parse_real(token%text, found, note)
+    call parse_real(token%text, found, note, tiny_is_zero)
     if (token%quoted) note = 'expected a number without quotes'
     if (len(note) > 0) then
       message = bad_value(token, name)

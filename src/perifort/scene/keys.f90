@@ -341,7 +341,9 @@ contains
     if (allocated(value)) deallocate (value)
     allocate (value(size(slots)), source=0.0_wp)
     do i = 1, size(slots)
-      call to_real(keys%source%tokens(slots(i)), name, unit, value(i), message, note)
+      ! tables come from other programs, with their rounding errors
+      call to_real(keys%source%tokens(slots(i)), name, unit, value(i), message, note, &
+        & tiny_is_zero=.true.)
       call keys%complain(slots(i), message, note)
       if (allocated(keys%fault)) return
     end do
