@@ -41,6 +41,8 @@ contains
       & new_unittest('a stiff block pressed into a soft pad', test_pad), &
       & new_unittest('supports that turn a body', test_turned), &
       & new_unittest('a load that vanishes in rounding', test_drowned), &
+      & new_unittest('supports that strain less than rounding', test_drowned_supports), &
+      & new_unittest('a small load on a heated body', test_heated), &
       & new_unittest('a loose piece and isolated points stay', test_loose), &
       & new_unittest('a piece torn off with its load', test_torn_off), &
       & new_unittest('a piece torn off without load', test_goes_on), &
@@ -247,6 +249,71 @@ contains
         & index(fault%message, 'rounding') > 0, 'message: '//fault%message)
     end do
   end subroutine test_drowned
+
+  !> Both ends of a strip move by a metre, in the same way: nothing acts. Where one goes 1e-12 m
+  !> farther, all that acts vanishes in rounding, and that is said.
+  subroutine test_drowned_supports(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(listener_type) :: listener
+    type(fault_type), allocatable :: fault
+    integer :: s, i
+
+    do s = 1, size(solvers)
+      do i = 1, 2
+        call strip([12, 3], scene)
+        deallocate (scene%loads, scene%regions)
+        allocate (scene%loads(0), scene%regions(2))
+        scene%regions%name = ['foot', 'head']
+        scene%regions%shape = 'box'
+        scene%regions(1)%upper(1) = 3*spacing
+        scene%regions(2)%lower(1) = 9*spacing
+        scene%boundaries = [scene%boundaries, scene%boundaries]
+        scene%boundaries(2)%name = 'head'
+        scene%boundaries(2)%region = 'head'
+        scene%boundaries(1)%displacement(:2) = [1.0_wp, -0.5_wp]
+        scene%boundaries(2)%displacement(:2) = [1.0_wp, -0.5_wp]
+        if (i == 2) scene%boundaries(2)%displacement(1) = 1.0_wp + 1.0e-12_wp
+        scene%relaxation%solver = solvers(s)
+        call relax(scene, set_up, listener, error, fault)
+        if (allocated(error)) return
+        call expect_true(error, allocated(fault) .eqv. i == 2, merge('refused ', 'accepted', &
+          & i == 1))
+        if (allocated(error)) return
+        if (.not. allocated(fault)) cycle
+        call expect_true(error, fault%status == status_no_answer .and. &
+          & index(fault%message, 'rounding') > 0, 'message: '//fault%message)
+      end do
+    end do
+  end subroutine test_drowned_supports
+
+  !> A strip is heated so that its thermal forces are about a million times the load across its end.
+  !> The reaction is the load (statics), to 1e-3.
+  subroutine test_heated(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: load = -1.0e-2_wp
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(listener_type) :: listener
+    integer :: s, c
+
+    do s = 1, size(solvers)
+      call strip([12, 3], scene)
+      scene%materials%thermal_expansion = 1.0e-5_wp
+      if (allocated(scene%initial)) deallocate (scene%initial)
+      allocate (scene%initial(1))
+      scene%initial(1)%temperature_change = 100.0_wp
+      scene%loads(1)%force(2) = load
+      scene%relaxation%solver = solvers(s)
+      call relax(scene, set_up, listener, error)
+      if (allocated(error)) return
+      do c = 1, 2
+        call expect(error, set_up%system%motions(1)%reaction(c), merge(0.0_wp, -load, c == 1), &
+          & 1.0e-3_wp*abs(load), 'reaction, '//trim(solvers(s)))
+      end do
+    end do
+  end subroutine test_heated
 
   !> A crack parts the right half, on which nothing acts, and two cracks isolate the last column's
   !> points: they stay where they are, it is said, and the left half bears its load as ever.

@@ -65,7 +65,10 @@ contains
       do k = 1, keys%count
         associate (info => keys%known(k))
           call refuse_all(info%name, no_value)
-          if (index(info%kind, 'real') == 1) then
+          if (info%kind == 'real list') then
+            ! tables may have numbers that are 0 but for rounding
+            call refuse_all(info%name, pack(no_number, no_number /= '1e-31'))
+          else if (index(info%kind, 'real') == 1) then
             call refuse_all(info%name, no_number)
           else if (index(info%kind, 'integer') == 1) then
             call refuse_all(info%name, no_count)

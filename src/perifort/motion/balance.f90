@@ -9,7 +9,7 @@ module pd_motion_balance
   use pd_motion_fault, only: place
   use pd_motion_pieces, only: piece_text
   use pd_motion_residual, only: relaxation_type
-  use pd_motion_rigid, only: rigid_type
+  use pd_motion_rigid, only: rigid_type, fit_rigid_motion
   use pd_motion_system, only: system_type, add_loads
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
@@ -31,6 +31,7 @@ module pd_motion_balance
     real(wp) :: moment(3) = 0.0_wp      !! their moment about the piece's centre [N m]
     real(wp) :: force_scale = 0.0_wp    !! largest net force of a boundary or a load [N]
     real(wp) :: moment_scale = 0.0_wp   !! largest net moment of one [N m]
+    logical :: loaded = .false.         !! its loads have a net force or moment
     real(wp) :: energy = 0.0_wp         !! twice the strain energy [J]
   end type tally_type
 
@@ -44,6 +45,12 @@ module pd_motion_balance
 
   !> Share of the largest net force, and moment, that reactions and loads may leave over.
   real(wp), parameter :: left_over = 2.0e-4_wp
+  !> ... and what they may leave where rounding lets nothing better be had.
+  real(wp), parameter :: most_left_over = 1.0e-3_wp
+  !> Imposed displacements are those of a rigid body if they differ by no more than this part.
+  real(wp), parameter :: rigid_to = 1.0e-13_wp
+  !> Net force or moment of loads, over the applied ones, that counts as none.
+  real(wp), parameter :: no_net = 1.0e-10_wp
   !> Rounding of a force: so many units in the last place of a displacement times the stiffness of a
   !> point, which bounds its row (doc/theory.md, 6).
   real(wp), parameter :: last_places = 8.0_wp
@@ -138,7 +145,7 @@ contains
     type(rigid_type), intent(in) :: rigid
     real(wp), intent(in) :: loads(:, :)
     type(balance_type), intent(inout) :: balance
-    real(wp), allocatable :: force(:, :), moment(:, :)
+    real(wp), allocatable :: force(:, :), moment(:, :), applied(:)
     real(wp) :: one(3)
     integer :: m, i, p, dim, k
 
@@ -160,12 +167,18 @@ contains
     end do
     force = 0.0_wp
     moment = 0.0_wp
+    allocate (applied(size(balance%piece)), source=0.0_wp)
     do k = 1, system%body%n_slots
       if (rigid%pieces%of(k) == 0) cycle
       if (all(abs(loads(k, :)) <= 0.0_wp)) cycle
       one = 0.0_wp
       one(:dim) = loads(k, :)*system%body%volume(k)
       call add_one(k, one)
+      applied(p) = applied(p) + norm2(one)
+    end do
+    do p = 1, size(balance%piece)
+      balance%piece(p)%loaded = norm2(force(:, p)) > no_net*applied(p) .or. &
+        & norm2(moment(:, p)) > no_net*applied(p)*rigid%piece(p)%size
     end do
     call add_net()
 
@@ -236,27 +249,43 @@ contains
     at_the_floor = piece%residual <= piece%rounding*merge(1.0_wp, likely**2, silent(piece))
   end function at_the_floor
 
-  !> Whether residual force and net forces and moments of a piece are small enough.
+  !> Whether residual force and net forces and moments of a piece are small enough, or as small as
+  !> rounding lets them be.
   elemental logical function piece_balanced(relaxation, rigid_size, piece) result(balanced)
     type(relaxation_type), intent(in) :: relaxation
     real(wp), intent(in) :: rigid_size   !! extent of the piece [m]
     type(tally_type), intent(in) :: piece
-    real(wp) :: force, moment
 
     balanced = at_the_floor(piece)
-    if (balanced) return
+    if (silent(piece)) then
+      balanced = balanced .or. piece%residual <= relaxation%tolerance**2*scale_of(piece)
+      return
+    end if
     ! of a state whose supports bear nothing but what is out of balance, the ratio is near 1
-    balanced = piece%residual <= relaxation%tolerance**2*scale_of(piece)
+    balanced = balanced .or. piece%residual <= relaxation%tolerance**2*scale_of(piece)
     if (.not. balanced) return
-    ! where every net force vanishes the residual is all there is to go by
-    force = max(left_over*piece%force_scale, relaxation%tolerance*sqrt(scale_of(piece)), &
-      & sqrt(piece%rounding))
-    moment = max(left_over*piece%moment_scale, force*rigid_size)
-    balanced = norm2(piece%left) <= force .and. norm2(piece%moment) <= moment
+    balanced = net_balanced(relaxation%tolerance, left_over, rigid_size, piece) .or. &
+      & piece%residual <= likely**2*piece%rounding
   end function piece_balanced
 
-  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how
-  !> far off its displacements are.
+  !> Whether loads and reactions of a piece leave no more than `share` of the largest net force, and
+  !> moment, of a boundary or of the loads. Where no load has one, reactions may vanish, as those of
+  !> a heated body that can expand; the residual is then all there is to go by.
+  elemental logical function net_balanced(tolerance, share, rigid_size, piece) result(balanced)
+    real(wp), intent(in) :: tolerance    !! of the residual [-]
+    real(wp), intent(in) :: share        !! [-]
+    real(wp), intent(in) :: rigid_size   !! extent of the piece [m]
+    type(tally_type), intent(in) :: piece
+    real(wp) :: force, moment
+
+    force = share*max(piece%force_scale, piece%moment_scale/rigid_size)
+    if (.not. piece%loaded) force = max(force, tolerance*sqrt(scale_of(piece)))
+    moment = max(share*piece%moment_scale, force*rigid_size)
+    balanced = norm2(piece%left) <= force .and. norm2(piece%moment) <= moment
+  end function net_balanced
+
+  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how far
+  !> off its displacements are.
   pure logical function balanced_but_for_error(relaxation, rigid, balance) result(balanced)
     type(relaxation_type), intent(in) :: relaxation
     type(rigid_type), intent(in) :: rigid
@@ -316,12 +345,19 @@ contains
     real(wp), intent(in) :: t                   !! its time [s]
     real(wp), intent(in) :: change              !! of displacement in the last iteration, relative
     type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: advice
 
+    if (at_the_floor(balance%piece(worst_piece(balance)))) then
+      advice = 'No less than '//to_text(likely*sqrt(balance%piece(worst_piece(balance))%rounding), 1) &
+        & //' N can be expected where forces are rounded. Move or heat the body by less, load it '// &
+        & 'by more, or raise tolerance'
+    else
+      advice = 'Raise maximum_iterations or tolerance, or use more load steps'
+    end if
     call fail(error, 'not converged: after '//to_text(relaxation%maximum_iterations)// &
       & ' iterations of load step '//to_text(load_step)//' the residual force is '// &
       & to_text(relative_residual(balance))//' and the change of displacement '//to_text(change)// &
-      & ' (tolerance '//to_text(relaxation%tolerance)// &
-      & '). Raise maximum_iterations or tolerance, or use more load steps'//newline//'  '// &
+      & ' (tolerance '//to_text(relaxation%tolerance)//'). '//advice//newline//'  '// &
       & describe_left_over(system, rigid, balance, worst_piece(balance), t), status_no_answer)
   end subroutine fail_unconverged
 
@@ -338,38 +374,59 @@ contains
       & 'exactly; the state is accepted, since its error is known to be small'
   end function rounding_note
 
-  !> An error if the loads of some piece vanish in the rounding of its forces: then nothing is known
-  !> of its equilibrium.
-  subroutine check_drowned(system, rigid, balance, error)
+  !> An error if what acts on some piece vanishes in the rounding of its forces: then nothing is
+  !> known of its equilibrium.
+  subroutine check_drowned(system, relaxation, rigid, balance, error)
     type(system_type), intent(in) :: system
+    type(relaxation_type), intent(in) :: relaxation
     type(rigid_type), intent(in) :: rigid
-    type(balance_type), intent(in) :: balance   !! as weighed
+    type(balance_type), intent(in) :: balance   !! as weighed, of an accepted state
     type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: text
     integer :: p
 
-    p = drowned(balance)
-    if (p == 0) return
-    associate (tally => balance%piece(p))
-      call fail(error, 'no static equilibrium can be computed: the forces that act on '// &
-        & piece_text(system%body, rigid%pieces, p)//', '//to_text(sqrt(scale_of(tally)), 3)// &
-        & ' N, vanish in the rounding of its forces, '//to_text(sqrt(tally%rounding), 2)// &
-        & ' N at displacements of up to '//to_text(maxval(abs(system%state%u)), 3)// &
-        & ' m. Move it by less, or load it by more', status_no_answer)
-    end associate
+    do p = 1, size(balance%piece)
+      associate (tally => balance%piece(p))
+        if (silent(tally)) then
+          ! a piece that is only moved, as a rigid body, is where it should be
+          if (.not. max(tally%load, tally%thermal) > 0.0_wp) then
+            if (.not. supports_strain(system, rigid, p)) cycle
+          end if
+          text = 'the forces that act on '//piece_text(system%body, rigid%pieces, p)//', '// &
+            & to_text(sqrt(scale_of(tally)), 3)//' N, vanish in the rounding of its forces, '// &
+            & to_text(sqrt(tally%rounding), 2)//' N'
+        else
+          if (net_balanced(max(relaxation%tolerance, likely*sqrt(tally%rounding/scale_of(tally))), &
+            & most_left_over, rigid%piece(p)%size, tally)) cycle
+          text = 'loads and reactions of '//piece_text(system%body, rigid%pieces, p)// &
+            & ', net forces of up to '//to_text(tally%force_scale, 3)//' N, leave a force of '// &
+            & to_text(norm2(tally%left), 3)//' N because its forces are rounded,'
+        end if
+      end associate
+      call fail(error, 'no static equilibrium can be told: '//text//' at displacements of up to '// &
+        & to_text(maxval(abs(system%state%u)), 3)//' m. Move or heat it by less, or load it by more', &
+        & status_no_answer)
+      return
+    end do
   end subroutine check_drowned
 
-  !> The first piece whose loads or thermal forces vanish in what rounding leaves, 0 if there is
-  !> none.
-  pure integer function drowned(balance) result(piece)
-    type(balance_type), intent(in) :: balance
+  !> Whether the imposed displacements of a piece are not those of a rigid body, to rounding.
+  logical function supports_strain(system, rigid, p)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    integer, intent(in) :: p                    !! number of the piece
+    real(wp), allocatable :: u(:, :), weight(:, :)
 
-    do piece = 1, size(balance%piece)
-      associate (tally => balance%piece(piece))
-        if (silent(tally) .and. max(tally%load, tally%thermal) > 0.0_wp) return
-      end associate
-    end do
-    piece = 0
-  end function drowned
+    associate (slots => rigid%pieces%slots(rigid%pieces%start(p):rigid%pieces%start(p + 1) - 1))
+      supports_strain = .false.
+      if (.not. rigid%piece(p)%held) return
+      allocate (weight, source=real(system%held, wp))
+      allocate (u(size(weight, 1), size(weight, 2)), source=0.0_wp)
+      call fit_rigid_motion(system, rigid, p, system%state%u, weight, u)
+      supports_strain = any(weight(slots, :)*abs(u(slots, :) - system%state%u(slots, :)) &
+        & > rigid_to*maxval(abs(system%state%u(slots, :))))
+    end associate
+  end function supports_strain
 
   !> What is left over in a piece and where, in words.
   function describe_left_over(system, rigid, balance, piece, t) result(text)

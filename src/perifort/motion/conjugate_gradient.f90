@@ -126,7 +126,7 @@ contains
     end do
     if (newton%iterations >= enough_iterations .and. newton%softness > 0.0_wp) &
       & system%memory%softness = newton%softness
-    call check_drowned(system, rigid, balance, error)
+    call check_drowned(system, relaxation, rigid, balance, error)
   end subroutine relax_by_conjugate_gradient
 
   !> An error if loads or thermal forces are beyond what can be squared.

@@ -239,7 +239,7 @@ contains
         instant%residual = relative_residual(balance)
         if (balanced_but_for_error(relaxation, rigid, balance) .and. error_is_known(balance, &
           & 0.0_wp, allowed_error(relaxation, balance))) then
-          call check_drowned(system, rigid, balance, error)
+          call check_drowned(system, relaxation, rigid, balance, error)
           return
         end if
       end if
@@ -289,7 +289,7 @@ contains
             instant%residual = relative_residual(balance)
             call add_note(instant, rounding_note(relaxation, balance))
             memory%iteration = 0
-            call check_drowned(system, rigid, balance, error)
+            call check_drowned(system, relaxation, rigid, balance, error)
             return
           end if
         end if
