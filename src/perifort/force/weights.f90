@@ -13,13 +13,13 @@ module pd_force_weights
   private
   public :: build_weights, block_weights, allocate_weights, weights_now, half_of
 
-  integer(i8), parameter :: free_bytes = 64_i8*1024_i8**2  !! tables may always take this much,
-  integer(i8), parameter :: bytes_per_slot = 100_i8        !! and this much per slot
+  integer(i8), parameter :: free_bytes = 256_i8*1024_i8**2  !! tables may always take this much,
+  integer(i8), parameter :: bytes_per_slot = 100_i8         !! and this much per slot
 
 contains
 
   !> Find the blocks that are alike and make the weights of each kind. When the kinds become too
-  !> many (a lattice full of random holes), the rest make theirs in every pass.
+  !> many (a lattice full of random holes), blocks of further kinds make theirs in every pass.
   subroutine build_weights(family, model)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
@@ -27,14 +27,16 @@ contains
     type(weights_type), allocatable :: table(:), longer(:)
     integer(i8), allocatable :: column(:), first(:), more(:)
     integer(i8) :: key, bytes
-    integer :: b, g, i, number
-    logical :: is_new
+    integer :: b, g, i, number, made
+    logical :: is_new, full
 
     if (fast_limit(model, merge(single, narrow, family%mixed)) <= 0.0_wp) call use_double(family)
     if (family%mixed) call allocate_singles(family, model)
     call column_keys(family, column)
     allocate (table(256), first(256))
     bytes = 0_i8
+    made = 0
+    full = .false.
     do b = 1, size(family%block)
       g = grid_at(family, family%block(b))
       key = int(g, i8)
@@ -43,10 +45,16 @@ contains
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(iand(key, family%key_bits), number, is_new)
+      full = full .or. (is_new .and. bytes + table_bytes(family, family%grids(g)%n) > free_bytes &
+        & + bytes_per_slot*family%n_slots)
+      ! once it is full, kinds are numbered on, but have no tables
+      if (full .and. number > made) then
+        family%weights(b) = 0_i4
+        cycle
+      end if
       family%weights(b) = int(number, i4)
       if (.not. is_new) cycle
-      bytes = bytes + family%grids(g)%n*(16_i8*lanes + merge(60, 44, family%mixed))
-      if (bytes > free_bytes + bytes_per_slot*family%n_slots) exit
+      made = number
       if (number > size(table)) then
         allocate (longer(2*size(table)))
         longer(:size(table)) = table
@@ -59,15 +67,19 @@ contains
       call allocate_weights(family, model, table(number))
       call block_weights(family, model, family%block(b), table(number))
       call trim_weights(table(number))
+      bytes = bytes + table_bytes(family, table(number)%n)
     end do
-    if (b <= size(family%block)) then
-      kinds%count = kinds%count - 1
-      family%weights(b:) = 0_i4
-    end if
-    family%table = table(:kinds%count)
+    family%table = table(:made)
     call compare_surroundings(family, first)
     deallocate (family%class_of)  ! it has done its work
   end subroutine build_weights
+
+  !> Memory of a table of weights [bytes].
+  pure integer(i8) function table_bytes(family, n) result(bytes)
+    type(lattice_family_type), intent(in) :: family
+    integer, intent(in) :: n  !! its offsets
+    bytes = n*(16_i8*lanes + merge(60, 44, family%mixed))
+  end function table_bytes
 
   !> A key of 64 bits hardly ever belongs to two kinds of blocks. Where it does, blocks that look
   !> another way than the one that their table was made for, by its `first` slot, make their weights
