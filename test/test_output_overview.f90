@@ -96,7 +96,8 @@ contains
     call estimate(scene, set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
       & set_up%system%family%n_bonds), 0.0_wp, text)
     call expect_true(error, index(text, 'with history and output (predicted)') > 0 .and. &
-      & index(text, '(measured); 1000 steps') > 0 .and. index(text, 'one after every 7 steps') > 0 .and. &
+      & index(text, '(measured); 1000 steps') > 0 .and. &
+      & index(text, 'one after every 7 steps') > 0 .and. &
       & index(text, '; 11 outputs') > 0, text)
     scene%time%method = 'relaxation'
     deallocate (scene%initial)

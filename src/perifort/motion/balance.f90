@@ -284,8 +284,8 @@ contains
     balanced = norm2(piece%left) <= force .and. norm2(piece%moment) <= moment
   end function net_balanced
 
-  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how far
-  !> off its displacements are.
+  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how
+  !> far off its displacements are.
   pure logical function balanced_but_for_error(relaxation, rigid, balance) result(balanced)
     type(relaxation_type), intent(in) :: relaxation
     type(rigid_type), intent(in) :: rigid
@@ -348,8 +348,9 @@ contains
     character(:), allocatable :: advice
 
     if (at_the_floor(balance%piece(worst_piece(balance)))) then
-      advice = 'No less than '//to_text(likely*sqrt(balance%piece(worst_piece(balance))%rounding), 1) &
-        & //' N can be expected where forces are rounded. Move or heat the body by less, load it '// &
+      advice = 'No less than '// &
+        & to_text(likely*sqrt(balance%piece(worst_piece(balance))%rounding), 1)// &
+        & ' N can be expected where forces are rounded. Move or heat the body by less, load it '// &
         & 'by more, or raise tolerance'
     else
       advice = 'Raise maximum_iterations or tolerance, or use more load steps'
@@ -403,8 +404,9 @@ contains
             & to_text(norm2(tally%left), 3)//' N because its forces are rounded,'
         end if
       end associate
-      call fail(error, 'no static equilibrium can be computed: '//text//' at displacements of up to '// &
-        & to_text(maxval(abs(system%state%u)), 3)//' m. Move or heat it by less, or load it by more', &
+      call fail(error, 'no static equilibrium can be computed: '//text//' at displacements of up '// &
+        & 'to '//to_text(maxval(abs(system%state%u)), 3)// &
+        & ' m. Move or heat it by less, or load it by more', &
         & status_no_answer)
       return
     end do
