@@ -404,8 +404,8 @@ contains
             & to_text(norm2(tally%left), 3)//' N because its forces are rounded,'
         end if
       end associate
-      call fail(error, 'no static equilibrium can be computed: '//text//' at displacements of up '// &
-        & 'to '//to_text(maxval(abs(system%state%u)), 3)// &
+      call fail(error, 'no static equilibrium can be computed: '//text// &
+        & ' at displacements of up to '//to_text(maxval(abs(system%state%u)), 3)// &
         & ' m. Move or heat it by less, or load it by more', &
         & status_no_answer)
       return
