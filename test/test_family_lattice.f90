@@ -318,13 +318,14 @@ contains
 
   !> A box with part of its points taken out at random, surface factors, and a critical stretch of
   !> 0.02 where bonds may break.
-  subroutine porous(count, horizon, part, kind, breakable, subject)
+  subroutine porous(count, horizon, part, kind, breakable, subject, room)
     integer, intent(in) :: count(:)
     real(wp), intent(in) :: horizon          !! [spacings]
     real(wp), intent(in) :: part             !! of the points that are taken out
     character(*), intent(in) :: kind
     logical, intent(in) :: breakable
     type(subject_type), intent(out) :: subject
+    integer(i8), intent(in), optional :: room  !! for tables of weights [bytes]
     type(material_type) :: materials(1)
     logical, allocatable :: keep(:)
     type(lattice_family_type), allocatable :: lattice
@@ -364,6 +365,7 @@ contains
         else
           allocate (lattice)
           call new_lattice_family(body, rule, breakable, .false., lattice, fault)
+          if (present(room)) lattice%room = room
           call move_alloc(lattice, subject%family)
         end if
       end associate
@@ -521,7 +523,7 @@ contains
     real(wp) :: dissipated
     integer :: k
 
-    call porous([20, 20, 20], 5.015_wp, 0.4_wp, 'lattice', .true., subject)
+    call porous([20, 20, 20], 5.015_wp, 0.4_wp, 'lattice', .true., subject, room=32_i8*1024_i8**2)
     select type (family => subject%family)
     type is (lattice_family_type)
       call expect_true(error, count(family%weights > 0) > 300, 'too few blocks with tables')

@@ -62,6 +62,7 @@ module pd_family_lattice
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
+    integer(i8) :: room = 256_i8*1024_i8**2    !! that tables may always take [bytes]
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
     integer(i4), allocatable :: first_of(:)    !! the first slot of each class
     integer(i8), allocatable :: broken(:, :)   !! 1-bits: broken bonds (n_slots, words), if any can

@@ -13,8 +13,7 @@ module pd_force_weights
   private
   public :: build_weights, block_weights, allocate_weights, weights_now, half_of
 
-  integer(i8), parameter :: free_bytes = 256_i8*1024_i8**2  !! tables may always take this much,
-  integer(i8), parameter :: bytes_per_slot = 100_i8         !! and this much per slot
+  integer(i8), parameter :: bytes_per_slot = 100_i8  !! that tables may take beside their room
 
 contains
 
@@ -45,7 +44,7 @@ contains
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(iand(key, family%key_bits), number, is_new)
-      full = full .or. (is_new .and. bytes + table_bytes(family, family%grids(g)%n) > free_bytes &
+      full = full .or. (is_new .and. bytes + table_bytes(family, family%grids(g)%n) > family%room &
         & + bytes_per_slot*family%n_slots)
       ! once it is full, kinds are numbered on, but have no tables
       if (full .and. number > made) then

@@ -397,6 +397,7 @@ contains
             & to_text(sqrt(scale_of(tally)), 3)//' N, vanish in the rounding of its forces, '// &
             & to_text(sqrt(tally%rounding), 2)//' N'
         else
+          if (.not. scale_of(tally) > 0.0_wp) cycle  ! nothing acts
           if (net_balanced(max(relaxation%tolerance, likely*sqrt(tally%rounding/scale_of(tally))), &
             & most_left_over, rigid%piece(p)%size, tally)) cycle
           text = 'loads and reactions of '//piece_text(system%body, rigid%pieces, p)// &
