@@ -342,6 +342,23 @@ contains
     scene%no_fail(1)%upper(1) = 1.0_wp
     scene%regions(1)%upper(1) = -1.0_wp
     call expect_told(error, scene, 'the region left holds no point', .true., 'an empty region')
+    ! a second body that is to fill a hole, which the hole takes away as well
+    call box_scene([8, 8], spacing, 0.2_wp, scene)
+    scene%bodies = [scene%bodies, scene%bodies]
+    deallocate (scene%removed)
+    allocate (scene%removed(1))
+    scene%removed(1)%shape = 'box'
+    scene%removed(1)%lower(:2) = 2*spacing
+    scene%removed(1)%upper(:2) = 5*spacing
+    scene%bodies(2)%lower(:2) = 2*spacing
+    scene%bodies(2)%upper(:2) = 4*spacing
+    scene%bodies(2)%points(:2) = 2
+    call expect_told(error, scene, '&body number 2 holds no point', .true., 'a body removed')
+    call expect_told(error, scene, '&body number 1 holds no point', .false., 'a body with a hole')
+    scene%removed(1)%lower(:2) = 3*spacing
+    scene%bodies(1)%lower(:2) = 4*spacing
+    scene%bodies(1)%upper(:2) = 12*spacing
+    call expect_told(error, scene, '&body number 2 holds no point', .false., 'a body cut')
   end subroutine test_empty
 
   subroutine test_clamps(error)

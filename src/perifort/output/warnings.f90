@@ -43,6 +43,13 @@ contains
       & to_text(plan%lowest, 2)//' of the largest one. With a strongly negative '// &
       & "poissons_ratio, surface_correction = '"//trim(scene%horizon%surface_correction)// &
       & "' makes the dilatation of corners too strong; with 'none' it is not", tell=.false.)
+    do i = 1, size(scene%bodies)
+      associate (body => system%body)
+        if (any(body%body == i .and. body%layer == 0 .and. body%point > 0)) cycle
+      end associate
+      call warnings%add('empty body '//to_text(i), '&body number '//to_text(i)// &
+        & ' holds no point: &remove cuts its shapes out of all bodies', tell=.false.)
+    end do
     do i = 1, size(scene%regions)
       if (any(region_mask(scene, system%body, scene%regions(i)%name))) cycle
       call warnings%add('empty region '//to_text(i), 'the region '// &
