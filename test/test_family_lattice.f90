@@ -46,6 +46,7 @@ contains
       & new_unittest('every bond has its bit', test_bits), &
       & new_unittest('breaking leaves what it leaves in lists', test_breaking), &
       & new_unittest('random holes agree with the theory', test_holes), &
+      & new_unittest('the kinds that most blocks share have tables', test_most_used), &
       & new_unittest('long: more kinds of blocks than tables', test_on_the_fly), &
       & new_unittest('a chain in space keeps its ends', test_chain)]
   end subroutine collect_family_lattice
@@ -318,7 +319,7 @@ contains
 
   !> A box with part of its points taken out at random, surface factors, and a critical stretch of
   !> 0.02 where bonds may break.
-  subroutine porous(count, horizon, part, kind, breakable, subject, room)
+  subroutine porous(count, horizon, part, kind, breakable, subject, room, surface)
     integer, intent(in) :: count(:)
     real(wp), intent(in) :: horizon          !! [spacings]
     real(wp), intent(in) :: part             !! of the points that are taken out
@@ -326,6 +327,7 @@ contains
     logical, intent(in) :: breakable
     type(subject_type), intent(out) :: subject
     integer(i8), intent(in), optional :: room  !! for tables of weights [bytes]
+    logical, intent(in), optional :: surface   !! with surface factors; default: yes
     type(material_type) :: materials(1)
     logical, allocatable :: keep(:)
     type(lattice_family_type), allocatable :: lattice
@@ -372,7 +374,9 @@ contains
       call new_model(body, materials, .true., spread(.false., 1, body%n_slots), &
         & spread(0.0_wp, 1, body%n_slots), subject%model)
       subject%model%surface = .true.
-      call surface_factors(body, subject%family, materials, subject%model%D, subject%model%S)
+      if (present(surface)) subject%model%surface = surface
+      if (subject%model%surface) call surface_factors(body, subject%family, materials, &
+        & subject%model%D, subject%model%S)
     end associate
     select type (family => subject%family)
     type is (lattice_family_type)
@@ -512,8 +516,43 @@ contains
     end do
   end subroutine test_holes
 
-  !> Beyond some 64 MB of tables, blocks make their weights in every pass: 800 kinds with the 514
-  !> offsets of five spacings, here 1200.
+  !> A cube of 24 points along an edge has 3 blocks in a row, and without surface factors 7 kinds of
+  !> rows along y and z: those within 3 points of a side, and the others. Factors make that 13,
+  !> since the far end of a bond has its own. Where the tables have room for some of 3*13*13 kinds
+  !> only, the 3*(12 + 12 + 1) inside along y or z have them, which are 3 of 4 blocks.
+  subroutine test_most_used(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(subject_type) :: subject
+
+    call porous([24, 24, 24], ratio, 0.0_wp, 'lattice', .false., subject, surface=.false.)
+    select type (family => subject%family)
+    type is (lattice_family_type)
+      call check(error, size(family%table), 3*7*7, 'kinds without surface factors')
+      if (allocated(error)) return
+      call expect_true(error, all(family%weights > 0), 'blocks without a table')
+    end select
+    call expect_theory(error, subject, 'a cube without surface factors')
+    if (allocated(error)) return
+    call porous([24, 24, 24], ratio, 0.0_wp, 'lattice', .false., subject, room=0_i8)
+    select type (family => subject%family)
+    type is (lattice_family_type)
+      call expect_true(error, size(family%table) < 3*13*13, 'no kind without a table')
+      call expect_true(error, 4*count(family%weights > 0) >= 3*size(family%weights), &
+        & 'blocks of common kinds without a table')
+    end select
+    call expect_theory(error, subject, 'a cube with few tables')
+    if (allocated(error)) return
+    ! five spacings have 514 offsets: all kinds have tables
+    call porous([20, 20, 20], 5.015_wp, 0.0_wp, 'lattice', .false., subject)
+    select type (family => subject%family)
+    type is (lattice_family_type)
+      call check(error, family%most_bonds, 514, 'offsets')
+      call expect_true(error, all(family%weights > 0), 'five spacings: blocks without a table')
+    end select
+  end subroutine test_most_used
+
+  !> Beyond the room of the tables, blocks make their weights in every pass: here 32 MiB, of 1200
+  !> kinds with the 514 offsets of five spacings.
   subroutine test_on_the_fly(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject

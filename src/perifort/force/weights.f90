@@ -17,25 +17,65 @@ module pd_force_weights
 
 contains
 
-  !> Find the blocks that are alike and make the weights of each kind. When the kinds become too
-  !> many (a lattice full of random holes), blocks of further kinds make theirs in every pass.
+  !> Find the blocks that are alike and make the weights of each kind, those that most blocks share
+  !> first. When the kinds become too many (a lattice full of random holes), blocks of the others
+  !> make theirs in every pass.
   subroutine build_weights(family, model)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
-    type(lookup_type) :: kinds
-    type(weights_type), allocatable :: table(:), longer(:)
-    integer(i8), allocatable :: column(:), first(:), more(:)
-    integer(i8) :: key, bytes
-    integer :: b, g, i, number, made
-    logical :: is_new, full
+    integer(i8), allocatable :: first(:), first_of_table(:)
+    integer(i4), allocatable :: table_of(:)
+    integer, allocatable :: uses(:), order(:)
+    type(weights_type), allocatable :: table(:)
+    integer(i8) :: bytes, most
+    integer :: b, i, made
 
     if (fast_limit(model, merge(single, narrow, family%mixed)) <= 0.0_wp) call use_double(family)
     if (family%mixed) call allocate_singles(family, model)
-    call column_keys(family, column)
-    allocate (table(256), first(256))
+    ! without surface factors, members farther away than a block's own do not count
+    if (.not. model%surface) family%class_of = merge(int(model%material, i4), 0_i4, &
+      & family%alive == 1_i1)
+    call find_kinds(family, first, uses)
+    order = most_used_first(uses)
+    allocate (table(size(uses)), first_of_table(size(uses)), table_of(0:size(uses)))
+    table_of = 0_i4
     bytes = 0_i8
+    most = family%room + bytes_per_slot*family%n_slots
     made = 0
-    full = .false.
+    do i = 1, size(order)
+      associate (from => first(order(i)))
+        if (bytes + table_bytes(family, family%grids(grid_at(family, from))%n) > most) exit
+        made = i
+        first_of_table(made) = from
+        call allocate_weights(family, model, table(made))
+        call block_weights(family, model, from, table(made))
+      end associate
+      call trim_weights(table(made))
+      bytes = bytes + table_bytes(family, table(made)%n)
+      table_of(order(i)) = int(made, i4)
+    end do
+    do b = 1, size(family%block)
+      family%weights(b) = table_of(family%weights(b))
+    end do
+    family%table = table(:made)
+    call compare_surroundings(family, first_of_table)
+    deallocate (family%class_of)  ! it has done its work
+  end subroutine build_weights
+
+  !> Number the kinds of blocks by their surroundings, into `family%weights`.
+  subroutine find_kinds(family, first, uses)
+    type(lattice_family_type), intent(inout) :: family
+    integer(i8), allocatable, intent(out) :: first(:)  !! first slot of the first block of each kind
+    integer, allocatable, intent(out) :: uses(:)       !! blocks of each kind
+    type(lookup_type) :: kinds
+    integer(i8), allocatable :: column(:)
+    integer(i8) :: key
+    integer :: b, g, i, number
+    logical :: is_new
+
+    call column_keys(family, column)
+    allocate (first(size(family%block)))
+    allocate (uses(size(family%block)), source=0)
     do b = 1, size(family%block)
       g = grid_at(family, family%block(b))
       key = int(g, i8)
@@ -44,34 +84,33 @@ contains
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(iand(key, family%key_bits), number, is_new)
-      full = full .or. (is_new .and. bytes + table_bytes(family, family%grids(g)%n) > family%room &
-        & + bytes_per_slot*family%n_slots)
-      ! once it is full, kinds are numbered on, but have no tables
-      if (full .and. number > made) then
-        family%weights(b) = 0_i4
-        cycle
-      end if
       family%weights(b) = int(number, i4)
-      if (.not. is_new) cycle
-      made = number
-      if (number > size(table)) then
-        allocate (longer(2*size(table)))
-        longer(:size(table)) = table
-        call move_alloc(longer, table)
-        allocate (more(size(table)))
-        more(:size(first)) = first
-        call move_alloc(more, first)
-      end if
-      first(number) = family%block(b)
-      call allocate_weights(family, model, table(number))
-      call block_weights(family, model, family%block(b), table(number))
-      call trim_weights(table(number))
-      bytes = bytes + table_bytes(family, table(number)%n)
+      if (is_new) first(number) = family%block(b)
+      uses(number) = uses(number) + 1
     end do
-    family%table = table(:made)
-    call compare_surroundings(family, first)
-    deallocate (family%class_of)  ! it has done its work
-  end subroutine build_weights
+    first = first(:kinds%count)
+    uses = uses(:kinds%count)
+  end subroutine find_kinds
+
+  !> The numbers of the kinds, those with most `uses` first, equal ones in their order.
+  pure function most_used_first(uses) result(order)
+    integer, intent(in) :: uses(:)
+    integer :: order(size(uses))
+    integer, allocatable :: before(:)  ! kinds with more uses, or as many and placed
+    integer :: k
+
+    allocate (before(maxval([0, uses])), source=0)
+    do k = 1, size(uses)
+      if (uses(k) > 1) before(uses(k) - 1) = before(uses(k) - 1) + 1
+    end do
+    do k = size(before) - 1, 1, -1
+      before(k) = before(k) + before(k + 1)
+    end do
+    do k = 1, size(uses)
+      before(uses(k)) = before(uses(k)) + 1
+      order(before(uses(k))) = k
+    end do
+  end function most_used_first
 
   !> Memory of a table of weights [bytes].
   pure integer(i8) function table_bytes(family, n) result(bytes)
