@@ -15,10 +15,11 @@ module perifort
     & status_usage
   use pd_base_kinds, only: wp
   use pd_base_version, only: program_version
-  use pd_driver, only: check_scene, run_options_type, run_scene
-  use pd_scene_read, only: read_scene, read_scene_text
-  use pd_scene_types, only: body_group, boundary_group, crack_group, header_type, horizon_group, &
-    & initial_group, is_set, load_group, material_group, output_group, probe_group, &
+  use pd_driver, only: check_scene, run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_scene_content_read, only: read_scene, read_scene_text
+  use pd_scene_content_types, only: body_group, boundary_group, crack_group, header_type, &
+    & horizon_group, initial_group, is_set, load_group, material_group, output_group, probe_group, &
     & relaxation_group, scene_type, shape_group, time_group, unset
   implicit none (type, external)
   private

@@ -6,16 +6,18 @@ module bodies
   use pd_base_numbers, only: noise
   use pd_body_body, only: body_type
   use pd_body_material, only: material_type, new_material
-  use pd_driver, only: set_up_type, prepare
+  use pd_set_up_prepare, only: set_up_type, prepare
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
-  use pd_scene_types, only: scene_type, name_length
+  use pd_scene_content_types, only: scene_type, name_length
   use comparisons, only: expect => close_number, text_of
   use testdrive, only: error_type, test_failed
+  use pd_output_report_before, only: foresee_output
+  use pd_output_report_recorder, only: probe_type
   implicit none (type, external)
   private
-  public :: box_scene, ready, ready_alone, expect, expect_true, noise, shake, diary_type, &
-    & rotation_matrix, at_point, youngs_modulus, density_of_steel, text_of
+  public :: prepare_run, box_scene, ready, ready_alone, expect, expect_true, noise, shake, &
+    & diary_type, rotation_matrix, at_point, youngs_modulus, density_of_steel, text_of
 
   real(wp), parameter :: youngs_modulus = 200.0e9_wp   !! of every test's material [Pa]
   real(wp), parameter :: density_of_steel = 7850.0_wp  !! [kg/m3]
@@ -74,7 +76,7 @@ contains
     type(fault_type), allocatable :: fault
 
     if (allocated(error)) return
-    call prepare(scene, set_up, fault)
+    call prepare_run(scene, set_up, fault)
     if (allocated(fault)) call test_failed(error, 'the scene is refused: '//fault%message)
   end subroutine ready
 
@@ -192,5 +194,15 @@ contains
       observer%u = reshape(now, [system%body%dim, observer%n])
     end if
   end subroutine observe
+
+  !> Prepare a scene as a run does, warnings about its output included.
+  subroutine prepare_run(scene, set_up, error)
+    type(scene_type), intent(in) :: scene
+    type(set_up_type), intent(out) :: set_up
+    type(fault_type), allocatable, intent(out) :: error
+    type(probe_type), allocatable :: probes(:)
+    call prepare(scene, set_up, error)
+    if (.not. allocated(error)) call foresee_output(scene, set_up, probes, error)
+  end subroutine prepare_run
 
 end module bodies

@@ -17,7 +17,7 @@ module force_subjects
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_force_model, only: model_type, new_model
   use pd_force_weights, only: build_weights
-  use pd_scene_types, only: crack_group
+  use pd_scene_content_types, only: crack_group
   use bodies, only: noise, youngs_modulus
   implicit none (type, external)
   private

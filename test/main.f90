@@ -40,48 +40,48 @@ program main
   use test_force_contract, only: collect_force_contract
   use test_force_frame, only: collect_force_frame
   use test_motion_conditions, only: collect_motion_conditions
-  use test_motion_conjugate_gradient, only: collect_motion_conjugate_gradient
+  use test_motion_static_conjugate_gradient, only: collect_motion_static_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
-  use test_motion_explicit, only: collect_motion_explicit
+  use test_motion_explicit_integrators, only: collect_motion_explicit_integrators
   use test_motion_equilibrium, only: collect_motion_equilibrium
   use test_motion_heating, only: collect_motion_heating
   use test_motion_newton, only: collect_motion_newton
-  use test_motion_relaxation, only: collect_motion_relaxation
-  use test_motion_spectrum, only: collect_motion_spectrum
+  use test_motion_static_relaxation, only: collect_motion_static_relaxation
+  use test_motion_explicit_spectrum, only: collect_motion_explicit_spectrum
   use test_motion_system, only: collect_motion_system
   use test_motion_tangent, only: collect_motion_tangent
-  use test_motion_time_step, only: collect_motion_time_step
+  use test_motion_explicit_time_step, only: collect_motion_explicit_time_step
   use test_orders, only: collect_orders
-  use test_output_base64, only: collect_output_base64
-  use test_output_begin, only: collect_output_begin
-  use test_output_checkpoint, only: collect_output_checkpoint
-  use test_output_contact, only: collect_output_contact
-  use test_output_files, only: collect_output_files
-  use test_output_layout, only: collect_output_layout
-  use test_output_overview, only: collect_output_overview
-  use test_output_restart, only: collect_output_restart
-  use test_output_results, only: collect_output_results
-  use test_scene_change, only: collect_scene_change
-  use test_scene_check, only: collect_scene_check
+  use test_output_results_base64, only: collect_output_results_base64
+  use test_output_report_begin, only: collect_output_report_begin
+  use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
+  use test_output_report_contact, only: collect_output_report_contact
+  use test_output_results_files, only: collect_output_results_files
+  use test_output_results_layout, only: collect_output_results_layout
+  use test_output_report_overview, only: collect_output_report_overview
+  use test_output_checkpoint_restart, only: collect_output_checkpoint_restart
+  use test_output_results_results, only: collect_output_results_results
+  use test_scene_content_change, only: collect_scene_content_change
+  use test_scene_content_check, only: collect_scene_content_check
   use test_scene_hostile, only: collect_scene_hostile
-  use test_motion_watch, only: collect_motion_watch
-  use test_scene_compare, only: collect_scene_compare
-  use test_scene_elements, only: collect_scene_elements
-  use test_scene_file, only: collect_scene_file
-  use test_scene_read, only: collect_scene_read
-  use test_scene_reference, only: collect_scene_reference
-  use test_scene_source, only: collect_scene_source
-  use test_scene_table, only: collect_scene_table
-  use test_scene_template, only: collect_scene_template
-  use test_scene_values, only: collect_scene_values
-  use test_scene_write, only: collect_scene_write
-  use test_study_bench, only: collect_study_bench
-  use test_study_limits, only: collect_study_limits
-  use test_study_closed_form, only: collect_study_closed_form
-  use test_study_interpolate, only: collect_study_interpolate
-  use test_study_plan, only: collect_study_plan
-  use test_study_predict, only: collect_study_predict
-  use test_study_study, only: collect_study_study
+  use test_motion_energy_watch, only: collect_motion_energy_watch
+  use test_scene_content_compare, only: collect_scene_content_compare
+  use test_scene_format_elements, only: collect_scene_format_elements
+  use test_scene_format_file, only: collect_scene_format_file
+  use test_scene_content_read, only: collect_scene_content_read
+  use test_scene_content_reference, only: collect_scene_content_reference
+  use test_scene_format_source, only: collect_scene_format_source
+  use test_scene_format_table, only: collect_scene_format_table
+  use test_scene_content_template, only: collect_scene_content_template
+  use test_scene_format_values, only: collect_scene_format_values
+  use test_scene_content_write, only: collect_scene_content_write
+  use test_study_bench_bench, only: collect_study_bench_bench
+  use test_study_limits_limits, only: collect_study_limits_limits
+  use test_study_trade_closed_form, only: collect_study_trade_closed_form
+  use test_study_trade_interpolate, only: collect_study_trade_interpolate
+  use test_study_trade_plan, only: collect_study_trade_plan
+  use test_study_trade_predict, only: collect_study_trade_predict
+  use test_study_trade_study, only: collect_study_trade_study
   use test_warnings, only: collect_warnings
   implicit none (type, external)
 
@@ -121,48 +121,48 @@ program main
   call register('force_contract', collect_force_contract)
   call register('force_frame', collect_force_frame)
   call register('motion_conditions', collect_motion_conditions)
-  call register('motion_conjugate_gradient', collect_motion_conjugate_gradient)
+  call register('motion_static_conjugate_gradient', collect_motion_static_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)
-  call register('motion_explicit', collect_motion_explicit)
+  call register('motion_explicit_integrators', collect_motion_explicit_integrators)
   call register('motion_equilibrium', collect_motion_equilibrium)
   call register('motion_heating', collect_motion_heating)
   call register('motion_newton', collect_motion_newton)
-  call register('motion_relaxation', collect_motion_relaxation)
-  call register('motion_spectrum', collect_motion_spectrum)
+  call register('motion_static_relaxation', collect_motion_static_relaxation)
+  call register('motion_explicit_spectrum', collect_motion_explicit_spectrum)
   call register('motion_system', collect_motion_system)
   call register('motion_tangent', collect_motion_tangent)
-  call register('motion_time_step', collect_motion_time_step)
+  call register('motion_explicit_time_step', collect_motion_explicit_time_step)
   call register('orders', collect_orders)
-  call register('output_base64', collect_output_base64)
-  call register('output_begin', collect_output_begin)
-  call register('output_checkpoint', collect_output_checkpoint)
-  call register('output_contact', collect_output_contact)
-  call register('output_files', collect_output_files)
-  call register('output_layout', collect_output_layout)
-  call register('output_overview', collect_output_overview)
-  call register('output_restart', collect_output_restart)
-  call register('output_results', collect_output_results)
-  call register('scene_change', collect_scene_change)
-  call register('scene_check', collect_scene_check)
+  call register('output_results_base64', collect_output_results_base64)
+  call register('output_report_begin', collect_output_report_begin)
+  call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
+  call register('output_report_contact', collect_output_report_contact)
+  call register('output_results_files', collect_output_results_files)
+  call register('output_results_layout', collect_output_results_layout)
+  call register('output_report_overview', collect_output_report_overview)
+  call register('output_checkpoint_restart', collect_output_checkpoint_restart)
+  call register('output_results_results', collect_output_results_results)
+  call register('scene_content_change', collect_scene_content_change)
+  call register('scene_content_check', collect_scene_content_check)
   call register('scene_hostile', collect_scene_hostile)
-  call register('motion_watch', collect_motion_watch)
-  call register('scene_compare', collect_scene_compare)
-  call register('scene_elements', collect_scene_elements)
-  call register('scene_file', collect_scene_file)
-  call register('scene_read', collect_scene_read)
-  call register('scene_reference', collect_scene_reference)
-  call register('scene_source', collect_scene_source)
-  call register('scene_table', collect_scene_table)
-  call register('scene_template', collect_scene_template)
-  call register('scene_values', collect_scene_values)
-  call register('scene_write', collect_scene_write)
-  call register('study_bench', collect_study_bench)
-  call register('study_limits', collect_study_limits)
-  call register('study_closed_form', collect_study_closed_form)
-  call register('study_interpolate', collect_study_interpolate)
-  call register('study_plan', collect_study_plan)
-  call register('study_predict', collect_study_predict)
-  call register('study_study', collect_study_study)
+  call register('motion_energy_watch', collect_motion_energy_watch)
+  call register('scene_content_compare', collect_scene_content_compare)
+  call register('scene_format_elements', collect_scene_format_elements)
+  call register('scene_format_file', collect_scene_format_file)
+  call register('scene_content_read', collect_scene_content_read)
+  call register('scene_content_reference', collect_scene_content_reference)
+  call register('scene_format_source', collect_scene_format_source)
+  call register('scene_format_table', collect_scene_format_table)
+  call register('scene_content_template', collect_scene_content_template)
+  call register('scene_format_values', collect_scene_format_values)
+  call register('scene_content_write', collect_scene_content_write)
+  call register('study_bench_bench', collect_study_bench_bench)
+  call register('study_limits_limits', collect_study_limits_limits)
+  call register('study_trade_closed_form', collect_study_trade_closed_form)
+  call register('study_trade_interpolate', collect_study_trade_interpolate)
+  call register('study_trade_plan', collect_study_trade_plan)
+  call register('study_trade_predict', collect_study_trade_predict)
+  call register('study_trade_study', collect_study_trade_study)
   call register('warnings', collect_warnings)
 
   call read_arguments()

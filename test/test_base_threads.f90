@@ -5,16 +5,18 @@ module test_base_threads
   use pd_base_kinds, only: wp, i8
   use pd_base_system, only: processor_quota
   use pd_base_threads, only: default_threads, is_worth_threads, team_type
-  use pd_driver, only: prepare, run_options_type, run_scene, set_up_type
-  use pd_motion_explicit, only: run_explicit
+  use pd_driver, only: run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: system_type
-  use pd_output_files, only: make_directory, remove_file
-  use pd_output_sink, only: sink_type
-  use pd_scene_types, only: scene_type
+  use pd_output_results_files, only: make_directory, remove_file
+  use pd_output_results_sink, only: sink_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: box_scene, expect_true
+  use bodies, only: prepare_run, box_scene, expect_true
   implicit none (type, external)
   private
   public :: collect_base_threads
@@ -201,7 +203,7 @@ contains
       scene%loads(1)%side = 'x_max'
       scene%loads(1)%pressure = -1.0e6_wp
       scene%time%steps = 12
-      call prepare(scene, set_up, fault)
+      call prepare_run(scene, set_up, fault)
       if (allocated(fault)) exit
       observer%threads = [1]
       if (turn == 2) observer%threads = [2, 1, 3, 4, 2]

@@ -5,7 +5,7 @@ module test_body_generate
   use pd_body_body, only: body_type
   use pd_body_generate, only: generate_body
   use pd_body_layers, only: layer_rows
-  use pd_scene_types, only: scene_type, body_group, boundary_group
+  use pd_scene_content_types, only: scene_type, body_group, boundary_group
   use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect, expect_true

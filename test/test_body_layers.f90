@@ -7,9 +7,9 @@ module test_body_layers
   use pd_body_body, only: body_type, in_point_order
   use pd_body_generate, only: generate_body
   use pd_body_layers, only: layer_count_type, layer_count_text
-  use pd_driver, only: set_up_type
-  use pd_motion_relaxation, only: run_relaxation
-  use pd_scene_types, only: scene_type, body_group, shape_group, unset
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_static_relaxation, only: run_relaxation
+  use pd_scene_content_types, only: scene_type, body_group, shape_group, unset
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: box_scene, diary_type, expect, expect_true, ready_alone, youngs_modulus
   implicit none (type, external)

@@ -2,10 +2,10 @@
 module test_body_overlap
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
-  use pd_driver, only: set_up_type, prepare
-  use pd_scene_types, only: scene_type, body_group
+  use pd_set_up_prepare, only: set_up_type
+  use pd_scene_content_types, only: scene_type, body_group
   use testdrive, only: error_type, new_unittest, unittest_type
-  use bodies, only: box_scene, expect_true
+  use bodies, only: prepare_run, box_scene, expect_true
   implicit none (type, external)
   private
   public :: collect_body_overlap
@@ -164,7 +164,7 @@ contains
     type(fault_type), allocatable :: fault
 
     if (allocated(error)) return
-    call prepare(scene, set_up, fault)
+    call prepare_run(scene, set_up, fault)
     if (.not. overlaps) then
       if (.not. allocated(fault)) return
       call expect_true(error, .false., 'refused: '//fault%message)

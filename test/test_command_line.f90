@@ -5,8 +5,8 @@ module test_command_line
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, command_names, parse_command_line, &
     & restart_command
-  use pd_scene_file, only: read_text_file
-  use pd_scene_template, only: template_names, template_text
+  use pd_scene_format_file, only: read_text_file
+  use pd_scene_content_template, only: template_names, template_text
   use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
   implicit none (type, external)
   private

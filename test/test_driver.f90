@@ -4,17 +4,20 @@ module test_driver
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: to_text
-  use pd_driver, only: check_scene, prepare, run_options_type, run_scene, set_up_type
-  use pd_output_datasets, only: get_shape, read_rows
-  use pd_output_files, only: directory_exists, file_bytes, file_exists, make_directory, remove_file
-  use pd_output_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
-  use pd_output_sink, only: sink_type
-  use pd_scene_file, only: line_type, read_text_file, split_lines
-  use pd_scene_types, only: scene_type
-  use pd_scene_write, only: scene_text
+  use pd_driver, only: check_scene, run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_set_up_prepare, only: set_up_type
+  use pd_output_results_datasets, only: get_shape, read_rows
+  use pd_output_results_files, only: directory_exists, file_bytes, file_exists, make_directory, &
+    & remove_file
+  use pd_output_results_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
+  use pd_output_results_sink, only: sink_type
+  use pd_scene_format_file, only: line_type, read_text_file, split_lines
+  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_write, only: scene_text
   use comparisons, only: expect_close
   use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
-  use bodies, only: box_scene, density_of_steel, expect, expect_true, text_of
+  use bodies, only: prepare_run, box_scene, density_of_steel, expect, expect_true, text_of
   implicit none (type, external)
   private
   public :: collect_driver
@@ -429,7 +432,7 @@ contains
     call flight('plate', scene)
     scene%initial(1)%velocity = 0.0_wp
     scene%initial(1)%velocity_gradient(1, 1) = 10.0_wp
-    call prepare(scene, set_up, fault)
+    call prepare_run(scene, set_up, fault)
     call accept(error, fault)
     if (allocated(error)) return
     scene%time%steps = 2000
@@ -633,7 +636,7 @@ contains
         scene%horizon%surface_correction = correction
         scene%horizon%family = families(f)
         scene%header%plane = plane
-        call prepare(scene, set_up, fault)
+        call prepare_run(scene, set_up, fault)
         call accept(error, fault)
         if (allocated(error)) return
         call expect_true(error, (index(set_up%warnings%text(), &

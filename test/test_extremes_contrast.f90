@@ -3,11 +3,11 @@ module test_extremes_contrast
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
   use pd_base_error, only: fault_type => error_type
-  use pd_driver, only: set_up_type
-  use pd_motion_explicit, only: run_explicit
-  use pd_motion_relaxation, only: run_relaxation
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, density_of_steel, diary_type, expect, ready_alone, youngs_modulus
   implicit none (type, external)

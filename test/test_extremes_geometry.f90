@@ -3,15 +3,15 @@
 module test_extremes_geometry
   use pd_base_kinds, only: wp, i8
   use pd_base_error, only: fault_type => error_type, status_input
-  use pd_driver, only: prepare, set_up_type
-  use pd_motion_explicit, only: run_explicit
-  use pd_motion_relaxation, only: run_relaxation
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: energies_of, energies_type, evaluate
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: at_point, box_scene, density_of_steel, diary_type, expect, expect_true, noise, &
-    & ready_alone, text_of, youngs_modulus
+  use bodies, only: prepare_run, at_point, box_scene, density_of_steel, diary_type, expect, &
+    & expect_true, noise, ready_alone, text_of, youngs_modulus
   implicit none (type, external)
   private
   public :: collect_extremes_geometry
@@ -344,7 +344,7 @@ contains
           scene%horizon%family = families(f)
           scene%time%method = methods(m)
           scene%materials(1)%critical_stretch = 0.1_wp
-          call prepare(scene, set_up, fault)
+          call prepare_run(scene, set_up, fault)
           call expect_true(error, allocated(fault), 'one point alone is accepted')
           if (allocated(error)) return
           call expect_true(error, fault%status == status_input .and. index(fault%message, &

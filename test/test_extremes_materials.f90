@@ -3,12 +3,12 @@ module test_extremes_materials
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
   use pd_base_error, only: fault_type => error_type, status_no_answer
-  use pd_driver, only: set_up_type
-  use pd_motion_fault, only: check_strain_energy
-  use pd_motion_explicit, only: run_explicit
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_watch_fault, only: check_strain_energy
+  use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_system, only: energies_of, energies_type, evaluate
-  use pd_motion_time_step, only: stiffness_bound
-  use pd_scene_types, only: scene_type
+  use pd_motion_explicit_time_step, only: stiffness_bound
+  use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: at_point, box_scene, density_of_steel, diary_type, expect, expect_true, noise, &
     & ready_alone, text_of, youngs_modulus

@@ -5,14 +5,16 @@ module test_extremes_steps
   use, intrinsic :: iso_fortran_env, only: compiler_options
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
-  use pd_driver, only: prepare, run_options_type, run_scene, set_up_type
-  use pd_motion_explicit, only: run_explicit
-  use pd_scene_file, only: read_text_file
-  use pd_scene_types, only: scene_type
+  use pd_driver, only: run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_scene_format_file, only: read_text_file
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: box_scene, density_of_steel, diary_type, expect, expect_true, noise, &
-    & ready_alone, text_of, youngs_modulus
+  use bodies, only: prepare_run, box_scene, density_of_steel, diary_type, expect, expect_true, &
+    & noise, ready_alone, text_of, youngs_modulus
   implicit none (type, external)
   private
   public :: collect_extremes_steps
@@ -67,7 +69,7 @@ contains
     do i = 1, size(steps)
       call box_scene([5, 5], dx, 0.3_wp, scene)
       scene%time%step = steps(i)
-      call prepare(scene, set_up, fault)
+      call prepare_run(scene, set_up, fault)
       call expect_true(error, allocated(fault), 'a step of '//text_of(steps(i))//' is accepted')
       if (allocated(error)) return
       call expect_true(error, fault%status == status_input .and. &

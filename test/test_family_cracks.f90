@@ -2,9 +2,9 @@
 !> that follows.
 module test_family_cracks
   use pd_base_kinds, only: wp, i8
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_cracks, only: crack_type, crosses, new_crack
-  use pd_scene_types, only: scene_type, crack_group
+  use pd_scene_content_types, only: scene_type, crack_group
   use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: at_point, box_scene, expect, expect_true, ready, rotation_matrix

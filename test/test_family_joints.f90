@@ -2,9 +2,9 @@
 module test_family_joints
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: to_text
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_joints, only: joint_type, count_joints
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect_true, ready_alone
   implicit none (type, external)

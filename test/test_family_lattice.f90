@@ -5,7 +5,7 @@ module test_family_lattice
   use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_body_body, only: body_type, grid_type, allocate_points, in_point_order, keep_points
   use pd_body_material, only: material_type, new_material
-  use pd_driver, only: set_up_type, prepare
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds, family_type
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
@@ -15,13 +15,13 @@ module test_family_lattice
   use pd_force_model, only: new_model
   use pd_force_reference, only: reference_force
   use pd_force_weights, only: build_weights
-  use pd_motion_explicit, only: run_explicit
-  use pd_output_files, only: make_directory
-  use pd_output_sink, only: sink_type
-  use pd_scene_types, only: scene_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_output_results_files, only: make_directory
+  use pd_output_results_sink, only: sink_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: box_scene, diary_type, expect, expect_true, noise, ready, shake, &
+  use bodies, only: prepare_run, box_scene, diary_type, expect, expect_true, noise, ready, shake, &
     & youngs_modulus
   use force_subjects, only: subject_type, fast_force, some_gradient, spacing
   implicit none (type, external)
@@ -105,7 +105,7 @@ contains
     integer :: i
 
     if (allocated(error)) return
-    call prepare(scene, set_up, fault)
+    call prepare_run(scene, set_up, fault)
     if (.not. allocated(fault)) then
       call test_failed(error, 'not refused: '//trim(words(1)))
       return

@@ -2,12 +2,12 @@
 module test_family_slabs
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i8
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_lattice, only: grid_at, lanes, lattice_family_type
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_force_reference, only: reference_force
   use pd_motion_system, only: system_type
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, expect, expect_true, ready, shake, text_of

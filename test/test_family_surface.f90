@@ -3,10 +3,10 @@
 module test_family_surface
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_surface, only: bond_factor
   use pd_force_reference, only: reference_dilatation, reference_energy
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect, expect_true, ready

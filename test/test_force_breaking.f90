@@ -1,9 +1,9 @@
 !> Which bonds break, what they cost, and what counts as damage.
 module test_force_breaking
   use pd_base_kinds, only: wp, i8
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_motion_system, only: evaluate
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: at_point, box_scene, expect, expect_true, ready

@@ -4,14 +4,14 @@ module test_force_frame
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, sp
   use pd_base_numbers, only: pi
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_lattice, only: lattice_family_type
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: reference_force
-  use pd_motion_explicit, only: run_explicit
-  use pd_output_rotation, only: turned_part, rotation_angle
-  use pd_scene_types, only: scene_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_output_report_rotation, only: turned_part, rotation_angle
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, diary_type, expect, expect_true, ready_alone, rotation_matrix, &

@@ -2,13 +2,13 @@
 module test_motion_conditions
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
-  use pd_driver, only: set_up_type, prepare
+  use pd_set_up_prepare, only: set_up_type
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve
   use pd_motion_system, only: add_loads, evaluate
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type
-  use bodies, only: at_point, box_scene, expect, expect_true, ready
+  use bodies, only: prepare_run, at_point, box_scene, expect, expect_true, ready
   implicit none (type, external)
   private
   public :: collect_motion_conditions
@@ -243,7 +243,7 @@ contains
     end if
     scene%bodies(1)%points(1) = 5
     scene%bodies(1)%upper(1) = 5.0_wp
-    call prepare(scene, set_up, fault)
+    call prepare_run(scene, set_up, fault)
     call expect_true(error, allocated(fault), 'a file with too few rows was accepted')
     if (allocated(fault)) call expect_true(error, index(fault%message, '12 rows') > 0 .and. &
       & index(fault%message, '15 points') > 0, 'message: '//fault%message)

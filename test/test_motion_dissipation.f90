@@ -4,12 +4,12 @@ module test_motion_dissipation
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_error, only: fault_type => error_type
-  use pd_driver, only: set_up_type
-  use pd_motion_explicit, only: run_explicit
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density, &
     & velocities_now
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: box_scene, expect, expect_true, ready, text_of

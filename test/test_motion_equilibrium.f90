@@ -4,12 +4,12 @@ module test_motion_equilibrium
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: fault_type => error_type, status_no_answer
   use pd_base_numbers, only: noise
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_relaxation, only: run_relaxation
-  use pd_motion_rigid, only: rigid_type, find_free_motions, turn_back
+  use pd_motion_static_relaxation, only: run_relaxation
+  use pd_motion_static_rigid, only: rigid_type, find_free_motions, turn_back
   use pd_motion_system, only: system_type, energies_type, energies_of
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: at_point, box_scene, expect, expect_true, ready_alone, rotation_matrix

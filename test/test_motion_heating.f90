@@ -2,15 +2,16 @@
 module test_motion_heating
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
-  use pd_body_memory, only: predicted_memory
-  use pd_driver, only: set_up_type, prepare
-  use pd_motion_explicit, only: run_explicit
-  use pd_motion_relaxation, only: run_relaxation
-  use pd_scene_read, only: read_scene_text
-  use pd_scene_types, only: scene_type
+  use pd_set_up_memory, only: predicted_memory
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_motion_static_relaxation, only: run_relaxation
+  use pd_scene_content_read, only: read_scene_text
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: box_scene, diary_type, expect, expect_true, ready, ready_alone, youngs_modulus
+  use bodies, only: prepare_run, box_scene, diary_type, expect, expect_true, ready, ready_alone, &
+    & youngs_modulus
   implicit none (type, external)
   private
   public :: collect_motion_heating
@@ -216,7 +217,7 @@ contains
 
       if (allocated(error)) return
       call read_scene_text(text, 'warned.nml', scene, fault)
-      if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+      if (.not. allocated(fault)) call prepare_run(scene, set_up, fault)
       if (allocated(fault)) then
         call test_failed(error, fault%message)
         return

@@ -5,12 +5,12 @@ module test_motion_newton
   use pd_base_kinds, only: wp, i8
   use pd_base_error, only: fault_type => error_type, fail, status_interrupted, status_no_answer
   use pd_base_shelf, only: shelf_type
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_motion_keep, only: keep_system
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_relaxation, only: run_relaxation
+  use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: box_scene, expect_true, ready
   implicit none (type, external)

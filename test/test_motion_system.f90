@@ -3,9 +3,9 @@ module test_motion_system
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i8
   use pd_base_error, only: fault_type => error_type
-  use pd_driver, only: set_up_type
-  use pd_motion_explicit, only: run_explicit
-  use pd_scene_types, only: scene_type
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: box_scene, density_of_steel, diary_type, expect, expect_true, ready, text_of, &

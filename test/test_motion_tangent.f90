@@ -2,12 +2,12 @@
 !> energy where the body is deformed.
 module test_motion_tangent
   use pd_base_kinds, only: wp
-  use pd_driver, only: set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
   use pd_motion_system, only: system_type
   use pd_motion_tangent, only: apply_tangent
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect, ready, shake, text_of

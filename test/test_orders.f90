@@ -5,10 +5,10 @@ module test_orders
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
   use pd_base_error, only: fault_type => error_type
-  use pd_driver, only: set_up_type
-  use pd_motion_explicit, only: run_explicit
+  use pd_set_up_prepare, only: set_up_type
+  use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_system, only: evaluate
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: at_point, box_scene, density_of_steel, diary_type, expect, expect_true, &

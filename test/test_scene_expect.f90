@@ -1,8 +1,8 @@
 !> Shared by the suites of scenes: messages must hold what they promise.
 module test_scene_expect
   use pd_base_error, only: scene_error => error_type
-  use pd_scene_read, only: read_scene_text
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_read, only: read_scene_text
+  use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, test_failed
   implicit none (type, external)
   private

@@ -2,11 +2,11 @@
 !> is refused at its place. New keys are covered without a word here.
 module test_scene_hostile
   use pd_base_error, only: scene_error => error_type
-  use pd_scene_file, only: line_type, read_text_file, split_lines
-  use pd_scene_groups, only: describe_group, group_names
-  use pd_scene_keys, only: keys_type
-  use pd_scene_read, only: read_scene_text
-  use pd_scene_types, only: scene_type
+  use pd_scene_format_file, only: line_type, read_text_file, split_lines
+  use pd_scene_content_groups, only: describe_group, group_names
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_content_read, only: read_scene_text
+  use pd_scene_content_types, only: scene_type
   use test_scene_expect, only: expect_fault, expect_parts, line
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)

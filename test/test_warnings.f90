@@ -4,13 +4,15 @@ module test_warnings
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
   use pd_base_warnings, only: warnings_type
-  use pd_driver, only: prepare, run_options_type, run_scene, set_up_type
-  use pd_output_files, only: file_exists, make_directory
-  use pd_output_sink, only: sink_type
-  use pd_scene_file, only: read_text_file
-  use pd_scene_types, only: scene_type
+  use pd_driver, only: run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_set_up_prepare, only: set_up_type
+  use pd_output_results_files, only: file_exists, make_directory
+  use pd_output_results_sink, only: sink_type
+  use pd_scene_format_file, only: read_text_file
+  use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: box_scene, expect_true
+  use bodies, only: prepare_run, box_scene, expect_true
   implicit none (type, external)
   private
   public :: collect_warnings
@@ -51,7 +53,7 @@ contains
     integer :: i, n
 
     if (allocated(error)) return
-    call prepare(scene, set_up, fault)
+    call prepare_run(scene, set_up, fault)
     if (allocated(fault)) then
       call test_failed(error, what//' is refused: '//fault%message)
       return

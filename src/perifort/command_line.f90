@@ -4,8 +4,8 @@ module pd_command_line
   use pd_base_kinds, only: wp
   use pd_base_shell, only: program_command, quoted
   use pd_base_text, only: join, nearest_name, newline, to_text
-  use pd_scene_values, only: parse_real
-  use pd_study_options, only: bench_options_type, check_options
+  use pd_scene_format_values, only: parse_real
+  use pd_study_bench_options, only: bench_options_type, check_options
   implicit none (type, external)
   private
   public :: command_line_type, parse_command_line, read_command_line, command_names, &

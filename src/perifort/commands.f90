@@ -7,16 +7,17 @@ module pd_commands
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
-  use pd_driver, only: check_scene, run_options_type, run_scene
-  use pd_output_hdf5, only: hdf5_version
-  use pd_scene_read, only: read_scene
-  use pd_scene_reference, only: write_reference
-  use pd_scene_template, only: write_template
-  use pd_scene_types, only: scene_type
-  use pd_study_bench, only: run_bench
-  use pd_study_choose, only: run_choose
-  use pd_study_limits, only: run_limits
-  use pd_study_study, only: run_study
+  use pd_driver, only: check_scene, run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_output_results_hdf5, only: hdf5_version
+  use pd_scene_content_read, only: read_scene
+  use pd_scene_content_reference, only: write_reference
+  use pd_scene_content_template, only: write_template
+  use pd_scene_content_types, only: scene_type
+  use pd_study_bench_bench, only: run_bench
+  use pd_study_trade_choose, only: run_choose
+  use pd_study_limits_limits, only: run_limits
+  use pd_study_trade_study, only: run_study
   implicit none (type, external)
   private
   public :: execute

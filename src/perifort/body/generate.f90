@@ -7,10 +7,10 @@ module pd_body_generate
   use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
-  use pd_scene_types, only: scene_type, is_set
-  use pd_scene_file, only: resolve_path
-  use pd_scene_rules, only: place_fault, scene_fault
-  use pd_scene_table, only: table_type, read_table
+  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_format_file, only: resolve_path
+  use pd_scene_content_rules, only: place_fault, scene_fault
+  use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_lattices, only: lattice_points, lattice_grid
   use pd_body_layers, only: add_layers, layer_count_type

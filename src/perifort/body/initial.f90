@@ -3,10 +3,10 @@ module pd_body_initial
   use pd_base_kinds, only: wp, i2
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
-  use pd_scene_types, only: scene_type, is_set
-  use pd_scene_file, only: resolve_path
-  use pd_scene_rules, only: place_fault, scene_fault
-  use pd_scene_table, only: table_type, read_table
+  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_format_file, only: resolve_path
+  use pd_scene_content_rules, only: place_fault, scene_fault
+  use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
   use pd_body_shapes, only: inside

@@ -1,7 +1,7 @@
 !> Lattices: points at the centres of the cells of a grid, and the cell that holds a point.
 module pd_body_lattices
   use pd_base_kinds, only: wp
-  use pd_scene_types, only: body_group
+  use pd_scene_content_types, only: body_group
   use pd_body_body, only: body_type, grid_type, allocate_points
   implicit none (type, external)
   private

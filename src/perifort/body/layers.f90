@@ -8,8 +8,8 @@ module pd_body_layers
   use pd_base_error, only: error_type
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
-  use pd_scene_rules, only: scene_fault
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_lattices, only: lattice_grid, box_of_cells, cell_of
   implicit none (type, external)

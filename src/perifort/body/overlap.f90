@@ -4,8 +4,8 @@ module pd_body_overlap
   use pd_base_kinds, only: wp, i4
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
-  use pd_scene_rules, only: scene_fault
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type
   use pd_body_body, only: body_type, grid_type
   use pd_body_lattices, only: lattice_grid, cell_of
   implicit none (type, external)

@@ -1,7 +1,7 @@
 !> Shapes that choose points: box, sphere, cylinder (in 2D a sphere or cylinder is a disc).
 module pd_body_shapes
   use pd_base_kinds, only: wp
-  use pd_scene_types, only: shape_group, is_set
+  use pd_scene_content_types, only: shape_group, is_set
   implicit none (type, external)
   private
   public :: inside

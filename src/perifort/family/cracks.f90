@@ -5,7 +5,7 @@
 !> different sides and it passes through the crack or its rim (again within a millionth).
 module pd_family_cracks
   use pd_base_kinds, only: wp, i8
-  use pd_scene_types, only: crack_group, is_set
+  use pd_scene_content_types, only: crack_group, is_set
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)

@@ -6,7 +6,7 @@ module pd_family_warnings
   use pd_base_numbers, only: pi
   use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_types, only: scene_type
+  use pd_scene_content_types, only: scene_type
   use pd_body_body, only: body_type
   use pd_family_cracks, only: points_on
   use pd_family_family, only: family_type, bonds_type, allocate_bonds

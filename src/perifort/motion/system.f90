@@ -13,7 +13,7 @@ module pd_motion_system
     & moved_by_velocity
   use pd_motion_heating, only: heating_type, heat, apply_factors
   use pd_motion_memory, only: memory_type
-  use pd_motion_watch, only: watch_type
+  use pd_motion_energy_watch, only: watch_type
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &

@@ -1,0 +1,269 @@
+!> The stable time step (7.25 in the form of doc/theory.md, 6).
+module pd_motion_explicit_time_step
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
+  use pd_base_numbers, only: pi
+  use pd_body_body, only: body_type
+  use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_surface, only: bond_factor
+  use pd_family_lattice, only: lattice_family_type
+  use pd_force_bound, only: lattice_bound, lattice_printed_bound
+  use pd_force_model, only: model_type
+  implicit none (type, external)
+  private
+  public :: stiffness_bound, stable_step, printed_step, printed_stiffness, book_step, &
+    & chapter_stiffness, integrator_limit, evaluations
+  public :: constant_stiffness, horizon_volume
+
+contains
+
+  !> M_k [N/m4] of every slot, 0 for points without bonds:
+  !> sum_j [ (q_k+q_j) Gb + (m_k I_k + m_j I_j) Gd ] vc V_j/|xi|, m = 2 max(a,0) (d delta)^2,
+  !> I_k = sum_l Gd vc V_l/|xi|. The step sqrt(2 rho/M) and the relaxation's mass come from it.
+  subroutine stiffness_bound(body, family, model, bound)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(inout), contiguous :: bound(:)
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: inverse(:)
+    real(wp) :: n(body%dim)
+    integer :: k, i, j
+
+    select type (family)
+    type is (lattice_family_type)
+      ! the weights hold all that is needed, unless they are not made yet
+      if (allocated(family%table)) then
+        call lattice_bound(family, model, bound)
+        return
+      end if
+    class default  ! below, bond by bond, which suits any family
+      continue
+    end select
+    allocate (inverse(body%n_slots), source=0.0_wp)
+    !$omp parallel default(none) shared(body, family, model, bound, inverse) &
+    !$omp private(bonds, n, k, i, j)
+    call allocate_bonds(family, bonds)
+    if (model%dilatation) then
+      !$omp do schedule(dynamic, 256)
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        call family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          j = bonds%j(i)
+          n = bonds%xi(i, :)/bonds%length(i)
+          inverse(k) = inverse(k) + factor(model, model%D, n, k, j)*bonds%weight(i)/bonds%length(i)
+        end do
+        associate (m => model%materials(model%material(k)))
+          inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*m%t**2
+        end associate
+      end do
+    end if
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      bound(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        j = bonds%j(i)
+        n = bonds%xi(i, :)/bonds%length(i)
+        bound(k) = bound(k) + ((model%materials(model%material(k))%q &
+          & + model%materials(model%material(j))%q)*factor(model, model%S, n, k, j) &
+          & + (inverse(k) + inverse(j))*factor(model, model%D, n, k, j)) &
+          & *bonds%weight(i)/bonds%length(i)
+      end do
+    end do
+    !$omp end parallel
+  end subroutine stiffness_bound
+
+  !> The size of Gd or Gb of the bond k-j along the unit vector n.
+  pure real(wp) function factor(model, g, n, k, j)
+    type(model_type), intent(in) :: model
+    real(wp), allocatable, intent(in) :: g(:, :)
+    real(wp), intent(in) :: n(:)
+    integer, intent(in) :: k, j
+    factor = 1.0_wp
+    if (model%surface) factor = abs(bond_factor(n, g(k, :), g(j, :)))
+  end function factor
+
+  !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
+  pure real(wp) function stable_step(body, model, bound) result(step)
+    type(body_type), intent(in) :: body
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: bound(:)
+    integer :: k
+
+    step = huge(step)
+    do k = 1, body%n_slots
+      if (bound(k) > 0.0_wp) &
+        & step = min(step, sqrt(2*model%materials(model%material(k))%density/bound(k)))
+    end do
+  end function stable_step
+
+  !> 7.25 as printed: without surface factors, and with the plain sign of a. Negative sums have no
+  !> step: 0 is returned. Shown beside the step that is used.
+  subroutine printed_step(body, family, model, step)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: step
+    real(wp), allocatable :: printed(:)
+    real(wp) :: squared
+    integer :: k
+
+    allocate (printed(body%n_slots), source=0.0_wp)
+    call printed_stiffness(body, family, model, printed)
+    squared = huge(squared)
+    do k = 1, body%n_slots
+      ! a sum that is exactly 0 has no bonds
+      if (printed(k) < 0.0_wp) squared = 0.0_wp
+      if (printed(k) > 0.0_wp) &
+        & squared = min(squared, 2*model%materials(model%material(k))%density/printed(k))
+    end do
+    step = sqrt(squared)
+  end subroutine printed_step
+
+  !> The sum of 7.25 as printed for every slot [N/m4], 0 without bonds: no surface factors, a with
+  !> its sign. Its inner sum has the plain volumes in the book, and is all but the same with v_c.
+  subroutine printed_stiffness(body, family, model, printed)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(inout), contiguous :: printed(:)
+
+    select type (family)
+    type is (lattice_family_type)
+      call lattice_printed_bound(family, model, printed)
+    class default  ! bond by bond, which suits any family
+      call printed_bound(body, family, model, printed)
+    end select
+  end subroutine printed_stiffness
+
+  !> `printed_stiffness`, bond by bond.
+  subroutine printed_bound(body, family, model, printed)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: printed(:)
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: inverse(:)
+    integer :: k, i
+
+    allocate (inverse(body%n_slots), source=0.0_wp)
+    !$omp parallel default(none) shared(body, family, model, inverse, printed) private(bonds, k, i)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      inverse(k) = sum(bonds%weight(:bonds%n)/bonds%length(:bonds%n))
+    end do
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      printed(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      associate (m => model%materials(model%material(k)))
+        do i = 1, bonds%n
+          printed(k) = printed(k) + (2*m%a*m%t**2*(inverse(k) + inverse(bonds%j(i))) + 2*m%q) &
+            & *bonds%weight(i)/bonds%length(i)
+        end do
+      end associate
+    end do
+    !$omp end parallel
+  end subroutine printed_bound
+
+  !> Volume of the horizon [m3]: 4/3 pi delta^3, pi delta^2 h, 2 delta A.
+  pure real(wp) function horizon_volume(dim, delta, depth) result(volume)
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: delta, depth
+    select case (dim)
+    case (3); volume = 4*pi*delta**3/3
+    case (2); volume = pi*delta**2*depth
+    case default; volume = 2*delta*depth
+    end select
+  end function horizon_volume
+
+  !> The book's own estimate of the step, sqrt(2 rho dx/(V_h c)) [s], least over the materials.
+  pure real(wp) function book_step(model, dim, delta, depth, spacing) result(step)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: delta, depth, spacing
+    step = minval(sqrt(2*model%materials%density*spacing &
+      & /(horizon_volume(dim, delta, depth)*2*model%materials%q)))
+  end function book_step
+
+  !> The sum 7.32 for each component, each term times vc V_j [N/m4].
+  subroutine chapter_stiffness(body, family, model, stiffness)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(out) :: stiffness(:, :)
+    type(bonds_type) :: bonds
+    real(wp) :: term, delta
+    integer :: k, i, c, j
+
+    delta = family%rule%delta
+    !$omp parallel default(none) shared(body, family, model, stiffness, delta) &
+    !$omp private(bonds, k, i, c, j, term)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      stiffness(k, :) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      associate (m => model%materials(model%material(k)))
+        do i = 1, bonds%n
+          j = bonds%j(i)
+          term = 4*delta/bonds%length(i)*(0.5_wp*max(m%a, 0.0_wp)*m%d**2*delta/bonds%length(i) &
+            & *(body%volume(k)*bonds%weight(i)/body%volume(j) + bonds%weight(i)) &
+            & + m%b)*bonds%weight(i)
+          do c = 1, body%dim
+            stiffness(k, c) = stiffness(k, c) + abs(bonds%xi(i, c))/bonds%length(i)*term
+          end do
+        end do
+      end associate
+    end do
+    !$omp end parallel
+  end subroutine chapter_stiffness
+
+  !> V_h c/spacing of every slot, the book's own estimate of the stiffness [N/m4].
+  pure subroutine constant_stiffness(body, model, delta, depth, stiffness)
+    type(body_type), intent(in) :: body
+    type(model_type), intent(in) :: model
+    real(wp), intent(in) :: delta, depth
+    real(wp), intent(out) :: stiffness(:)
+    integer :: k
+
+    do k = 1, body%n_slots
+      stiffness(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      stiffness(k) = horizon_volume(body%dim, delta, depth)*2*model%materials(model%material(k))%q &
+        & /body%spacing(k)
+    end do
+  end subroutine constant_stiffness
+
+  !> Largest stable omega dt of an integrator on the undamped oscillator.
+  pure real(wp) function integrator_limit(integrator) result(limit)
+    character(*), intent(in) :: integrator
+    select case (integrator)
+    case ('adams_bashforth'); limit = 0.72_wp
+    case ('adams_moulton'); limit = 1.29_wp
+    case ('runge_kutta'); limit = 2.83_wp
+    case ('forward_backward', 'velocity_verlet'); limit = 2.0_wp
+    case default; call internal_fault('unknown integrator')
+    end select
+  end function integrator_limit
+
+  !> Force evaluations of one step of an integrator.
+  pure integer function evaluations(integrator)
+    character(*), intent(in) :: integrator
+    select case (integrator)
+    case ('runge_kutta'); evaluations = 4
+    case ('adams_moulton'); evaluations = 2
+    case ('forward_backward', 'velocity_verlet', 'adams_bashforth'); evaluations = 1
+    case default; call internal_fault('unknown integrator')
+    end select
+  end function evaluations
+
+end module pd_motion_explicit_time_step

@@ -1,0 +1,483 @@
+!> Whether a state is in static equilibrium, piece by piece (doc/theory.md, 7): what is out of
+!> balance beside what acts, whether reactions and loads balance, and how far the displacements may
+!> be off.
+module pd_motion_static_balance
+  use pd_base_kinds, only: wp, i1
+  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_text, only: newline, to_text
+  use pd_force_forces, only: energy_pass
+  use pd_motion_watch_fault, only: place
+  use pd_motion_static_pieces, only: piece_text
+  use pd_motion_static_residual, only: relaxation_type
+  use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
+  use pd_motion_system, only: system_type, add_loads
+  use pd_motion_tangent, only: forces_at
+  implicit none (type, external)
+  private
+  public :: balance_type, begin_balance, weigh, weigh_energies, balanced_but_for_error
+  public :: allowed_error, error_is_known, relative_residual, describe_left_over
+  public :: fail_unconverged, check_drowned, rounding_note
+
+  !> What is out of balance in one piece. Norms of forces are squared, over components: [N2].
+  type :: tally_type
+    real(wp) :: residual = 0.0_wp       !! of the free components
+    real(wp) :: support = 0.0_wp        !! of the constrained components
+    real(wp) :: load = 0.0_wp           !! of the loads
+    real(wp) :: thermal = 0.0_wp        !! of the forces of the undeformed body, heated
+    real(wp) :: rounding = 0.0_wp       !! of what rounding of the displacements leaves
+    real(wp) :: rho = 0.0_wp            !! residual . (residual/mass), weighted with volume [N m]
+    real(wp) :: rho_rounding = 0.0_wp   !! the same of what rounding leaves [N m]
+    real(wp) :: left(3) = 0.0_wp        !! loads and reactions together [N]
+    real(wp) :: moment(3) = 0.0_wp      !! their moment about the piece's centre [N m]
+    real(wp) :: force_scale = 0.0_wp    !! largest net force of a boundary or a load [N]
+    real(wp) :: moment_scale = 0.0_wp   !! largest net moment of one [N m]
+    logical :: loaded = .false.         !! its loads have a net force or moment
+    real(wp) :: energy = 0.0_wp         !! twice the strain energy [J]
+  end type tally_type
+
+  !> All pieces, and what is the same for all states of a load step.
+  type :: balance_type
+    type(tally_type), allocatable :: piece(:)
+    real(wp), allocatable :: thermal(:)         !! as in `tally_type`
+    real(wp), allocatable :: thermal_energy(:)  !! twice the energy of the undeformed body, heated
+    real(wp) :: acting = 0.0_wp  !! squared norm of loads or thermal forces, all pieces
+  end type balance_type
+
+  !> Share of the largest net force, and moment, that reactions and loads may leave over.
+  real(wp), parameter :: left_over = 2.0e-4_wp
+  !> ... and what they may leave where rounding lets nothing better be had.
+  real(wp), parameter :: most_left_over = 1.0e-3_wp
+  !> Imposed displacements are those of a rigid body if they differ by no more than this part.
+  real(wp), parameter :: rigid_to = 1.0e-13_wp
+  !> Net force or moment of loads, over the applied ones, that counts as none.
+  real(wp), parameter :: no_net = 1.0e-10_wp
+  !> Rounding of a force: so many units in the last place of a displacement times the stiffness of a
+  !> point, which bounds its row (doc/theory.md, 6).
+  real(wp), parameter :: last_places = 8.0_wp
+  !> That is a bound. What rounding does leave is nearer to this part of it, since the errors of a
+  !> point's bonds are of either sign: so far a residual can be brought beside what acts.
+  real(wp), parameter :: likely = 0.0125_wp
+  !> What acts must be so many times the bound: then what is left is a thousandth.
+  real(wp), parameter :: audible = 1.0e3_wp*likely
+
+contains
+
+  !> What is the same for all states at time `t`: the forces and energies that heat alone makes, and
+  !> the norm of what acts.
+  subroutine begin_balance(system, rigid, t, balance)
+    type(system_type), intent(inout) :: system   !! a body with its conditions
+    type(rigid_type), intent(in) :: rigid        !! its pieces
+    real(wp), intent(in) :: t                    !! time [s]
+    type(balance_type), intent(out) :: balance   !! ready for `weigh`
+    real(wp), allocatable :: none(:, :), force(:, :), energy(:)
+    integer :: k, p
+
+    allocate (balance%piece(rigid%pieces%number))
+    allocate (balance%thermal(rigid%pieces%number), balance%thermal_energy(rigid%pieces%number), &
+      & source=0.0_wp)
+    allocate (force(system%body%n_slots, system%body%dim), source=0.0_wp)
+    call add_loads(system, t, 1.0_wp, .false., force)
+    do k = 1, system%body%n_slots
+      balance%acting = balance%acting + sum((force(k, :)*system%body%volume(k))**2)
+    end do
+    if (.not. system%model%thermal) return
+    allocate (none, mold=force)
+    allocate (energy(system%body%n_slots), source=0.0_wp)
+    none = 0.0_wp
+    call forces_at(system, none, force)
+    call energy_pass(system%family, system%model, none, energy)
+    do k = 1, system%body%n_slots
+      p = rigid%pieces%of(k)
+      if (p == 0) cycle
+      balance%thermal(p) = balance%thermal(p) + sum((force(k, :)*system%body%volume(k))**2)
+      balance%thermal_energy(p) = balance%thermal_energy(p) + 2*abs(energy(k))*system%body%volume(k)
+    end do
+    balance%acting = max(balance%acting, sum(balance%thermal))
+  end subroutine begin_balance
+
+  !> Sum up the state of every piece at time `t`; the forces of the system must belong to its
+  !> displacements.
+  subroutine weigh(system, relaxation, rigid, t, balance)
+    type(system_type), intent(in) :: system           !! a state
+    type(relaxation_type), intent(in) :: relaxation   !! how it is relaxed
+    type(rigid_type), intent(in) :: rigid             !! its pieces
+    real(wp), intent(in) :: t                         !! time [s]
+    type(balance_type), intent(inout) :: balance      !! gets the sums
+    real(wp), allocatable :: loads(:, :)
+    real(wp) :: squared, floor
+    integer :: k, c, p
+
+    do p = 1, size(balance%piece)
+      balance%piece(p) = tally_type()
+      balance%piece(p)%thermal = balance%thermal(p)
+    end do
+    allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
+    call add_loads(system, t, 1.0_wp, .false., loads)
+    do k = 1, system%body%n_slots
+      p = rigid%pieces%of(k)
+      if (p == 0) cycle
+      associate (piece => balance%piece(p), volume => system%body%volume(k))
+        do c = 1, system%body%dim
+          piece%load = piece%load + (loads(k, c)*volume)**2
+          squared = ((system%state%force(k, c) + loads(k, c))*volume)**2
+          if (system%held(k, c) == 1_i1) then
+            piece%support = piece%support + squared
+          else
+            piece%residual = piece%residual + squared
+          end if
+          if (.not. relaxation%mass(k, c) > 0.0_wp) cycle
+          ! the mass is half the bound of the stiffness
+          floor = last_places*epsilon(floor)*norm2(system%state%u(k, :)) &
+            & *2*relaxation%mass(k, c)*volume
+          piece%rounding = piece%rounding + floor**2
+          piece%rho_rounding = piece%rho_rounding + floor**2/(relaxation%mass(k, c)*volume)
+          if (system%held(k, c) == 0_i1) piece%rho = piece%rho &
+            & + squared/(relaxation%mass(k, c)*volume)
+        end do
+      end associate
+    end do
+    call add_groups(system, rigid, loads, balance)
+  end subroutine weigh
+
+  !> Net forces and moments of each boundary and each load on every piece, and their sums.
+  subroutine add_groups(system, rigid, loads, balance)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    real(wp), intent(in) :: loads(:, :)
+    type(balance_type), intent(inout) :: balance
+    real(wp), allocatable :: force(:, :), moment(:, :), applied(:)
+    real(wp) :: one(3)
+    integer :: m, i, p, dim, k
+
+    dim = system%body%dim
+    allocate (force(3, size(balance%piece)), moment(3, size(balance%piece)))
+    do m = 1, size(system%motions)
+      force = 0.0_wp
+      moment = 0.0_wp
+      associate (motion => system%motions(m))
+        do i = 1, size(motion%slots)
+          k = motion%slots(i)
+          one = 0.0_wp
+          where (motion%held(i, :) == 1_i1) &
+            & one(:dim) = -(system%state%force(k, :) + loads(k, :))*system%body%volume(k)
+          call add_one(k, one)
+        end do
+      end associate
+      call add_net()
+    end do
+    force = 0.0_wp
+    moment = 0.0_wp
+    allocate (applied(size(balance%piece)), source=0.0_wp)
+    do k = 1, system%body%n_slots
+      if (rigid%pieces%of(k) == 0) cycle
+      if (all(abs(loads(k, :)) <= 0.0_wp)) cycle
+      one = 0.0_wp
+      one(:dim) = loads(k, :)*system%body%volume(k)
+      call add_one(k, one)
+      applied(p) = applied(p) + norm2(one)
+    end do
+    do p = 1, size(balance%piece)
+      balance%piece(p)%loaded = norm2(force(:, p)) > no_net*applied(p) .or. &
+        & norm2(moment(:, p)) > no_net*applied(p)*rigid%piece(p)%size
+    end do
+    call add_net()
+
+  contains
+
+    !> A force on a slot.
+    subroutine add_one(slot, value)
+      integer, intent(in) :: slot
+      real(wp), intent(in) :: value(3)
+      real(wp) :: arm(3)
+
+      arm = 0.0_wp
+      p = rigid%pieces%of(slot)
+      arm(:dim) = system%body%x(slot, :) + system%state%u(slot, :) - rigid%piece(p)%centre(:dim)
+      force(:, p) = force(:, p) + value
+      moment(:, p) = moment(:, p) + [arm(2)*value(3) - arm(3)*value(2), &
+        & arm(3)*value(1) - arm(1)*value(3), arm(1)*value(2) - arm(2)*value(1)]
+    end subroutine add_one
+
+    !> A group is complete.
+    subroutine add_net()
+      do p = 1, size(balance%piece)
+        associate (piece => balance%piece(p))
+          piece%left = piece%left + force(:, p)
+          piece%moment = piece%moment + moment(:, p)
+          piece%force_scale = max(piece%force_scale, norm2(force(:, p)))
+          piece%moment_scale = max(piece%moment_scale, norm2(moment(:, p)))
+        end associate
+      end do
+    end subroutine add_net
+  end subroutine add_groups
+
+  !> Twice the strain energy of every piece, or that of its heat alone if that is larger.
+  subroutine weigh_energies(system, rigid, balance)
+    type(system_type), intent(inout) :: system
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(inout) :: balance
+    real(wp), allocatable :: energy(:)
+    integer :: k, p
+
+    allocate (energy(system%body%n_slots), source=0.0_wp)
+    call energy_pass(system%family, system%model, system%state%u, energy)
+    balance%piece%energy = 0.0_wp
+    do k = 1, system%body%n_slots
+      p = rigid%pieces%of(k)
+      if (p > 0) balance%piece(p)%energy = balance%piece(p)%energy &
+        & + 2*energy(k)*system%body%volume(k)
+    end do
+    balance%piece%energy = max(abs(balance%piece%energy), balance%thermal_energy)
+  end subroutine weigh_energies
+
+  !> The square of what residuals of a piece are parts of: the largest of the norms of support
+  !> forces, loads and thermal forces.
+  elemental real(wp) function scale_of(piece) result(squared)
+    type(tally_type), intent(in) :: piece
+    squared = max(piece%support, piece%load, piece%thermal)
+  end function scale_of
+
+  !> Whether what acts on a piece, if anything does, is too little to be told from rounding.
+  elemental logical function silent(piece)
+    type(tally_type), intent(in) :: piece
+    silent = scale_of(piece) < audible**2*piece%rounding
+  end function silent
+
+  !> Whether a piece's residual is what rounding leaves.
+  elemental logical function at_the_floor(piece)
+    type(tally_type), intent(in) :: piece
+    at_the_floor = piece%residual <= piece%rounding*merge(1.0_wp, likely**2, silent(piece))
+  end function at_the_floor
+
+  !> Whether residual force and net forces and moments of a piece are small enough, or as small as
+  !> rounding lets them be.
+  elemental logical function piece_balanced(relaxation, rigid_size, piece) result(balanced)
+    type(relaxation_type), intent(in) :: relaxation
+    real(wp), intent(in) :: rigid_size   !! extent of the piece [m]
+    type(tally_type), intent(in) :: piece
+
+    balanced = at_the_floor(piece)
+    if (silent(piece)) then
+      balanced = balanced .or. piece%residual <= relaxation%tolerance**2*scale_of(piece)
+      return
+    end if
+    ! of a state whose supports bear nothing but what is out of balance, the ratio is near 1
+    balanced = balanced .or. piece%residual <= relaxation%tolerance**2*scale_of(piece)
+    if (.not. balanced) return
+    balanced = net_balanced(relaxation%tolerance, left_over, rigid_size, piece) .or. &
+      & piece%residual <= likely**2*piece%rounding
+  end function piece_balanced
+
+  !> Whether loads and reactions of a piece leave no more than `share` of the largest net force, and
+  !> moment, of a boundary or of the loads. Where no load has one, reactions may vanish, as those of
+  !> a heated body that can expand; the residual is then all there is to go by.
+  elemental logical function net_balanced(tolerance, share, rigid_size, piece) result(balanced)
+    real(wp), intent(in) :: tolerance    !! of the residual [-]
+    real(wp), intent(in) :: share        !! [-]
+    real(wp), intent(in) :: rigid_size   !! extent of the piece [m]
+    type(tally_type), intent(in) :: piece
+    real(wp) :: force, moment
+
+    force = share*max(piece%force_scale, piece%moment_scale/rigid_size)
+    if (.not. piece%loaded) force = max(force, tolerance*sqrt(scale_of(piece)))
+    moment = max(share*piece%moment_scale, force*rigid_size)
+    balanced = norm2(piece%left) <= force .and. norm2(piece%moment) <= moment
+  end function net_balanced
+
+  !> Whether the forces of every piece are in balance as weighed; what remains to be known is how
+  !> far off its displacements are.
+  pure logical function balanced_but_for_error(relaxation, rigid, balance) result(balanced)
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(in) :: balance
+    balanced = all(piece_balanced(relaxation, rigid%piece%size, balance%piece))
+  end function balanced_but_for_error
+
+  !> The error energy (error . stiffness . error) that each piece's displacements may have [J]:
+  !> relative to the strain energy its root is 100 times the tolerance, and at most 1e-3.
+  pure function allowed_error(relaxation, balance) result(allowed)
+    type(relaxation_type), intent(in) :: relaxation
+    type(balance_type), intent(in) :: balance
+    real(wp), allocatable :: allowed(:)
+    allocate (allowed(size(balance%piece)), source= &
+      & min(1.0e-3_wp, 100*relaxation%tolerance)**2*balance%piece%energy)
+  end function allowed_error
+
+  !> Whether the displacements of every piece are known to be near enough to equilibrium: the error
+  !> energy is at most the residual's `rho` times the softness of the preconditioned stiffness, if
+  !> that is known (> 0). Where only rounding is left nothing more can be had.
+  pure logical function error_is_known(balance, softness, allowed)
+    type(balance_type), intent(in) :: balance   !! with energies
+    real(wp), intent(in) :: softness            !! [-]
+    real(wp), intent(in) :: allowed(:)          !! error energy of each piece [J]
+    error_is_known = all(balance%piece%rho &
+      & <= balance%piece%rho_rounding*merge(1.0_wp, likely**2, silent(balance%piece)) .or. &
+      & (softness > 0.0_wp .and. balance%piece%rho*softness <= allowed))
+  end function error_is_known
+
+  !> The largest relative residual of all pieces; 0 where nothing but rounding is left.
+  pure real(wp) function relative_residual(balance) result(residual)
+    type(balance_type), intent(in) :: balance
+    residual = maxval(relative_to_scale(balance%piece))
+  end function relative_residual
+
+  elemental real(wp) function relative_to_scale(piece) result(relative)
+    type(tally_type), intent(in) :: piece
+    relative = 0.0_wp
+    if (piece%residual <= 0.0_wp) return
+    if (at_the_floor(piece) .and. silent(piece)) return
+    relative = sqrt(piece%residual/max(scale_of(piece), tiny(1.0_wp)))
+  end function relative_to_scale
+
+  !> The piece that is farthest from balance.
+  pure integer function worst_piece(balance) result(worst)
+    type(balance_type), intent(in) :: balance
+    worst = maxloc(relative_to_scale(balance%piece), dim=1)
+  end function worst_piece
+
+  !> The error of a relaxation whose iterations are used up; `balance` is where it stands.
+  subroutine fail_unconverged(system, relaxation, rigid, balance, load_step, t, change, error)
+    type(system_type), intent(in) :: system
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(in) :: balance   !! as weighed
+    integer, intent(in) :: load_step            !! its number
+    real(wp), intent(in) :: t                   !! its time [s]
+    real(wp), intent(in) :: change              !! of displacement in the last iteration, relative
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: advice
+
+    if (at_the_floor(balance%piece(worst_piece(balance)))) then
+      advice = 'No less than '// &
+        & to_text(likely*sqrt(balance%piece(worst_piece(balance))%rounding), 1)// &
+        & ' N can be expected where forces are rounded. Move or heat the body by less, load it '// &
+        & 'by more, or raise tolerance'
+    else
+      advice = 'Raise maximum_iterations or tolerance, or use more load steps'
+    end if
+    call fail(error, 'not converged: after '//to_text(relaxation%maximum_iterations)// &
+      & ' iterations of load step '//to_text(load_step)//' the residual force is '// &
+      & to_text(relative_residual(balance))//' and the change of displacement '//to_text(change)// &
+      & ' (tolerance '//to_text(relaxation%tolerance)//'). '//advice//newline//'  '// &
+      & describe_left_over(system, rigid, balance, worst_piece(balance), t), status_no_answer)
+  end subroutine fail_unconverged
+
+  !> What to say about an accepted state whose residual is above the tolerance, '' if it is not.
+  function rounding_note(relaxation, balance) result(text)
+    type(relaxation_type), intent(in) :: relaxation
+    type(balance_type), intent(in) :: balance   !! as weighed
+    character(:), allocatable :: text
+
+    text = ''
+    if (relative_residual(balance) <= relaxation%tolerance) return
+    text = 'the residual stops at '//to_text(relative_residual(balance), 2)//', above the '// &
+      & 'tolerance of '//to_text(relaxation%tolerance)//', because forces are not formed more '// &
+      & 'exactly; the state is accepted, since its error is known to be small'
+  end function rounding_note
+
+  !> An error if what acts on some piece vanishes in the rounding of its forces: then nothing is
+  !> known of its equilibrium.
+  subroutine check_drowned(system, relaxation, rigid, balance, error)
+    type(system_type), intent(in) :: system
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(in) :: balance   !! as weighed, of an accepted state
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: text
+    integer :: p
+
+    do p = 1, size(balance%piece)
+      associate (tally => balance%piece(p))
+        if (silent(tally)) then
+          ! a piece that is only moved, as a rigid body, is where it should be
+          if (.not. max(tally%load, tally%thermal) > 0.0_wp) then
+            if (.not. supports_strain(system, rigid, p)) cycle
+          end if
+          text = 'the forces that act on '//piece_text(system%body, rigid%pieces, p)//', '// &
+            & to_text(sqrt(scale_of(tally)), 3)//' N, vanish in the rounding of its forces, '// &
+            & to_text(sqrt(tally%rounding), 2)//' N'
+        else
+          if (.not. scale_of(tally) > 0.0_wp) cycle  ! nothing acts
+          if (net_balanced(max(relaxation%tolerance, likely*sqrt(tally%rounding/scale_of(tally))), &
+            & most_left_over, rigid%piece(p)%size, tally)) cycle
+          text = 'loads and reactions of '//piece_text(system%body, rigid%pieces, p)// &
+            & ', net forces of up to '//to_text(tally%force_scale, 3)//' N, leave a force of '// &
+            & to_text(norm2(tally%left), 3)//' N because its forces are rounded,'
+        end if
+      end associate
+      call fail(error, 'no static equilibrium can be computed: '//text// &
+        & ' at displacements of up to '//to_text(maxval(abs(system%state%u)), 3)// &
+        & ' m. Move or heat it by less, or load it by more', &
+        & status_no_answer)
+      return
+    end do
+  end subroutine check_drowned
+
+  !> Whether the imposed displacements of a piece are not those of a rigid body, to rounding.
+  logical function supports_strain(system, rigid, p)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    integer, intent(in) :: p                    !! number of the piece
+    real(wp), allocatable :: u(:, :), weight(:, :)
+
+    associate (slots => rigid%pieces%slots(rigid%pieces%start(p):rigid%pieces%start(p + 1) - 1))
+      supports_strain = .false.
+      if (.not. rigid%piece(p)%held) return
+      allocate (weight, source=real(system%held, wp))
+      allocate (u(size(weight, 1), size(weight, 2)), source=0.0_wp)
+      call fit_rigid_motion(system, rigid, p, system%state%u, weight, u)
+      supports_strain = any(weight(slots, :)*abs(u(slots, :) - system%state%u(slots, :)) &
+        & > rigid_to*maxval(abs(system%state%u(slots, :))))
+    end associate
+  end function supports_strain
+
+  !> What is left over in a piece and where, in words.
+  function describe_left_over(system, rigid, balance, piece, t) result(text)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    type(balance_type), intent(in) :: balance    !! as weighed
+    integer, intent(in) :: piece                 !! its number
+    real(wp), intent(in) :: t                    !! time of the loads [s]
+    character(:), allocatable :: text
+    real(wp), allocatable :: loads(:, :)
+    real(wp) :: largest, here
+    integer :: i, k, at
+
+    allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
+    call add_loads(system, t, 1.0_wp, .false., loads)
+    largest = -1.0_wp
+    at = 0
+    do i = rigid%pieces%start(piece), rigid%pieces%start(piece + 1) - 1
+      k = rigid%pieces%slots(i)
+      here = norm2(merge(system%state%force(k, :) + loads(k, :), 0.0_wp, &
+        & system%held(k, :) == 0_i1))*system%body%volume(k)
+      if (here > largest .or. at == 0) at = k
+      largest = max(largest, here)
+    end do
+    associate (tally => balance%piece(piece))
+      text = piece_text(system%body, rigid%pieces, piece)//' has '// &
+        & to_text(sqrt(tally%residual), 3)//' N out of balance, most of it at point '// &
+        & to_text(int(system%body%point(at)))//' at ('//place(system, at)// &
+          & '); its supports bear '// &
+        & to_text(sqrt(tally%support), 3)//' N, its loads are '//to_text(sqrt(tally%load), 3)// &
+        & ' N (root sums of squares over the points), and together they leave a force of ('// &
+        & vector(tally%left(:system%body%dim))//') N'
+      if (system%body%dim == 2) text = text//' and a moment of '//to_text(tally%moment(3), 3)// &
+        & ' N m'
+      if (system%body%dim == 3) text = text//' and a moment of ('//vector(tally%moment)//') N m'
+    end associate
+  end function describe_left_over
+
+  !> Components as text.
+  pure function vector(values) result(text)
+    real(wp), intent(in) :: values(:)
+    character(:), allocatable :: text
+    integer :: c
+
+    text = to_text(values(1), 3)
+    do c = 2, size(values)
+      text = text//', '//to_text(values(c), 3)
+    end do
+  end function vector
+
+end module pd_motion_static_balance

@@ -1,0 +1,347 @@
+!> The loops over the arrays of a conjugate gradient solve: what is left of the force, the
+!> direction, and what the stiffness makes of it (doc/theory.md, 7). Everything is per volume, and
+!> inner products are weighted with the points' volumes, in which the stiffness is symmetric.
+module pd_motion_static_krylov
+  use pd_base_kinds, only: wp, i1
+  use pd_base_numbers, only: block_length
+  use pd_motion_newton, only: krylov_type, ritz_type, sums_type
+  use pd_motion_system, only: system_type, add_loads
+  use pd_motion_tangent, only: forces_at
+  implicit none (type, external)
+  private
+  public :: make_room, linearise, take_residual, first_direction
+  public :: next_direction, take_direction, apply_stiffness, go_along, volume_inner
+  public :: smallest_curvature, note_length
+
+  !> Directions are kept this small over the horizon: there the forces are linear to the last digit,
+  !> so that one evaluation at a direction itself is the product with the undeformed stiffness.
+  real(wp), parameter :: direction_size = 1.0e-14_wp, largest_size = 1.0e-10_wp
+  !> Step of the differences that make the tangent of a deformed body, over the horizon.
+  real(wp), parameter :: difference_size = 1.0e-8_wp
+  !> Curvature over that of the preconditioner, below which a direction meets no stiffness at all.
+  real(wp), parameter :: smallest_curvature = 1.0e-14_wp
+
+contains
+
+  !> Room for a system's solves, where there is none yet; `mass` (n_slots, dim) is the
+  !> preconditioner [N/m4].
+  subroutine make_room(system, mass, krylov)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: mass(:, :)
+    type(krylov_type), intent(inout) :: krylov
+
+    if (.not. allocated(krylov%residual)) allocate (krylov%residual, krylov%direction, &
+      & krylov%origin, source=0.0_wp*mass)
+    allocate (krylov%product, krylov%inverse, source=0.0_wp*mass)
+    where (mass > 0.0_wp .and. system%held == 0_i1) krylov%inverse = 1/mass
+  end subroutine make_room
+
+  !> The residual from the system's forces and the loads at `t`, and its sums.
+  subroutine take_residual(system, t, krylov, sums)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: t
+    type(krylov_type), intent(inout) :: krylov
+    type(sums_type), intent(out) :: sums
+
+    krylov%residual = system%state%force
+    call add_loads(system, t, 1.0_wp, .false., krylov%residual)
+    where (.not. krylov%inverse > 0.0_wp) krylov%residual = 0.0_wp
+    ! a step of length 0 moves nothing and sums everything
+    krylov%product = 0.0_wp
+    call go_along(system, 0.0_wp, krylov, sums)
+  end subroutine take_residual
+
+  !> Start anew from the residual: the direction is the preconditioned residual.
+  subroutine first_direction(system, krylov)
+    type(system_type), intent(in) :: system
+    type(krylov_type), intent(inout) :: krylov
+    real(wp) :: largest
+    integer :: k, c
+
+    largest = 0.0_wp
+    do c = 1, size(krylov%residual, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(krylov, c) private(k) &
+      !$omp reduction(max:largest)
+      do k = 1, size(krylov%residual, 1)
+        krylov%direction(k, c) = krylov%residual(k, c)*krylov%inverse(k, c)
+        largest = max(largest, abs(krylov%direction(k, c)))
+      end do
+    end do
+    krylov%scale = 1.0_wp
+    krylov%rho = volume_inner(system, krylov%residual, krylov%direction)
+    krylov%norm = krylov%rho
+    krylov%largest = largest
+    krylov%ritz = ritz_type()
+    if (largest > 0.0_wp) call rescale(krylov, direction_size*system%family%rule%delta/largest)
+  end subroutine first_direction
+
+  !> The next direction, conjugate to those before; `rho` belongs to the new residual.
+  subroutine next_direction(system, rho, krylov)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: rho
+    type(krylov_type), intent(inout) :: krylov
+    real(wp) :: beta, largest, scaled
+    integer :: k, c
+
+    scaled = krylov%scale*rho
+    beta = scaled/krylov%rho
+    krylov%ritz%beta = beta
+    krylov%rho = scaled
+    ! the preconditioned residual is conjugate with the old direction
+    krylov%norm = krylov%scale*krylov%rho + beta**2*krylov%norm
+    largest = 0.0_wp
+    do c = 1, size(krylov%residual, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(krylov, c, beta) private(k) &
+      !$omp reduction(max:largest)
+      do k = 1, size(krylov%residual, 1)
+        krylov%direction(k, c) = krylov%scale*krylov%residual(k, c)*krylov%inverse(k, c) &
+          & + beta*krylov%direction(k, c)
+        largest = max(largest, abs(krylov%direction(k, c)))
+      end do
+    end do
+    krylov%largest = largest
+    if (largest > largest_size*system%family%rule%delta) &
+      & call rescale(krylov, direction_size*system%family%rule%delta/largest)
+  end subroutine next_direction
+
+  !> Note that the iteration under way goes so far along its direction that the `curvature`
+  !> (direction . stiffness . direction) asks for. The lengths make the Cholesky factor of the
+  !> tridiagonal matrix
+  !> that the iterations have projected the preconditioned stiffness to; the norm of its inverse is
+  !> estimated by a column at a time (Duff and Voemel, BIT 42 (2002); Meurant and Tichy, Numer.
+  !> Algorithms 82 (2019)). It never exceeds the true one, and soon comes near it.
+  pure subroutine note_length(curvature, krylov)
+    real(wp), intent(in) :: curvature            !! [N m]
+    type(krylov_type), intent(inout) :: krylov   !! the solve; its estimate is brought up to date
+    real(wp) :: length, ratio, inner, column, half, root, norm, share, rest
+
+    associate (ritz => krylov%ritz)
+      length = krylov%rho*krylov%scale/curvature
+      if (.not. ritz%length > 0.0_wp) then
+        ritz%softness = length
+        ritz%inner = length
+        ritz%last = length
+      else
+        ratio = sqrt(ritz%beta*length/ritz%length)
+        column = ratio**2*ritz%last + length
+        inner = -ratio*ritz%inner
+        half = (ritz%softness - column)/2
+        root = sqrt(half**2 + inner**2)
+        ! the larger eigenvalue of [softness, inner; inner, column] and its vector (share, rest)
+        share = merge(half + root, inner, half >= 0.0_wp)
+        rest = merge(inner, root - half, half >= 0.0_wp)
+        norm = sqrt(share**2 + rest**2)
+        ritz%softness = (ritz%softness + column)/2 + root
+        ritz%inner = column
+        if (norm > 0.0_wp) ritz%inner = (share*inner + rest*column)/norm
+        ritz%last = column
+      end if
+      ritz%length = length
+    end associate
+  end subroutine note_length
+
+  !> Take a displacement for the direction; `scale` is 0 if it is none.
+  subroutine take_direction(system, displacement, krylov)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: displacement(:, :)
+    type(krylov_type), intent(inout) :: krylov
+    real(wp) :: largest
+
+    largest = maxval(abs(displacement))
+    krylov%scale = 0.0_wp
+    if (.not. largest > 0.0_wp) return
+    krylov%direction = displacement
+    krylov%scale = 1.0_wp
+    krylov%largest = largest
+    call rescale(krylov, direction_size*system%family%rule%delta/largest)
+  end subroutine take_direction
+
+  !> Multiply the directions.
+  subroutine rescale(krylov, factor)
+    type(krylov_type), intent(inout) :: krylov
+    real(wp), intent(in) :: factor
+    krylov%direction = factor*krylov%direction
+    krylov%scale = factor*krylov%scale
+    krylov%largest = factor*krylov%largest
+    krylov%rho = factor*krylov%rho
+    krylov%norm = factor**2*krylov%norm
+  end subroutine rescale
+
+  !> Linearise at the present displacements: they become the origin, and with `deformed` the tangent
+  !> there takes the place of the undeformed stiffness.
+  subroutine linearise(system, deformed, krylov)
+    type(system_type), intent(inout) :: system
+    logical, intent(in) :: deformed
+    type(krylov_type), intent(inout) :: krylov
+
+    krylov%origin = system%state%u
+    krylov%deformed = deformed
+    if (.not. deformed) return
+    if (.not. allocated(krylov%forces)) allocate (krylov%forces, mold=krylov%origin)
+    call unprojected_forces(system, krylov%origin, krylov%forces)
+  end subroutine linearise
+
+  !> Forces with the unprojected dilatation: they are a gradient, and their tangent is symmetric.
+  subroutine unprojected_forces(system, u, force)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    logical :: projected
+
+    projected = system%model%projected
+    system%model%projected = .false.
+    call forces_at(system, u, force)
+    system%model%projected = projected
+  end subroutine unprojected_forces
+
+  !> `product` = stiffness times `direction`, which may move constrained components, too. Either
+  !> costs one evaluation of the forces, the undeformed stiffness (with the bonds that are intact
+  !> now) by the fast formulas. The tangent is a one-sided difference, some seven digits: more than
+  !> what isn't linear leaves to a solve.
+  subroutine apply_stiffness(system, krylov)
+    type(system_type), intent(inout) :: system
+    type(krylov_type), intent(inout) :: krylov
+    logical :: projected, thermal
+    real(wp) :: step
+    integer :: k, c
+
+    if (.not. krylov%deformed) then
+      ! at no displacement both dilatations have the same, symmetric stiffness, and heat has none
+      projected = system%model%projected
+      thermal = system%model%thermal
+      system%model%projected = .true.
+      system%model%thermal = .false.
+      call forces_at(system, krylov%direction, krylov%product)
+      system%model%projected = projected
+      system%model%thermal = thermal
+      do c = 1, size(krylov%product, 2)
+        !$omp parallel do simd schedule(static) default(none) shared(krylov, c) private(k)
+        do k = 1, size(krylov%product, 1)
+          krylov%product(k, c) = -krylov%product(k, c)
+        end do
+      end do
+      return
+    end if
+    if (.not. allocated(krylov%moved)) allocate (krylov%moved, mold=krylov%origin)
+    step = difference_size*system%family%rule%delta/krylov%largest
+    do c = 1, size(krylov%product, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)
+      do k = 1, size(krylov%product, 1)
+        krylov%moved(k, c) = krylov%origin(k, c) + step*krylov%direction(k, c)
+      end do
+    end do
+    call unprojected_forces(system, krylov%moved, krylov%product)
+    do c = 1, size(krylov%product, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)
+      do k = 1, size(krylov%product, 1)
+        krylov%product(k, c) = (krylov%forces(k, c) - krylov%product(k, c))/step
+      end do
+    end do
+  end subroutine apply_stiffness
+
+  !> Go `length` along the direction: displacements, the forces that follow linearly, the residual.
+  !> The sums are formed in blocks of fixed length.
+  subroutine go_along(system, length, krylov, sums)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: length
+    type(krylov_type), intent(inout) :: krylov
+    type(sums_type), intent(out) :: sums
+    type(sums_type), allocatable :: part(:)
+    integer :: block, blocks, c, first, last
+
+    blocks = (size(krylov%residual, 1) + block_length - 1)/block_length
+    allocate (part(blocks))
+    !$omp parallel do schedule(static) default(none) shared(blocks, part, system, krylov, length) &
+    !$omp private(block, c, first, last)
+    do block = 1, blocks
+      first = (block - 1)*block_length + 1
+      last = min(block*block_length, size(krylov%residual, 1))
+      do c = 1, size(krylov%residual, 2)
+        call go_block(last - first + 1, length, system%body%volume(first:last), &
+          & krylov%direction(first:last, c), krylov%product(first:last, c), &
+          & krylov%inverse(first:last, c), system%state%u(first:last, c), &
+          & system%state%force(first:last, c), krylov%residual(first:last, c), part(block))
+      end do
+    end do
+    do block = 1, blocks
+      sums%residual = sums%residual + part(block)%residual
+      sums%change = sums%change + part(block)%change
+      sums%displacement = sums%displacement + part(block)%displacement
+      sums%rho = sums%rho + part(block)%rho
+    end do
+    sums%support = force_of_supports(system)
+  end subroutine go_along
+
+  !> One component of one block.
+  pure subroutine go_block(n, length, volume, direction, product, inverse, u, force, residual, sums)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: length
+    real(wp), intent(in) :: volume(n), direction(n), product(n), inverse(n)
+    real(wp), intent(inout) :: u(n), force(n), residual(n)
+    type(sums_type), intent(inout) :: sums
+    real(wp) :: squared, rho, change, displacement, free
+    integer :: k
+
+    squared = 0.0_wp
+    rho = 0.0_wp
+    change = 0.0_wp
+    displacement = 0.0_wp
+    do k = 1, n
+      free = merge(1.0_wp, 0.0_wp, inverse(k) > 0.0_wp)
+      u(k) = u(k) + length*direction(k)
+      force(k) = force(k) - length*product(k)
+      residual(k) = residual(k) - free*length*product(k)
+      squared = squared + (residual(k)*volume(k))**2
+      rho = rho + volume(k)*residual(k)**2*inverse(k)
+      change = change + free*(length*direction(k))**2
+      displacement = displacement + free*u(k)**2
+    end do
+    sums%residual = sums%residual + squared
+    sums%rho = sums%rho + rho
+    sums%change = sums%change + change
+    sums%displacement = sums%displacement + displacement
+  end subroutine go_block
+
+  !> (V F).(V F) over the constrained components.
+  pure real(wp) function force_of_supports(system) result(squared)
+    type(system_type), intent(in) :: system
+    integer :: m, c, i
+
+    squared = 0.0_wp
+    do m = 1, size(system%motions)
+      associate (motion => system%motions(m))
+        do c = 1, size(motion%held, 2)
+          do i = 1, size(motion%slots)
+            if (motion%held(i, c) == 1_i1) squared = squared &
+              & + (system%state%force(motion%slots(i), c)*system%body%volume(motion%slots(i)))**2
+          end do
+        end do
+      end associate
+    end do
+  end function force_of_supports
+
+  !> Sum of V a b over all components, in blocks of fixed length.
+  function volume_inner(system, a, b) result(sum_of_all)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in), contiguous :: a(:, :), b(:, :)
+    real(wp) :: sum_of_all
+    real(wp), allocatable :: part(:)
+    integer :: block, blocks, first, last, c
+
+    blocks = (size(a, 1) + block_length - 1)/block_length
+    allocate (part(blocks))
+    !$omp parallel do schedule(static) default(none) shared(blocks, part, system, a, b) &
+    !$omp private(block, first, last, c)
+    do block = 1, blocks
+      first = (block - 1)*block_length + 1
+      last = min(block*block_length, size(a, 1))
+      part(block) = 0.0_wp
+      do c = 1, size(a, 2)
+        part(block) = part(block) &
+          & + sum(system%body%volume(first:last)*a(first:last, c)*b(first:last, c))
+      end do
+    end do
+    sum_of_all = sum(part)
+  end function volume_inner
+
+end module pd_motion_static_krylov

@@ -1,0 +1,409 @@
+!> Rigid motions of the pieces of a body, and which of them the constraints leave free. In a static
+!> problem nothing resists those, so the loads must not drive them.
+module pd_motion_static_rigid
+  use pd_base_kinds, only: wp, i1
+  use pd_base_error, only: error_type, fail
+  use pd_base_text, only: to_text
+  use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
+  use pd_motion_system, only: system_type, add_loads
+  implicit none (type, external)
+  private
+  public :: rigid_type, piece_type, find_free_motions, check_balance, remove_free_motions
+  public :: turn_back, fit_rigid_motion
+
+  real(wp), parameter :: balanced = 1.0e-10_wp  !! net force and moment over the applied ones
+  real(wp), parameter :: held_at_all = 1.0e-12_wp
+  integer, parameter :: most_turns = 60         !! iterations that look for a finite rotation
+  real(wp), parameter :: negligible = 1.0e-14_wp !! motion over the displacements
+
+  !> A piece, and its free rigid motions as combinations of three translations and three rotations.
+  type :: piece_type
+    integer :: number = 0
+    real(wp) :: centre(3) = 0.0_wp          !! of its volume [m]
+    real(wp) :: size = 1.0_wp               !! its extent, which makes rotations comparable [m]
+    real(wp) :: combination(6, 6) = 0.0_wp  !! columns 1..number, orthonormal in the volume
+    logical :: held = .false.               !! some component is constrained
+    logical :: loaded = .false.             !! a load acts on it, at whatever time
+  end type piece_type
+
+  !> All pieces of a body.
+  type :: rigid_type
+    type(pieces_type) :: pieces
+    type(piece_type), allocatable :: piece(:)
+  end type rigid_type
+
+contains
+
+  !> The pieces that intact bonds join now, and which rigid motions of each no constraint resists.
+  subroutine find_free_motions(system, rigid)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(out) :: rigid
+    integer :: p, l, i
+
+    call find_pieces(system%body, system%family, rigid%pieces)
+    allocate (rigid%piece(rigid%pieces%number))
+    do p = 1, rigid%pieces%number
+      associate (pieces => rigid%pieces)
+        call describe_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
+          & rigid%piece(p))
+      end associate
+    end do
+    do l = 1, size(system%loads)
+      associate (load => system%loads(l))
+        do i = 1, size(load%slots)
+          if (any(abs(load%density(i, :)) > 0.0_wp)) &
+            & rigid%piece(rigid%pieces%of(load%slots(i)))%loaded = .true.
+        end do
+      end associate
+    end do
+  end subroutine find_free_motions
+
+  !> Place, extent and free motions of the piece that consists of `slots`.
+  subroutine describe_piece(system, slots, piece)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: slots(:)
+    type(piece_type), intent(out) :: piece
+    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6)
+    integer :: n, k, c, i, j, dim
+
+    dim = system%body%dim
+    piece%size = maxval(system%body%spacing(slots))
+    do c = 1, dim
+      piece%centre(c) = sum(system%body%volume(slots)*system%body%x(slots, c)) &
+        & /sum(system%body%volume(slots))
+      piece%size = max(piece%size, maxval(system%body%x(slots, c)) &
+        & - minval(system%body%x(slots, c)))
+    end do
+    piece%held = any(system%held(slots, :) == 1_i1)
+    resistance = 0.0_wp
+    mass = 0.0_wp
+    do n = 1, size(slots)
+      k = slots(n)
+      do c = 1, dim
+        mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
+        do i = 1, 6
+          do j = 1, 6
+            mass(i, j) = mass(i, j) + mode(i)*mode(j)*system%body%volume(k)
+            if (system%held(k, c) == 1_i1) resistance(i, j) = resistance(i, j) + mode(i)*mode(j)
+          end do
+        end do
+      end do
+    end do
+    call eigenvectors(resistance, values, vectors)
+    do i = 1, 6
+      if (values(i) > held_at_all*max(1.0_wp, maxval(values))) cycle
+      ! out of the dimension (a rotation about x in a plane): no motion at all
+      mode = vectors(:, i)
+      do j = 1, piece%number
+        mode = mode - piece%combination(:, j) &
+          & *dot_product(piece%combination(:, j), matmul(mass, mode))
+      end do
+      if (dot_product(mode, matmul(mass, mode)) <= 1.0e-10_wp*mass(1, 1)) cycle
+      piece%number = piece%number + 1
+      piece%combination(:, piece%number) = mode/sqrt(dot_product(mode, matmul(mass, mode)))
+    end do
+  end subroutine describe_piece
+
+  !> Component `c` of the six unit motions at position `x`.
+  pure function motion_at(centre, size_of, x, c) result(mode)
+    real(wp), intent(in) :: centre(3), size_of
+    real(wp), intent(in) :: x(:)
+    integer, intent(in) :: c
+    real(wp) :: mode(6), r(3)
+
+    r = 0.0_wp
+    r(:size(x)) = (x - centre(:size(x)))/size_of
+    mode = 0.0_wp
+    mode(c) = 1.0_wp
+    if (size(x) == 1) return
+    ! rotations about z, and in 3D about x and y
+    select case (c)
+    case (1)
+      mode(4) = -r(2)
+      if (size(x) == 3) mode(6) = r(3)
+    case (2)
+      mode(4) = r(1)
+      if (size(x) == 3) mode(5) = -r(3)
+    case default
+      mode(5) = r(2)
+      mode(6) = -r(1)
+    end select
+  end function motion_at
+
+  !> An error unless the loads at time `t` leave the free motions of every piece alone. `status` is
+  !> that of the error.
+  subroutine check_balance(system, rigid, t, status, error)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    real(wp), intent(in) :: t
+    integer, intent(in) :: status
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: loads(:, :)
+    real(wp) :: work(6), applied, mode(6), share(6)
+    integer :: p, i, k, c
+
+    if (size(system%loads) == 0 .or. all(rigid%piece%number == 0)) return
+    allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
+    call add_loads(system, t, 1.0_wp, .false., loads)
+    do p = 1, rigid%pieces%number
+      associate (piece => rigid%piece(p), pieces => rigid%pieces)
+        if (piece%number == 0 .or. .not. piece%loaded) cycle
+        work = 0.0_wp
+        applied = 0.0_wp
+        do c = 1, system%body%dim
+          do i = pieces%start(p), pieces%start(p + 1) - 1
+            k = pieces%slots(i)
+            if (abs(loads(k, c)) <= 0.0_wp) cycle
+            mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
+            share = matmul(mode, piece%combination)
+            work = work + loads(k, c)*system%body%volume(k)*share
+            applied = applied + abs(loads(k, c))*system%body%volume(k)*maxval(abs(share))
+          end do
+        end do
+        if (maxval(abs(work)) <= balanced*applied) cycle
+        call fail(error, piece_text(system%body, pieces, p)//' is free to move as a whole in '// &
+          & to_text(piece%number)//' way(s), and the loads at t = '//to_text(t)// &
+          & ' push it that way ('//net_load(system, rigid, p, loads)//', net over applied '// &
+          & to_text(maxval(abs(work))/applied, 3)//', at most '//to_text(balanced)// &
+          & ' is allowed): there is no static equilibrium. Support it with a &boundary, or '// &
+          & 'balance the loads', status)
+        return
+      end associate
+    end do
+  end subroutine check_balance
+
+  !> The net force and moment of `loads` (n_slots, dim) [N/m3] on a piece, in words.
+  function net_load(system, rigid, p, loads) result(text)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    integer, intent(in) :: p
+    real(wp), intent(in) :: loads(:, :)
+    character(:), allocatable :: text
+    real(wp) :: force(3), moment(3), arm(3), part(3)
+    integer :: i, k, dim
+
+    dim = system%body%dim
+    force = 0.0_wp
+    moment = 0.0_wp
+    do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+      k = rigid%pieces%slots(i)
+      arm = 0.0_wp
+      part = 0.0_wp
+      arm(:dim) = system%body%x(k, :) - rigid%piece(p)%centre(:dim)
+      part(:dim) = loads(k, :)*system%body%volume(k)
+      force = force + part
+      moment = moment + [arm(2)*part(3) - arm(3)*part(2), arm(3)*part(1) - arm(1)*part(3), &
+        & arm(1)*part(2) - arm(2)*part(1)]
+    end do
+    text = 'net force '//to_text(norm2(force), 3)//' N'
+    if (dim > 1) text = text//', net moment '//to_text(norm2(moment), 3)//' N m'
+  end function net_load
+
+  !> Take the free rigid motions of every piece out of a field (n_slots, dim), by linear modes about
+  !> the undeformed body.
+  subroutine remove_free_motions(system, rigid, field)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    real(wp), intent(inout) :: field(:, :)
+    real(wp) :: mode(6)
+    integer :: p, i, k, c
+
+    do p = 1, rigid%pieces%number
+      associate (piece => rigid%piece(p), pieces => rigid%pieces)
+        if (piece%number == 0) cycle
+        mode = matmul(piece%combination, amounts(system, piece, &
+          & pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), field))
+        do c = 1, system%body%dim
+          do i = pieces%start(p), pieces%start(p + 1) - 1
+            k = pieces%slots(i)
+            if (system%held(k, c) == 1_i1) cycle
+            field(k, c) = field(k, c) &
+              & - dot_product(motion_at(piece%centre, piece%size, system%body%x(k, :), c), mode)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine remove_free_motions
+
+  !> How much of each free motion of a piece is in a field.
+  pure function amounts(system, piece, slots, field) result(amount)
+    type(system_type), intent(in) :: system
+    type(piece_type), intent(in) :: piece
+    integer, intent(in) :: slots(:)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: amount(6), mode(6)
+    integer :: n, c
+
+    mode = 0.0_wp
+    do c = 1, system%body%dim
+      do n = 1, size(slots)
+        mode = mode + motion_at(piece%centre, piece%size, system%body%x(slots(n), :), c) &
+          & *field(slots(n), c)*system%body%volume(slots(n))
+      end do
+    end do
+    amount = matmul(mode, piece%combination)
+  end function amounts
+
+  !> Take the mean motion out of displacements `u` (n_slots, dim) [m] where nothing holds it,
+  !> without straining anything: a piece without any constraint is moved and turned back as a rigid
+  !> body until its mean displacement and mean rotation vanish (the best fit to where its points
+  !> were in the least squares of volume). Of a piece that is held in part, and of all pieces
+  !> without `turning`, a free translation is taken back, and a free rotation left as it is.
+  subroutine turn_back(system, rigid, turning, u)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    logical, intent(in) :: turning
+    real(wp), intent(inout) :: u(:, :)
+    real(wp) :: mode(6), amount(6), largest
+    integer :: p, turn, i, c
+
+    do p = 1, rigid%pieces%number
+      associate (piece => rigid%piece(p), pieces => rigid%pieces)
+        if (piece%number == 0) cycle
+        associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
+          if (piece%held .or. .not. turning) then
+            ! about the centre of volume, translations and rotations don't mix in the modes
+            amount = amounts(system, piece, slots, u)
+            do i = 1, piece%number
+              if (any(abs(piece%combination(4:, i)) > 1.0e-9_wp*norm2(piece%combination(:3, i)))) &
+                & cycle
+              do c = 1, system%body%dim
+                where (system%held(slots, c) == 0_i1) &
+                  & u(slots, c) = u(slots, c) - amount(i)*piece%combination(c, i)
+              end do
+            end do
+            cycle
+          end if
+          largest = maxval(abs(u(slots, :)))
+          do turn = 1, most_turns
+            mode = matmul(piece%combination, amounts(system, piece, slots, u))
+            call move_rigidly(system, piece, slots, -mode, u)
+            if (all(abs(mode) <= negligible*largest)) exit
+          end do
+        end associate
+      end associate
+    end do
+  end subroutine turn_back
+
+  !> Move the points `slots` as a rigid body on from where `u` has put them: translations mode(1:3)
+  !> [m] and rotations mode(4:6)/size [rad] about z, x and y through the centre as it has moved. The
+  !> increments are formed without differences of large numbers, so that small motions keep their
+  !> digits.
+  pure subroutine move_rigidly(system, piece, slots, mode, u)
+    type(system_type), intent(in) :: system
+    type(piece_type), intent(in) :: piece
+    integer, intent(in) :: slots(:)
+    real(wp), intent(in) :: mode(6)
+    real(wp), intent(inout) :: u(:, :)
+    real(wp) :: axis(3), angle, r(3), centre(3), turned(3), across(3)
+    integer :: n, k, dim
+
+    dim = system%body%dim
+    centre = piece%centre
+    do n = 1, dim
+      centre(n) = centre(n) + sum(system%body%volume(slots)*u(slots, n)) &
+        & /sum(system%body%volume(slots))
+    end do
+    axis = [mode(5), mode(6), mode(4)]/piece%size
+    angle = norm2(axis)
+    if (angle > 0.0_wp) axis = axis/angle
+    do n = 1, size(slots)
+      k = slots(n)
+      r = 0.0_wp
+      r(:dim) = system%body%x(k, :) + u(k, :) - centre(:dim)
+      across = cross(axis, r)
+      ! Rodrigues: (R - 1) r
+      turned = sin(angle)*across + 2*sin(angle/2)**2*cross(axis, across)
+      u(k, :) = u(k, :) + mode(:dim) + turned(:dim)
+    end do
+  end subroutine move_rigidly
+
+  pure function cross(a, b) result(c)
+    real(wp), intent(in) :: a(3), b(3)
+    real(wp) :: c(3)
+    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
+  end function cross
+
+  !> Move a piece as a rigid body on from displacements `u` so that it comes as near as it can to
+  !> `target` (n_slots, dim) [m] in the least squares of `weight` (n_slots, dim), by Newton's
+  !> iterations on the finite motion, to the last digit of what is left of the displacements.
+  !> Motions that no weighted component sees are left alone.
+  subroutine fit_rigid_motion(system, rigid, p, target, weight, u)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid
+    integer, intent(in) :: p
+    real(wp), intent(in) :: target(:, :), weight(:, :)
+    real(wp), intent(inout) :: u(:, :)
+    real(wp) :: matrix(6, 6), vectors(6, 6), values(6), side(6), mode(6), part(6), centre(3)
+    integer :: turn, n, k, c, i
+
+    associate (piece => rigid%piece(p), pieces => rigid%pieces)
+      associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
+        do turn = 1, most_turns
+          matrix = 0.0_wp
+          side = 0.0_wp
+          centre = piece%centre
+          do c = 1, system%body%dim
+            centre(c) = centre(c) + sum(system%body%volume(slots)*u(slots, c)) &
+              & /sum(system%body%volume(slots))
+          end do
+          do n = 1, size(slots)
+            k = slots(n)
+            do c = 1, system%body%dim
+              if (.not. weight(k, c) > 0.0_wp) cycle
+              part = motion_at(centre, piece%size, system%body%x(k, :) + u(k, :), c)
+              side = side + weight(k, c)*(target(k, c) - u(k, c))*part
+              do i = 1, 6
+                matrix(:, i) = matrix(:, i) + weight(k, c)*part(i)*part
+              end do
+            end do
+          end do
+          call eigenvectors(matrix, values, vectors)
+          mode = 0.0_wp
+          do i = 1, 6
+            if (values(i) > 1.0e-10_wp*maxval(values)) &
+              & mode = mode + vectors(:, i)*dot_product(vectors(:, i), side)/values(i)
+          end do
+          ! at most a radian at a time
+          mode = mode/max(1.0_wp, norm2(mode(4:))/piece%size)
+          call move_rigidly(system, piece, slots, mode, u)
+          if (norm2(mode) <= negligible*maxval(abs(u(slots, :)))) exit
+        end do
+      end associate
+    end associate
+  end subroutine fit_rigid_motion
+
+  !> Eigenvalues and eigenvectors of a small symmetric matrix by Jacobi's rotations.
+  pure subroutine eigenvectors(matrix, values, vectors)
+    real(wp), intent(in) :: matrix(6, 6)
+    real(wp), intent(out) :: values(6), vectors(6, 6)
+    real(wp) :: a(6, 6), rotation(6, 6), angle
+    integer :: sweep, i, j
+
+    a = matrix
+    vectors = 0.0_wp
+    do i = 1, 6
+      vectors(i, i) = 1.0_wp
+    end do
+    do sweep = 1, 30
+      do i = 1, 5
+        do j = i + 1, 6
+          if (abs(a(i, j)) <= 0.0_wp) cycle
+          angle = 0.5_wp*atan2(2*a(i, j), a(j, j) - a(i, i))
+          rotation = 0.0_wp
+          rotation(1, 1) = 1.0_wp; rotation(2, 2) = 1.0_wp; rotation(3, 3) = 1.0_wp
+          rotation(4, 4) = 1.0_wp; rotation(5, 5) = 1.0_wp; rotation(6, 6) = 1.0_wp
+          rotation(i, i) = cos(angle); rotation(j, j) = cos(angle)
+          rotation(i, j) = sin(angle); rotation(j, i) = -sin(angle)
+          a = matmul(transpose(rotation), matmul(a, rotation))
+          a(i, j) = 0.0_wp; a(j, i) = 0.0_wp
+          vectors = matmul(vectors, rotation)
+        end do
+      end do
+    end do
+    do i = 1, 6
+      values(i) = a(i, i)
+    end do
+  end subroutine eigenvectors
+
+end module pd_motion_static_rigid

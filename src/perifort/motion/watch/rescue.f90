@@ -1,0 +1,66 @@
+!> The last good state of a motion: kept while it runs, and shown to the observer when the motion
+!> has gone wrong.
+module pd_motion_watch_rescue
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp
+  use pd_base_shelf, only: shelf_type
+  use pd_motion_keep, only: keep_system
+  use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
+  implicit none (type, external)
+  private
+  public :: good_state_type, keep_good, show_good
+
+  type :: good_state_type
+    private
+    type(shelf_type) :: shelf
+    type(instant_type) :: instant
+    real(wp) :: most = huge(1.0_wp)   !! energy beyond which it is no good one after all [J]
+    logical :: there = .false.
+  end type good_state_type
+
+contains
+
+  !> Keep the state of this instant, whose forces are known, in the place of the one before. If it
+  !> is ever wanted, it must not have more energy than `most` [J]: looking at that costs as much as
+  !> several steps.
+  subroutine keep_good(good, system, instant, most)
+    type(good_state_type), intent(inout) :: good
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    real(wp), intent(in), optional :: most
+
+    call good%shelf%rewind(reading=.false.)
+    call keep_system(good%shelf, system)
+    good%instant = instant
+    good%most = huge(good%most)
+    if (present(most)) good%most = most
+    good%there = .not. allocated(good%shelf%error)
+  end subroutine keep_good
+
+  !> Put the last good state back and let the observer see it as what is left of the motion. An
+  !> error in writing it goes to the end of `error`, the fault that ended the motion.
+  subroutine show_good(good, system, observer, error)
+    type(good_state_type), intent(inout) :: good
+    type(system_type), intent(inout) :: system
+    class(observer_type), intent(inout) :: observer
+    type(error_type), allocatable, intent(inout) :: error
+    type(error_type), allocatable :: late
+    type(energies_type) :: energies
+    real(wp), allocatable :: v(:, :)
+
+    if (.not. good%there) return
+    call good%shelf%rewind(reading=.true.)
+    call keep_system(good%shelf, system)
+    if (allocated(good%shelf%error)) return
+    if (good%most < huge(good%most)) then
+      call velocities_now(system, good%instant%time, good%instant%kick, v)
+      call energies_of(system, v, energies)
+      if (.not. energies%kinetic + energies%strain + system%dissipated <= good%most) return
+    end if
+    good%instant%rescued = .true.
+    call observer%observe(system, good%instant, late)
+    if (allocated(late)) error%message = error%message//new_line('a')//'  '//late%message
+  end subroutine show_good
+
+end module pd_motion_watch_rescue

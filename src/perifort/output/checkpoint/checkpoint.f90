@@ -1,0 +1,207 @@
+!> Checkpoints of a run: what they hold, when they are due, and how they are written, so that there
+!> is a whole one at any moment.
+!>
+!> The newest is `STEM.checkpoint`, the one before it `STEM.checkpoint.old`. A new one is written
+!> beside them, brought to the disk, and then takes its name in one step; what it counts on in the
+!> results is brought to the disk before.
+module pd_output_checkpoint_checkpoint
+  use pd_base_archive, only: archive_type
+  use pd_base_clock, only: wall_time
+  use pd_base_warnings, only: warnings_type
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp, i8
+  use pd_base_version, only: compiler_flags, compiler_name, program_version
+  use pd_motion_keep, only: keep_system
+  use pd_motion_system, only: system_type
+  use pd_output_checkpoint_file, only: meter_type, writer_type
+  use pd_output_results_files, only: file_exists, in_directory, remove_file, rename_file, sync_path
+  use pd_output_results_types, only: kept_type
+  implicit none (type, external)
+  private
+  public :: about_type, checkpoint_type, new_about, keep_about, checkpoint_path, older_path, &
+    & remove_checkpoints, checkpoint_bytes
+
+  !> What a checkpoint holds beside the system.
+  type :: about_type
+    character(:), allocatable :: version, compiler, flags  !! of the program that wrote it
+    type(kept_type) :: kept             !! of the results, with the resolved scene
+    integer(i8) :: start = 0_i8         !! checksum of the points and the initial state
+    integer :: step = 0                 !! complete steps (iterations)
+    integer :: steps = 0                !! of the whole run (load steps)
+    real(wp) :: time = 0.0_wp           !! [s]
+    real(wp) :: dt = 0.0_wp             !! time step [s]
+    logical :: finished = .false.       !! the run has come to its end
+    real(wp) :: supply = 0.0_wp         !! energy at the first row [J]
+    real(wp) :: kinetic = 0.0_wp, strain = 0.0_wp  !! energies of the last row [J]
+    type(warnings_type) :: warnings     !! so far
+  end type about_type
+
+  !> The checkpoints of a run that is under way.
+  type :: checkpoint_type
+    character(:), allocatable :: path   !! of the newest
+    integer :: every = 0                !! steps (iterations) between them; 0: not by steps
+    real(wp) :: minutes = 0.0_wp        !! wall time between them; 0: not by time
+    logical :: keep_newest = .true.     !! the newest is whole and becomes the older one
+    integer :: written = 0
+    integer :: last_step = 0            !! step of the last one
+    real(wp) :: last = 0.0_wp           !! wall time of the last one, or of the start [s]
+  contains
+    procedure :: start
+    procedure :: is_due
+    procedure :: keeps_end
+    procedure :: write => write_checkpoint
+  end type checkpoint_type
+
+contains
+
+  !> Of this program and this run.
+  function new_about(scene_text, start, steps, dt) result(about)
+    character(*), intent(in) :: scene_text
+    integer(i8), intent(in) :: start
+    integer, intent(in) :: steps
+    real(wp), intent(in) :: dt
+    type(about_type) :: about
+
+    about%version = program_version
+    about%compiler = compiler_name()
+    about%flags = compiler_flags()
+    about%kept%scene_text = scene_text
+    about%start = start
+    about%steps = steps
+    about%dt = dt
+  end function new_about
+
+  !> Keep all of it, or put it back.
+  subroutine keep_about(archive, about)
+    class(archive_type), intent(inout) :: archive
+    type(about_type), intent(inout) :: about
+
+    call archive%keep('version', about%version)
+    call archive%keep('compiler', about%compiler)
+    call archive%keep('flags', about%flags)
+    call archive%keep('scene', about%kept%scene_text)
+    call archive%keep('checksum of the start', about%start)
+    call archive%keep('steps done', about%step)
+    call archive%keep('steps of the run', about%steps)
+    call archive%keep('time', about%time)
+    call archive%keep('step size', about%dt)
+    call archive%keep('finished', about%finished)
+    call archive%keep('supply', about%supply)
+    call archive%keep('kinetic energy', about%kinetic)
+    call archive%keep('strain energy', about%strain)
+    call about%warnings%keep(archive)
+    call archive%keep('history', about%kept%rows)
+    call archive%keep('times of outputs', about%kept%times)
+  end subroutine keep_about
+
+  !> The newest checkpoint of a run.
+  pure function checkpoint_path(directory, stem) result(path)
+    character(*), intent(in) :: directory, stem
+    character(:), allocatable :: path
+    path = in_directory(directory, trim(stem)//'.checkpoint')
+  end function checkpoint_path
+
+  !> The one before it.
+  pure function older_path(newest) result(path)
+    character(*), intent(in) :: newest
+    character(:), allocatable :: path
+    path = newest//'.old'
+  end function older_path
+
+  !> Remove the checkpoints of an earlier run.
+  subroutine remove_checkpoints(directory, stem)
+    character(*), intent(in) :: directory, stem
+    character(:), allocatable :: newest
+
+    newest = checkpoint_path(directory, stem)
+    call remove_file(newest//'.part')
+    call remove_file(older_path(newest))
+    call remove_file(newest)
+  end subroutine remove_checkpoints
+
+  !> Bytes of a checkpoint.
+  integer(i8) function checkpoint_bytes(about, system) result(bytes)
+    type(about_type), intent(inout) :: about
+    type(system_type), intent(inout) :: system
+    type(meter_type) :: meter
+
+    call keep_about(meter, about)
+    call keep_system(meter, system)
+    bytes = meter%bytes
+  end function checkpoint_bytes
+
+  !> Begin: the clock runs from here.
+  subroutine start(self, path, every, minutes, goes_on, keep_newest)
+    class(checkpoint_type), intent(inout) :: self
+    character(*), intent(in) :: path
+    integer, intent(in) :: every
+    real(wp), intent(in) :: minutes
+    logical, intent(in) :: goes_on      !! the run has checkpoints from before
+    logical, intent(in) :: keep_newest  !! the newest of them is whole
+
+    self%path = path
+    self%every = every
+    self%minutes = minutes
+    self%keep_newest = keep_newest
+    self%written = merge(1, 0, goes_on)
+    self%last = wall_time()
+  end subroutine start
+
+  !> Whether the end of a run is to be kept, so that it can be prolonged: if it has had checkpoints,
+  !> or was to have some by steps.
+  pure logical function keeps_end(self)
+    class(checkpoint_type), intent(in) :: self
+    keeps_end = self%every > 0 .or. self%written > 0
+  end function keeps_end
+
+  !> Whether a checkpoint is due after so many steps.
+  logical function is_due(self, step)
+    class(checkpoint_type), intent(in) :: self
+    integer, intent(in) :: step
+
+    is_due = .false.
+    ! the instants after a load step has settled have the number of its last iteration
+    if (self%every > 0) is_due = step/self%every > self%last_step/self%every
+    if (.not. is_due .and. self%minutes > 0.0_wp) &
+      & is_due = wall_time() - self%last >= 60*self%minutes
+  end function is_due
+
+  !> Write the next one. After an error those before it are as they were.
+  subroutine write_checkpoint(self, about, system, error)
+    class(checkpoint_type), intent(inout) :: self
+    type(about_type), intent(inout) :: about
+    type(system_type), intent(inout) :: system
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+    type(writer_type) :: writer
+    character(:), allocatable :: part
+
+    part = self%path//'.part'
+    self%last = wall_time()
+    self%last_step = about%step
+    call writer%create(part, checkpoint_bytes(about, system))
+    call keep_about(writer, about)
+    call keep_system(writer, system)
+    call writer%finish(error)
+    if (.not. allocated(error) .and. self%keep_newest .and. file_exists(self%path)) &
+      & call rename_file(self%path, older_path(self%path), error)
+    if (.not. allocated(error)) call rename_file(part, self%path, error)
+    if (allocated(error)) then
+      call remove_file(part)
+      return
+    end if
+    ! some systems cannot bring a folder to the disk; the names are in place none the less
+    call sync_path(folder_of(self%path), ignored)
+    self%keep_newest = .true.
+    self%written = self%written + 1
+    self%last = wall_time()
+  end subroutine write_checkpoint
+
+  pure function folder_of(path) result(folder)
+    character(*), intent(in) :: path
+    character(:), allocatable :: folder
+    folder = './'
+    if (index(path, '/') > 0) folder = path(:index(path, '/', back=.true.))
+  end function folder_of
+
+end module pd_output_checkpoint_checkpoint

@@ -1,0 +1,243 @@
+!> Going on with a run from a checkpoint: which one, whether it fits the scene, and putting the run
+!> back to where it was.
+module pd_output_checkpoint_restart
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: newline, to_text, with_unit
+  use pd_base_version, only: compiler_flags, compiler_name, program_version
+  use pd_motion_keep, only: checksum_of_start, keep_system
+  use pd_set_up_plan, only: plan_type
+  use pd_motion_system, only: system_type
+  use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_path, keep_about, older_path
+  use pd_output_checkpoint_file, only: reader_type
+  use pd_output_checkpoint_earlier, only: existing_results, mark_complete, refuse_existing, &
+    & scene_of_results, unfinished
+  use pd_output_results_files, only: file_exists, in_directory
+  use pd_scene_content_compare, only: difference_type, scene_differences
+  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_write, only: scene_text
+  implicit none (type, external)
+  private
+  public :: restart_type, find_restart, put_back
+
+  !> Where a run goes on.
+  type :: restart_type
+    logical :: found = .false.         !! there is a checkpoint to go on from
+    logical :: complete = .false.      !! the run is complete: there is nothing to do
+    logical :: newest = .true.         !! it is the newest of its run
+    type(about_type) :: about
+    type(reader_type) :: reader        !! open, at the system
+    character(:), allocatable :: note  !! what the user is told
+    logical :: longer = .false.        !! the end of the run may have changed
+  end type restart_type
+
+  ! What may change is named by what it does to the results.
+  integer, parameter :: refused = 0, harmless = 1, of_the_end = 2, of_the_files = 3
+
+contains
+
+  !> Find the checkpoint of a run in its folder, or take the one that is named, and compare its
+  !> scene with the present one. `command` starts the run again with `--restart`.
+  !>
+  !> Where there is no checkpoint, the run starts from the beginning (`found` is false), unless its
+  !> results are complete.
+  subroutine find_restart(directory, stem, named, scene, command, restart, error)
+    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: named  !! path of a checkpoint, '' = the run's newest
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: command
+    type(restart_type), intent(out) :: restart
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: path, newest
+
+    restart%note = ''
+    newest = checkpoint_path(directory, stem)
+    path = named
+    if (path == '') then
+      path = newest
+      if (.not. file_exists(newest)) path = older_path(newest)
+      if (.not. file_exists(path)) then
+        call find_nothing(directory, stem, scene, restart, error)
+        return
+      end if
+    end if
+    restart%newest = path == newest
+    call open_checkpoint(path, restart, error)
+    if (allocated(error)) then
+      if (path == newest) call offer_older(older_path(newest), command, error)
+      return
+    end if
+    restart%found = .true.
+    restart%note = '  restart         from step '//to_text(restart%about%step)//', t = '// &
+      & with_unit(restart%about%time, 's', 6)//' ('//path//')'
+    call check_build(restart)
+    call compare(directory, stem, scene, restart, error)
+    if (allocated(error)) return
+    if (.not. restart%about%finished .or. restart%longer) return
+    restart%complete = .true.
+    call mark_complete(directory, stem)
+    restart%note = restart%note//newline//'  complete        the run has come to its end; '// &
+      & 'a longer one goes on with more &time steps or duration'
+  end subroutine find_restart
+
+  !> No checkpoint: from the beginning, or nothing to do, or results that must not go.
+  subroutine find_nothing(directory, stem, scene, restart, error)
+    character(*), intent(in) :: directory, stem
+    type(scene_type), intent(in) :: scene
+    type(restart_type), intent(inout) :: restart
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+    character(:), allocatable :: text
+
+    if (existing_results(directory, stem) == '' .or. unfinished(directory, stem)) then
+      restart%note = '  restart         there is no checkpoint in '//directory// &
+        & ' yet: the run starts from the beginning'
+      return
+    end if
+    call scene_of_results(in_directory(directory, stem//'.vtkhdf'), text, ignored)
+    if (.not. allocated(ignored)) restart%complete = text == scene_text(scene)
+    restart%note = '  complete        the results of this scene are there already: '// &
+      & existing_results(directory, stem)
+    if (.not. restart%complete) call refuse_existing(directory, stem, .false., error)
+  end subroutine find_nothing
+
+  !> Open a checkpoint and read what it says of itself.
+  subroutine open_checkpoint(path, restart, error)
+    character(*), intent(in) :: path
+    type(restart_type), intent(inout) :: restart
+    type(error_type), allocatable, intent(out) :: error
+
+    call restart%reader%open(path, error)
+    if (allocated(error)) return
+    call keep_about(restart%reader, restart%about)
+    if (.not. allocated(restart%reader%error)) return
+    call move_alloc(restart%reader%error, error)
+    call restart%reader%close()
+  end subroutine open_checkpoint
+
+  !> Add to the error of the newest checkpoint how to go on from the one before it.
+  subroutine offer_older(path, command, error)
+    character(*), intent(in) :: path, command
+    type(error_type), allocatable, intent(inout) :: error
+    type(restart_type) :: older
+    type(error_type), allocatable :: fault
+
+    if (.not. file_exists(path)) then
+      error%message = error%message//newline//'  there is no older one: --overwrite without '// &
+        & '--restart begins anew'
+      return
+    end if
+    call open_checkpoint(path, older, fault)
+    if (allocated(fault)) then
+      error%message = error%message//newline//'  so is the one before it ('//fault%message// &
+        & '): --overwrite without --restart begins anew'
+    else
+      call older%reader%close()
+      error%message = error%message//newline//'  the one before it, of step '// &
+        & to_text(older%about%step)//', is whole; to go on from there: '//command//' '//path
+    end if
+  end subroutine offer_older
+
+  !> Say so if another build of the program wrote the checkpoint.
+  subroutine check_build(restart)
+    type(restart_type), intent(inout) :: restart
+
+    associate (about => restart%about)
+      if (about%version == program_version .and. about%compiler == compiler_name() .and. &
+        & about%flags == compiler_flags()) return
+      restart%note = restart%note//newline//'  note            another build wrote it, so that '// &
+        & 'the last bits may differ: perifort '//about%version//', '//about%compiler
+    end associate
+  end subroutine check_build
+
+  !> What a change of a key means to a run that goes on.
+  pure integer function meaning_of(difference) result(meaning)
+    type(difference_type), intent(in) :: difference
+
+    meaning = refused
+    select case (difference%group)
+    case ('scene')
+      if (difference%key == 'title') meaning = harmless
+    case ('time')
+      if (difference%key == 'steps' .or. difference%key == 'duration') meaning = of_the_end
+    case ('relaxation')
+      if (difference%key == 'maximum_iterations') meaning = harmless
+    case ('output')
+      meaning = harmless
+      if (any(difference%key == [character(9) :: 'fields', 'precision', 'format'])) &
+        & meaning = of_the_files
+    case ('probe')
+      meaning = of_the_files
+    case default
+      continue
+    end select
+  end function meaning_of
+
+  !> Compare the scenes: say what has changed, or refuse.
+  subroutine compare(directory, stem, scene, restart, error)
+    character(*), intent(in) :: directory, stem
+    type(scene_type), intent(in) :: scene
+    type(restart_type), intent(inout) :: restart
+    type(error_type), allocatable, intent(out) :: error
+    type(difference_type), allocatable :: differences(:)
+    character(:), allocatable :: wrong, other_files
+    integer :: i
+
+    differences = scene_differences(restart%about%kept%scene_text, scene_text(scene))
+    wrong = ''
+    other_files = ''
+    do i = 1, size(differences)
+      select case (meaning_of(differences(i)))
+      case (refused)
+        wrong = wrong//newline//'  '//differences(i)%text
+        cycle
+      case (of_the_end)
+        restart%longer = .true.
+      case (of_the_files)
+        other_files = other_files//newline//'  '//differences(i)%text
+      case default
+        continue
+      end select
+      restart%note = restart%note//newline//'  changed         '//differences(i)%text
+    end do
+    if (wrong /= '') then
+      call fail(error, 'the scene has changed since the checkpoint was written:'//wrong//newline// &
+        & '  may change: &time steps, duration; &relaxation maximum_iterations; &output; '// &
+        & '&probe; title'//newline//'  --overwrite without --restart computes the new scene '// &
+        & 'from the beginning')
+    else if (other_files /= '' .and. existing_results(directory, stem) /= '') then
+      call fail(error, 'the results that are there have another form than the scene asks for:'// &
+        & other_files//newline//'  with this checkpoint named and --output, the run goes on '// &
+        & 'into another folder, whose results begin there')
+    end if
+    if (allocated(error)) call restart%reader%close()
+  end subroutine compare
+
+  !> Put a system that was made from the scene back to where the checkpoint stands, and let the plan
+  !> go on with its time step.
+  subroutine put_back(restart, scene, system, plan, error)
+    type(restart_type), intent(inout) :: restart
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(inout) :: system
+    type(plan_type), intent(inout) :: plan
+    type(error_type), allocatable, intent(out) :: error
+
+    if (checksum_of_start(system) /= restart%about%start) then
+      call fail(error, 'the points or the initial state are not those of the checkpoint: has a '// &
+        & 'file that the scene names changed, or was it written by another version?')
+    else if (.not. plan%relaxes) then
+      plan%step = restart%about%dt
+      if (is_set(scene%time%duration)) &
+        & plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
+      if (plan%steps < restart%about%step) call fail(error, 'the checkpoint is of step '// &
+        & to_text(restart%about%step)//', beyond the '//to_text(plan%steps)//' of the scene')
+      restart%complete = plan%steps == restart%about%step .and. restart%about%finished
+    end if
+    if (.not. allocated(error)) then
+      call keep_system(restart%reader, system)
+      if (allocated(restart%reader%error)) call move_alloc(restart%reader%error, error)
+    end if
+    call restart%reader%close()
+  end subroutine put_back
+
+end module pd_output_checkpoint_restart

@@ -1,0 +1,145 @@
+!> What an engineer checks before a run, beyond what `run` tells: wave speeds and what a crack costs
+!> for each material, how many points each group of the scene acts on, and how long the horizon is
+!> beside bodies and cracks.
+module pd_output_report_overview
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
+  use pd_scene_content_types, only: scene_type
+  use pd_body_material, only: material_type, energy_from_critical_stretch, never
+  use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
+  use pd_family_cracks, only: extents_of
+  use pd_set_up_conditions, only: no_fail_mask, region_mask
+  use pd_motion_system, only: system_type
+  implicit none (type, external)
+  private
+  public :: overview
+
+contains
+
+  !> The lines of the overview, each ended by a newline.
+  function overview(scene, system, density_counts) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    logical, intent(in) :: density_counts   !! the scene's densities mean something
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(scene%materials)
+      if (size(scene%materials) > 1) text = text//line('material', trim(scene%materials(i)%name))
+      text = text//material_lines(scene, system%model%materials(i), &
+        & system%family%rule%delta, density_counts)
+    end do
+    text = text//lengths(scene, system)//counts(scene, system)
+  end function overview
+
+  !> Wave speeds and critical stretch of a material.
+  pure function material_lines(scene, m, delta, density_counts) result(text)
+    type(scene_type), intent(in) :: scene
+    type(material_type), intent(in) :: m
+    real(wp), intent(in) :: delta           !! horizon [m]
+    logical, intent(in) :: density_counts
+    character(:), allocatable :: text
+
+    text = ''
+    if (density_counts) then
+      select case (scene%header%dimension)
+      case (1)
+        text = line('bar wave', with_unit(longitudinal_speed(m), 'm/s', 4))
+      case (2)
+        text = line('P wave', with_unit(longitudinal_speed(m), 'm/s', 4)//', plane '// &
+          & trim(scene%header%plane))
+      case default
+        text = line('P wave', with_unit(longitudinal_speed(m), 'm/s', 4))
+      end select
+      if (scene%header%dimension > 1) text = text// &
+        & line('S wave', with_unit(shear_speed(m), 'm/s', 4))// &
+        & line('Rayleigh wave', with_unit(rayleigh_speed(m), 'm/s', 4))
+    end if
+    if (m%critical_stretch >= never) return
+    text = text//line('crit. stretch', to_text(m%critical_stretch, 4))// &
+      & line('Gc', with_unit(energy_from_critical_stretch(m, scene%header%dimension, delta), &
+      & 'J/m2', 4)//', from the critical stretch at this horizon')
+  end function material_lines
+
+  !> The horizon beside spacings, bodies and cracks.
+  function lengths(scene, system) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+    real(wp), allocatable :: extents(:)
+    logical, allocatable :: mine(:)
+    real(wp) :: edges(3)
+    integer :: i, c
+
+    associate (body => system%body, delta => system%family%rule%delta)
+      text = ''
+      do i = 1, size(scene%bodies)
+        mine = body%body == i .and. body%layer == 0 .and. body%point > 0
+        if (.not. any(mine)) cycle
+        do c = 1, body%dim
+          edges(c) = maxval(body%x(:, c) + body%spacing/2, mask=mine) &
+            & - minval(body%x(:, c) - body%spacing/2, mask=mine)
+        end do
+        text = text//line('body '//to_text(i), with_unit(minval(edges(:body%dim)), 'm', 4)// &
+          & ' in its thinnest direction: '//to_text(minval(edges(:body%dim))/delta, 3)// &
+          & ' horizons')
+      end do
+      do i = 1, size(scene%cracks)
+        extents = extents_of(scene%cracks(i), body%dim)
+        text = text//line('crack '//to_text(i), with_unit(minval(extents), 'm', 4)// &
+          & trim(merge(' long                    ', ' in its shorter direction', &
+          & size(extents) == 1))//': '// &
+          & to_text(minval(extents)/delta, 3)//' horizons')
+      end do
+    end associate
+  end function lengths
+
+  !> Points of each region, boundary, load and no-fail zone.
+  function counts(scene, system) result(text)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(scene%regions)
+      text = text//line('region '//to_text(i), trim(scene%regions(i)%name)//': '// &
+        & counted(count(region_mask(scene, system%body, scene%regions(i)%name)), 'point'))
+    end do
+    do i = 1, size(system%motions)
+      associate (group => scene%boundaries(i))
+        text = text//line('boundary '//to_text(i), named(group%name)//counted(size( &
+          & system%motions(i)%slots), 'point')//', '//place(group%side, group%region))
+      end associate
+    end do
+    do i = 1, size(system%loads)
+      associate (group => scene%loads(i))
+        text = text//line('load '//to_text(i), counted(size(system%loads(i)%slots), &
+          & 'point')//', '//place(group%side, group%region))
+      end associate
+    end do
+    do i = 1, size(scene%no_fail)
+      text = text//line('no-fail zone '//to_text(i), &
+        & counted(count(no_fail_mask(scene, system%body, i)), 'point'))
+    end do
+  end function counts
+
+  !> A name before what is told of it.
+  pure function named(name) result(text)
+    character(*), intent(in) :: name
+    character(:), allocatable :: text
+    text = ''
+    if (name /= '') text = trim(name)//': '
+  end function named
+
+  !> Where a boundary or a load acts.
+  pure function place(side, region) result(text)
+    character(*), intent(in) :: side, region
+    character(:), allocatable :: text
+    text = 'everywhere'
+    if (region /= '') text = "region '"//trim(region)//"'"
+    if (side /= '') text = 'side '//trim(side)
+  end function place
+
+end module pd_output_report_overview

@@ -1,0 +1,59 @@
+!> Whether what the results are to hold can be written: names, shapes and words.
+module pd_output_results_description
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: lower_case
+  use pd_output_results_types, only: column_type, field_type, label_length
+  implicit none (type, external)
+  private
+  public :: check_description
+
+contains
+
+  !> Whether names, shapes and words are usable.
+  subroutine check_description(positions, fields, columns, precision, format, error)
+    real(wp), intent(in) :: positions(:, :)
+    type(field_type), intent(in) :: fields(:)
+    type(column_type), intent(in) :: columns(:)
+    character(*), intent(in) :: precision, format
+    type(error_type), allocatable, intent(out) :: error
+    character(label_length), allocatable :: names(:)
+    integer :: i
+
+    if (size(positions, 1) < 1) then
+      call fail(error, 'results need at least one point')
+    else if (size(positions, 2) /= 3) then
+      call fail(error, 'positions need three components, whatever the dimension')
+    else if (all(lower_case(trim(precision)) /= ['single', 'double'])) then
+      call fail(error, 'unknown precision '''//trim(precision)//''': single, double')
+    else if (all(lower_case(trim(format)) /= ['vtkhdf', 'vtu   ', 'both  '])) then
+      call fail(error, 'unknown format '''//trim(format)//''': vtkhdf, vtu, both')
+    end if
+    allocate (names(max(size(fields), size(columns))))
+    do i = 1, size(fields)
+      if (allocated(error)) return
+      names(i) = fields(i)%name
+      call check_name(names(i), names(:i - 1), error)
+      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3])) &
+        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1 nor 3 components')
+    end do
+    do i = 1, size(columns)
+      if (allocated(error)) return
+      names(i) = columns(i)%name
+      call check_name(names(i), names(:i - 1), error)
+    end do
+  end subroutine check_description
+
+  !> A name is there, new, and no path; a comma would part it in the table.
+  subroutine check_name(name, others, error)
+    character(*), intent(in) :: name, others(:)
+    type(error_type), allocatable, intent(out) :: error
+
+    if (name == '' .or. scan(trim(name), '/,"<>&'//new_line('a')) > 0 .or. name == '.') then
+      call fail(error, '''' //trim(name)//''' can''t name a field or column of the results')
+    else if (any(others == name)) then
+      call fail(error, 'two fields or columns of the results are named '//trim(name))
+    end if
+  end subroutine check_name
+
+end module pd_output_results_description

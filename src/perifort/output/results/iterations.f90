@@ -1,0 +1,99 @@
+!> The way of a relaxation to equilibrium, `iterations.csv`: a line for each iteration that is
+!> due. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes
+!> on, and adds to them.
+module pd_output_results_iterations
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: i8
+  use pd_base_text, only: newline
+  use pd_output_results_files, only: file_exists
+  use pd_output_results_sink, only: sink_type
+  use pd_scene_format_file, only: read_text_file
+  implicit none (type, external)
+  private
+  public :: iterations_type
+
+  character(*), &
+    & parameter :: head = 'step,load_step,time,iteration,solver,residual,change,broken_bonds'
+
+  type :: iterations_type
+    private
+    type(sink_type) :: sink
+    integer(i8) :: written_at = 0   !! clock count of the last flush
+    logical :: begun = .false.
+  contains
+    procedure :: begin
+    procedure :: has_begun
+    procedure :: add
+    procedure :: sync
+    procedure :: close => close_iterations
+  end type iterations_type
+
+contains
+
+  !> Make the file `path`, with the lines of an older one whose step (the first number) is at most
+  !> `last`, if it is to `go_on`.
+  subroutine begin(self, path, go_on, last, error)
+    class(iterations_type), intent(inout) :: self
+    character(*), intent(in) :: path
+    logical, intent(in) :: go_on
+    integer, intent(in) :: last
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: text
+    integer :: first, length, step, status
+
+    self%begun = .true.
+    text = ''
+    if (go_on .and. file_exists(path)) call read_text_file(path, text, error)
+    if (allocated(error)) return
+    call self%sink%open(path//'.part', error)
+    if (.not. allocated(error)) call self%sink%line(head, error)
+    first = index(text, newline) + 1
+    do while (.not. allocated(error))
+      ! a line that was cut off has no end
+      length = index(text(first:), newline)
+      if (length == 0) exit
+      read (text(first:first + length - 1), *, iostat=status) step
+      if (status /= 0 .or. step > last) exit
+      call self%sink%put(text(first:first + length - 1), error)
+      first = first + length
+    end do
+    if (.not. allocated(error)) call self%sink%flush(error)
+    if (.not. allocated(error)) call self%sink%rename(path, error)
+  end subroutine begin
+
+  !> Whether the file has been made.
+  pure logical function has_begun(self)
+    class(iterations_type), intent(in) :: self
+    has_begun = self%begun
+  end function has_begun
+
+  !> Add a line, which reaches the file within about a second.
+  subroutine add(self, line, error)
+    class(iterations_type), intent(inout) :: self
+    character(*), intent(in) :: line
+    type(error_type), allocatable, intent(out) :: error
+    integer(i8) :: now, rate
+
+    call self%sink%line(line, error)
+    if (allocated(error)) return
+    call system_clock(now, rate)
+    if (now - self%written_at < rate) return
+    self%written_at = now
+    call self%sink%flush(error)
+  end subroutine add
+
+  !> Wait until all lines are on the disk.
+  subroutine sync(self, error)
+    class(iterations_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    if (self%sink%is_open()) call self%sink%sync(error)
+  end subroutine sync
+
+  !> Complete the file.
+  subroutine close_iterations(self, error)
+    class(iterations_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    if (self%sink%is_open()) call self%sink%close(error)
+  end subroutine close_iterations
+
+end module pd_output_results_iterations

@@ -1,0 +1,425 @@
+!> How the results file is laid out, and how its parts are made and copied.
+!>
+!> `/VTKHDF` follows VTK's file format of that name (version 2.0, type PolyData, with steps);
+!> `/scene`, `/points` and `/history` are this program's own, and other readers pass over them.
+module pd_output_results_layout
+  use, intrinsic :: iso_fortran_env, only: compiler_version
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp, sp, i8
+  use pd_output_results_datasets, only: get_shape, make_dataset, make_series, put_array, &
+    & read_rows, set_rows, storage_f4, storage_f8, storage_i8, write_rows
+  use pd_output_results_hdf5, only: change_attribute, copy_object, hdf5_file, make_group, &
+    & put_attribute, put_text
+  use pd_output_results_types, only: column_type, field_type
+  implicit none (type, external)
+  private
+  public :: layout_type, put_scene, put_geometry, write_vectors, copy_static, copy_scene, to_single
+  public :: chunk_rows, block_rows
+
+  integer, parameter :: block_rows = 65536  !! points converted and written at a time
+  integer(i8), parameter :: small_chunk = 65536_i8, large_chunk = 4194304_i8  ! [bytes]
+  integer(i8), parameter :: most_chunks = 65536_i8, most_bytes = 2147483648_i8
+
+  !> What the file holds, and room for how much of it.
+  type :: layout_type
+    type(field_type), allocatable :: fields(:)
+    type(column_type), allocatable :: columns(:)
+    integer(i8) :: points = 0        !! points
+    integer(i8) :: capacity = 0      !! outputs there is room for
+    integer(i8) :: row_capacity = 0  !! rows of the history there is room for
+    logical :: single = .false.      !! fields in single precision
+  contains
+    procedure :: make_heart
+    procedure :: make_time_series
+    procedure :: copy_time_series
+    procedure :: trim_time_series
+    procedure :: field_bytes
+    procedure :: output_bytes
+    procedure :: fixed_bytes
+  end type layout_type
+
+contains
+
+  !> Begin a file, before all else: what an output is counted by.
+  !>
+  !> Readers take the number of times for NSteps, and VTK's writes past its memory when it finds
+  !> more. So the two change together: made one after the other in a file that is still empty,
+  !> their records are neighbours at a fixed place, and HDF5 joins them into one write.
+  !> Should another version not do so, NSteps is written first.
+  subroutine make_heart(self, file, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: file
+    type(error_type), allocatable, intent(out) :: error
+
+    call make_group(file, '/VTKHDF', error)
+    if (allocated(error)) return
+    call make_group(file, '/VTKHDF/Steps', error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF/Steps', 'NSteps', 0_i8, error)
+    if (allocated(error)) return
+    call make_series(file, '/VTKHDF/Steps/Values', storage_f8, 1, 1_i8, self%capacity, error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
+    if (allocated(error)) return
+    call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
+  end subroutine make_heart
+
+  !> `/scene`: what was computed, by what.
+  subroutine put_scene(file, scene_text, command, version, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: scene_text, command, version
+    type(error_type), allocatable, intent(out) :: error
+
+    call make_group(file, '/scene', error)
+    if (.not. allocated(error)) call put_text(file, '/scene/text', scene_text, error)
+    if (.not. allocated(error)) call put_text(file, '/scene/command', command, error)
+    if (.not. allocated(error)) call put_attribute(file, '/scene', 'version', version, error)
+    if (.not. allocated(error)) &
+      & call put_attribute(file, '/scene', 'compiler', compiler_version(), error)
+  end subroutine put_scene
+
+  !> What doesn't change with time: points, each of them a vertex, and no other cells.
+  subroutine put_geometry(file, positions, error)
+    type(hdf5_file), intent(in) :: file
+    real(wp), intent(in) :: positions(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: empty(3) = [character(8) :: 'Lines', 'Polygons', 'Strips']
+    character(:), allocatable :: group
+    integer(i8) :: n
+    integer :: i
+
+    n = size(positions, 1, kind=i8)
+    call put_array(file, '/VTKHDF/NumberOfPoints', [n], error)
+    if (allocated(error)) return
+    call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, n, error)
+    if (allocated(error)) return
+    call write_vectors(file, '/VTKHDF/Points', 0_i8, positions, .false., error)
+    if (allocated(error)) return
+
+    call make_group(file, '/VTKHDF/Vertices', error)
+    if (allocated(error)) return
+    call put_array(file, '/VTKHDF/Vertices/NumberOfCells', [n], error)
+    if (allocated(error)) return
+    call put_array(file, '/VTKHDF/Vertices/NumberOfConnectivityIds', [n], error)
+    if (allocated(error)) return
+    call put_multiples(file, '/VTKHDF/Vertices/Connectivity', n, 1_i8, 0_i8, error)
+    if (allocated(error)) return
+    call put_multiples(file, '/VTKHDF/Vertices/Offsets', n + 1, 1_i8, 0_i8, error)
+    if (allocated(error)) return
+    do i = 1, size(empty)
+      group = '/VTKHDF/'//trim(empty(i))
+      call make_group(file, group, error)
+      if (allocated(error)) return
+      call put_array(file, group//'/NumberOfCells', [0_i8], error)
+      if (allocated(error)) return
+      call put_array(file, group//'/NumberOfConnectivityIds', [0_i8], error)
+      if (allocated(error)) return
+      call make_dataset(file, group//'/Connectivity', storage_i8, 1, 0_i8, error)
+      if (allocated(error)) return
+      call put_array(file, group//'/Offsets', [0_i8], error)
+      if (allocated(error)) return
+    end do
+  end subroutine put_geometry
+
+  !> A dataset of `rows` integers 0, step, 2 step, ...; with `chunk` above 0 one that can grow.
+  subroutine put_multiples(file, path, rows, step, chunk, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: rows, step, chunk
+    type(error_type), allocatable, intent(out) :: error
+    integer(i8), allocatable :: buffer(:)
+    integer(i8) :: first, i, count
+
+    if (chunk > 0) then
+      call make_series(file, path, storage_i8, 1, rows, chunk, error)
+    else
+      call make_dataset(file, path, storage_i8, 1, rows, error)
+    end if
+    allocate (buffer(min(rows, int(block_rows, i8))))
+    do first = 0, rows - 1, block_rows
+      if (allocated(error)) return
+      count = min(int(block_rows, i8), rows - first)
+      do i = 1, count
+        buffer(i) = (first + i - 1)*step
+      end do
+      call write_rows(file, path, first, buffer(:count), error)
+    end do
+  end subroutine put_multiples
+
+  !> What else grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
+  subroutine make_time_series(self, file, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: file
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: steps = '/VTKHDF/Steps'
+    character(:), allocatable :: path
+    integer(i8), allocatable :: constant(:), cells(:, :)
+    integer(i8) :: s, chunk
+    integer :: i
+
+    s = self%capacity
+    chunk = min(s, small_chunk/8)
+    call put_multiples(file, steps//'/PartOffsets', s, 0_i8, chunk, error)
+    if (allocated(error)) return
+    call put_multiples(file, steps//'/PointOffsets', s, 0_i8, chunk, error)
+    if (allocated(error)) return
+    call make_series(file, steps//'/NumberOfParts', storage_i8, 1, s, chunk, error)
+    if (allocated(error)) return
+    allocate (constant(s), source=1_i8)
+    call write_rows(file, steps//'/NumberOfParts', 0_i8, constant, error)
+    if (allocated(error)) return
+    allocate (cells(4, s), source=0_i8)
+    call make_series(file, steps//'/CellOffsets', storage_i8, 4, s, chunk, error)
+    if (allocated(error)) return
+    call write_rows(file, steps//'/CellOffsets', 0_i8, cells, error)
+    if (allocated(error)) return
+    call make_series(file, steps//'/ConnectivityIdOffsets', storage_i8, 4, s, chunk, error)
+    if (allocated(error)) return
+    call write_rows(file, steps//'/ConnectivityIdOffsets', 0_i8, cells, error)
+    if (allocated(error)) return
+
+    call make_group(file, '/VTKHDF/PointData', error)
+    if (allocated(error)) return
+    call make_group(file, steps//'/PointDataOffsets', error)
+    if (allocated(error)) return
+    do i = 1, size(self%fields)
+      associate (field => self%fields(i))
+        path = '/VTKHDF/PointData/'//trim(field%name)
+        call make_series(file, path, merge(storage_f4, storage_f8, self%single), &
+          & field%components, s*self%points, &
+          & chunk_rows(self%points, field_bytes(self, i), s), error)
+        if (allocated(error)) return
+        call put_attribute(file, path, 'units', trim(field%unit), error)
+        if (allocated(error)) return
+        call put_multiples(file, steps//'/PointDataOffsets/'//trim(field%name), s, self%points, &
+          & chunk, error)
+        if (allocated(error)) return
+      end associate
+    end do
+
+    call make_group(file, '/history', error)
+    if (allocated(error)) return
+    call put_attribute(file, '/history', 'rows', 0_i8, error)
+    do i = 1, size(self%columns)
+      if (allocated(error)) return
+      path = '/history/'//trim(self%columns(i)%name)
+      ! a single chunk, set aside by the one row that a column has from the start
+      call make_series(file, path, storage_f8, 1, 1_i8, self%row_capacity, error)
+      if (allocated(error)) return
+      call write_rows(file, path, 0_i8, [0.0_wp], error)
+      if (allocated(error)) return
+      call put_attribute(file, path, 'units', trim(self%columns(i)%unit), error)
+    end do
+  end subroutine make_time_series
+
+  !> Rows per chunk, for outputs of `points` rows of `row_bytes` bytes: several outputs if they
+  !> are small; if they are large a part of one that divides it evenly, where there is such a part.
+  pure integer(i8) function chunk_rows(points, row_bytes, outputs) result(rows)
+    integer(i8), intent(in) :: points   !! points
+    integer(i8), intent(in) :: row_bytes  !! bytes a point
+    integer(i8), intent(in) :: outputs  !! outputs planned
+    integer(i8) :: output_bytes, target_bytes, parts, i
+
+    output_bytes = max(1_i8, points*row_bytes)
+    if (output_bytes <= small_chunk) then
+      rows = points*min(outputs, small_chunk/output_bytes)
+    else
+      ! few enough chunks that the file's index of them stays small
+      target_bytes = min(most_bytes, max(large_chunk, output_bytes*outputs/most_chunks))
+      parts = (output_bytes + target_bytes - 1)/target_bytes
+      do i = parts, 2*parts
+        if (mod(points, i) == 0) exit
+      end do
+      if (i <= 2*parts) parts = i
+      rows = (points + parts - 1)/parts
+    end if
+    rows = max(1_i8, rows)
+  end function chunk_rows
+
+  !> Bytes a point of field `i`.
+  pure integer(i8) function field_bytes(self, i)
+    class(layout_type), intent(in) :: self
+    integer, intent(in) :: i
+    field_bytes = self%fields(i)%components*merge(4, 8, self%single)
+  end function field_bytes
+
+  !> Bytes that one output takes.
+  pure integer(i8) function output_bytes(self)
+    class(layout_type), intent(in) :: self
+    integer :: i
+
+    output_bytes = 0
+    do i = 1, size(self%fields)
+      output_bytes = output_bytes + self%points*field_bytes(self, i)
+    end do
+  end function output_bytes
+
+  !> Bytes written before the first output, within some kilobytes.
+  pure integer(i8) function fixed_bytes(self)
+    class(layout_type), intent(in) :: self
+
+    fixed_bytes = self%points*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
+      & + self%row_capacity*8*size(self%columns)
+  end function fixed_bytes
+
+  !> Write `values(n, 3)` as rows of three from row `at` on, turned block by block.
+  subroutine write_vectors(file, path, at, values, single, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: at
+    real(wp), intent(in) :: values(:, :)
+    logical, intent(in) :: single
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: turned(:, :)
+    real(sp), allocatable :: short(:, :)
+    integer(i8) :: n, first, count, i
+
+    n = size(values, 1, kind=i8)
+    allocate (turned(3, min(n, int(block_rows, i8))))
+    do first = 0, n - 1, block_rows
+      count = min(int(block_rows, i8), n - first)
+      do i = 1, count
+        turned(:, i) = values(first + i, :)
+      end do
+      if (single) then
+        short = to_single(turned(:, :count))
+        call write_rows(file, path, at + first, short, error)
+      else
+        call write_rows(file, path, at + first, turned(:, :count), error)
+      end if
+      if (allocated(error)) return
+    end do
+  end subroutine write_vectors
+
+  !> To single precision; what is beyond its range goes to the end of the range.
+  elemental real(sp) function to_single(value)
+    real(wp), intent(in) :: value
+    real(wp), parameter :: most = huge(1.0_sp)
+    to_single = real(value, sp)
+    if (abs(value) > most) to_single = sign(huge(1.0_sp), real(sign(1.0_wp, value), sp))
+  end function to_single
+
+  !> Copy all that doesn't grow but the scene.
+  subroutine copy_static(from, to, error)
+    type(hdf5_file), intent(in) :: from, to
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: parts(7) = [character(24) :: '/points', &
+      & '/VTKHDF/NumberOfPoints', '/VTKHDF/Points', '/VTKHDF/Vertices', '/VTKHDF/Lines', &
+      & '/VTKHDF/Polygons', '/VTKHDF/Strips']
+    integer :: i
+
+    do i = 1, size(parts)
+      call copy_object(from, trim(parts(i)), to, error)
+      if (allocated(error)) return
+    end do
+  end subroutine copy_static
+
+  !> Copy the scene.
+  subroutine copy_scene(from, to, error)
+    type(hdf5_file), intent(in) :: from, to
+    type(error_type), allocatable, intent(out) :: error
+    call copy_object(from, '/scene', to, error)
+  end subroutine copy_scene
+
+  !> Copy the complete outputs and rows, and what there is of an output under way, field by field
+  !> and block by block. `outputs` and `rows` count the complete ones.
+  subroutine copy_time_series(self, from, outputs, rows, to, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: from
+    integer(i8), intent(in) :: outputs, rows
+    type(hdf5_file), intent(in) :: to
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    call set_rows(to, '/VTKHDF/Steps/Values', 1, max(1_i8, outputs), error)
+    if (allocated(error)) return
+    call copy_rows(from, to, '/VTKHDF/Steps/Values', outputs, .false., error)
+    do i = 1, size(self%fields)
+      if (allocated(error)) return
+      call copy_rows(from, to, '/VTKHDF/PointData/'//trim(self%fields(i)%name), &
+        & (outputs + 1)*self%points, self%single, error)
+    end do
+    do i = 1, size(self%columns)
+      if (allocated(error)) return
+      call set_rows(to, '/history/'//trim(self%columns(i)%name), 1, max(1_i8, rows), error)
+      if (allocated(error)) return
+      call copy_rows(from, to, '/history/'//trim(self%columns(i)%name), rows, .false., &
+        & error)
+    end do
+    if (.not. allocated(error)) call change_attribute(to, '/history', 'rows', rows, error)
+    if (.not. allocated(error)) &
+      & call change_attribute(to, '/VTKHDF/Steps', 'NSteps', outputs, error)
+  end subroutine copy_time_series
+
+  !> Copy the first `rows` rows of a dataset of reals, or all if there are fewer.
+  subroutine copy_rows(from, to, path, rows, single, error)
+    type(hdf5_file), intent(in) :: from, to
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: rows
+    logical, intent(in) :: single
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:, :)
+    real(sp), allocatable :: short(:, :)
+    integer(i8) :: first, count, extent
+    integer :: components
+
+    call get_shape(from, path, components, extent, error)
+    if (allocated(error)) return
+    extent = min(extent, rows)
+    do first = 0, extent - 1, block_rows
+      count = min(int(block_rows, i8), extent - first)
+      if (.not. allocated(values)) allocate (values(components, count))
+      call read_rows(from, path, first, values(:, :count), error)
+      if (allocated(error)) return
+      if (single) then
+        short = to_single(values(:, :count))
+        call write_rows(to, path, first, short, error)
+      else
+        call write_rows(to, path, first, values(:, :count), error)
+      end if
+      if (allocated(error)) return
+    end do
+  end subroutine copy_rows
+
+  !> Cut off the room that `outputs` outputs and `rows` rows of history didn't need.
+  subroutine trim_time_series(self, file, outputs, rows, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: file
+    integer(i8), intent(in) :: outputs, rows
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: steps = '/VTKHDF/Steps/'
+    character(*), parameter :: scalars(4) = [character(16) :: 'Values', 'PartOffsets', &
+      & 'PointOffsets', 'NumberOfParts']
+    character(*), parameter :: tables(2) = [character(24) :: 'CellOffsets', &
+      & 'ConnectivityIdOffsets']
+    integer :: i
+
+    if (outputs < self%capacity) then
+      do i = 1, size(scalars)
+        call set_rows(file, steps//trim(scalars(i)), 1, outputs, error)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(tables)
+        call set_rows(file, steps//trim(tables(i)), 4, outputs, error)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(self%fields)
+        associate (field => self%fields(i))
+          call set_rows(file, steps//'PointDataOffsets/'//trim(field%name), 1, &
+            & outputs, error)
+          if (allocated(error)) return
+          call set_rows(file, '/VTKHDF/PointData/'//trim(field%name), field%components, &
+            & outputs*self%points, error)
+          if (allocated(error)) return
+        end associate
+      end do
+    end if
+    if (rows == 0) then
+      do i = 1, size(self%columns)
+        call set_rows(file, '/history/'//trim(self%columns(i)%name), 1, 0_i8, error)
+        if (allocated(error)) return
+      end do
+    end if
+  end subroutine trim_time_series
+
+end module pd_output_results_layout

@@ -1,0 +1,535 @@
+!> The results of a run, in the files that the user wants: what the solver talks to.
+!>
+!>     call results%create(directory, stem, positions, fields, ...)
+!>     call results%put_points('volume', volume, error)       ! any number of these
+!>     call results%add_row([...], error)                     ! at any time
+!>     call results%begin_output(time, error)
+!>     call results%put_field('displacement', u, error)       ! each field once
+!>     call results%end_output(error)
+!>     call results%close(error)
+!>
+!> Nothing of an earlier run is touched before the first output is complete. After an error call
+!> `close` none the less: it leaves the files as they were at the last complete output.
+module pd_output_results_results
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_text, only: join, lower_case, to_text, with_unit
+  use pd_output_checkpoint_checkpoint, only: remove_checkpoints
+  use pd_output_results_description, only: check_description
+  use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
+    & refuse_existing
+  use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_file
+  use pd_output_results_history, only: csv_type, history_type
+  use pd_output_results_iterations, only: iterations_type
+  use pd_output_results_sink, only: sink_type
+  use pd_output_results_types, only: column_type, field_type, kept_type, label_length
+  use pd_output_results_vtkhdf, only: vtkhdf_file
+  use pd_output_results_vtu, only: remove_series, vtu_series
+  implicit none (type, external)
+  private
+  public :: results_type, column_type, field_type, label_length
+
+  !> The results of one run.
+  type :: results_type
+    private
+    character(:), allocatable :: directory, stem
+    type(field_type), allocatable :: fields(:)
+    type(column_type), allocatable :: columns(:)
+    logical, allocatable :: given(:)     !! fields of the output under way
+    type(vtkhdf_file) :: vtkhdf
+    type(vtu_series) :: vtu
+    type(history_type) :: history
+    type(csv_type) :: csv
+    type(iterations_type) :: iterations
+    integer :: points = 0
+    integer :: planned_outputs = 0
+    integer :: outputs = 0               !! complete ones
+    character(:), allocatable :: warnings       !! a line for each
+    real(wp), allocatable :: times(:)    !! of them [s]
+    real(wp) :: time = 0.0_wp            !! of the output under way [s]
+    logical :: in_output = .false.
+    logical :: use_vtkhdf = .false., use_vtu = .false.
+    logical :: open = .false.
+    logical :: started = .false.         !! the files have their names
+    logical :: resumed = .false.         !! they are those of a run that goes on
+    logical :: failed = .false.
+  contains
+    procedure :: create
+    procedure, private :: put_points_real, put_points_i4, put_points_i1
+    !> Write an array over the points (volume [m3], body, region_NAME, ...), before the first
+    !> output: `values(n)` real, 32-bit or 8-bit integer. Only the HDF5 file has a place for it.
+    generic :: put_points => put_points_real, put_points_i4, put_points_i1
+    procedure :: begin_output
+    procedure, private :: put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
+    !> Write one field of the output under way, by its number or name: `values(n)`, or
+    !> `values(n, 3)` for vectors.
+    generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
+    procedure :: end_output
+    procedure :: add_row
+    procedure :: add_iteration
+    procedure :: put_warnings
+    procedure :: close => close_results
+    procedure :: sync
+    procedure :: kept => rows_and_times
+    procedure :: goes_on
+  end type results_type
+
+contains
+
+  !> Begin the results `directory/stem.*` and `directory/history.csv`.
+  !>
+  !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
+  !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
+  !> `precision` ('double', 'single') is that of the fields; `format` is 'vtkhdf', 'vtu' or 'both'.
+  !> `scene_text`, `command` and the program's `version` are kept in the file. With `kept`, the
+  !> files that are there go on after the outputs and rows in it; where there are none, new ones
+  !> begin with its rows.
+  subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
+    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept)
+    class(results_type), intent(out) :: self
+    character(*), intent(in) :: directory, stem
+    real(wp), intent(in) :: positions(:, :)
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    character(*), intent(in) :: precision, format
+    character(*), intent(in) :: scene_text, command, version
+    logical, intent(in) :: overwrite
+    type(error_type), allocatable, intent(out) :: error
+    type(kept_type), intent(in), optional :: kept
+    logical :: single
+
+    call check_description(positions, fields, columns, precision, format, error)
+    if (allocated(error)) return
+    self%resumed = .false.
+    if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
+    if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
+    if (allocated(error)) return
+    call make_directory(directory, error)
+    if (allocated(error)) return
+
+    self%directory = trim(directory)
+    self%stem = trim(stem)
+    allocate (self%fields, source=fields)
+    allocate (self%columns, source=columns)
+    allocate (self%given(size(fields)), source=.false.)
+    self%points = size(positions, 1)
+    self%planned_outputs = planned_outputs
+    single = lower_case(precision) == 'single'
+    self%use_vtkhdf = lower_case(format) /= 'vtu'
+    self%use_vtu = lower_case(format) /= 'vtkhdf'
+    call self%history%start(size(columns))
+    allocate (self%times(0))
+    if (present(kept)) call self%history%restore(kept%rows, written=self%resumed)
+    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
+    if (self%resumed) then
+      if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
+        & size(positions, 1, kind=i8), fields, planned_outputs, columns, planned_rows, single, &
+        & scene_text, command, version, kept, error)
+      if (.not. allocated(error)) call resume_others(self, kept, error)
+      if (allocated(error)) return
+    else if (self%use_vtkhdf) then
+      call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), positions, fields, &
+        & planned_outputs, columns, planned_rows, single, scene_text, command, version, error)
+      if (allocated(error)) then
+        call explain_need(self, 'the layout', self%vtkhdf%layout_bytes(), error)
+        return
+      end if
+    end if
+    self%open = .true.
+  end subroutine create
+
+  !> Go on with the files beside the HDF5 file.
+  subroutine resume_others(self, kept, error)
+    class(results_type), intent(inout) :: self
+    type(kept_type), intent(in) :: kept
+    type(error_type), allocatable, intent(out) :: error
+
+    self%times = kept%times
+    self%outputs = size(kept%times)
+    call mark_unfinished(self%directory, self%stem, error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%resume(kept%times, error)
+    if (size(self%columns) > 0 .and. .not. allocated(error)) call self%csv%replace( &
+      & in_directory(self%directory, 'history.csv'), self%columns, kept%rows, error)
+    self%started = .not. allocated(error)
+  end subroutine resume_others
+
+  subroutine put_points_real(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (allocated(error)) self%failed = .true.
+  end subroutine put_points_real
+
+  subroutine put_points_i4(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i4), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (allocated(error)) self%failed = .true.
+  end subroutine put_points_i4
+
+  subroutine put_points_i1(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i1), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (allocated(error)) self%failed = .true.
+  end subroutine put_points_i1
+
+  !> Begin the output of the state at `time` [s].
+  subroutine begin_output(self, time, error)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: time
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%open .or. self%in_output) then
+      call fail(error, 'an output begins in results that are not open, or within another')
+      return
+    end if
+    self%given = .false.
+    self%time = time
+    if (self%use_vtkhdf) call self%vtkhdf%begin_output(error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%begin_output(error)
+    if (allocated(error)) call explain_output(self, error)
+    self%in_output = .not. allocated(error)
+  end subroutine begin_output
+
+  subroutine put_scalar_at(self, field, values, error)
+    class(results_type), intent(inout) :: self
+    integer, intent(in) :: field
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+
+    call check_field(self, field, size(values), 1, error)
+    if (allocated(error)) return
+    if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
+    if (allocated(error)) call explain_output(self, error)
+    self%given(field) = .not. allocated(error)
+  end subroutine put_scalar_at
+
+  subroutine put_vector_at(self, field, values, error)
+    class(results_type), intent(inout) :: self
+    integer, intent(in) :: field
+    real(wp), intent(in) :: values(:, :)
+    type(error_type), allocatable, intent(out) :: error
+
+    call check_field(self, field, size(values, 1), size(values, 2), error)
+    if (allocated(error)) return
+    if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
+    if (allocated(error)) call explain_output(self, error)
+    self%given(field) = .not. allocated(error)
+  end subroutine put_vector_at
+
+  subroutine put_scalar_named(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: field
+
+    call find_field(self, name, field, error)
+    if (.not. allocated(error)) call self%put_field(field, values, error)
+  end subroutine put_scalar_named
+
+  subroutine put_vector_named(self, name, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: values(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: field
+
+    call find_field(self, name, field, error)
+    if (.not. allocated(error)) call self%put_field(field, values, error)
+  end subroutine put_vector_named
+
+  !> The number of a field.
+  subroutine find_field(self, name, field, error)
+    class(results_type), intent(in) :: self
+    character(*), intent(in) :: name
+    integer, intent(out) :: field
+    type(error_type), allocatable, intent(out) :: error
+    character(label_length), allocatable :: names(:)
+
+    allocate (names(size(self%fields)))
+    do field = 1, size(self%fields)
+      names(field) = self%fields(field)%name
+      if (names(field) == name) return
+    end do
+    call fail(error, 'these results have no field '''//trim(name)//''': '// &
+      & join(names, ', '))
+  end subroutine find_field
+
+  !> Whether a field can be written now, with values of this shape.
+  subroutine check_field(self, field, points, components, error)
+    class(results_type), intent(in) :: self
+    integer, intent(in) :: field, points, components
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%in_output) then
+      call fail(error, 'a field is given outside an output')
+    else if (field < 1 .or. field > size(self%fields)) then
+      call fail(error, 'these results have no field '//to_text(field))
+    else if (self%given(field)) then
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is given twice in one output')
+    else if (points /= self%points .or. components /= self%fields(field)%components) then
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%points) &
+        & //' x '//to_text(self%fields(field)%components)//', not '//to_text(points)//' x ' &
+        & //to_text(components))
+    end if
+  end subroutine check_field
+
+  !> Complete the output under way; all fields must have been given. History rows so far go with it.
+  subroutine end_output(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: table(:, :)
+    integer :: i
+
+    if (.not. self%in_output) then
+      call fail(error, 'an output ends that has not begun')
+      return
+    end if
+    do i = 1, size(self%fields)
+      if (self%given(i)) cycle
+      call fail(error, 'field '//trim(self%fields(i)%name)//' is missing from an output')
+      return
+    end do
+    ! rows first: a file that counts this output holds the history up to it
+    call self%history%take(table)
+    if (self%use_vtkhdf) then
+      call self%vtkhdf%append_rows(table, error)
+      if (.not. allocated(error)) call self%vtkhdf%end_output(self%time, error)
+    end if
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%end_output(self%time, error)
+    if (.not. allocated(error)) call start_files(self, error)
+    if (.not. allocated(error) .and. self%csv%is_open()) call self%csv%append(table, error)
+    if (.not. allocated(error)) call check_there(self, error)
+    if (allocated(error)) then
+      call explain_output(self, error)
+    else
+      self%outputs = self%outputs + 1
+      self%times = [self%times, self%time]
+      self%in_output = .false.
+    end if
+  end subroutine end_output
+
+  !> An error if the files are no longer where they are written: the system goes on to write files
+  !> whose names or folder have been removed, and they vanish with the program.
+  subroutine check_there(self, error)
+    class(results_type), intent(in) :: self
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: path
+
+    path = in_directory(self%directory, self%stem//'.vtkhdf')
+    if (self%use_vtkhdf .and. .not. file_exists(path)) then
+      call fail(error, path//' has been removed while it is written')
+      return
+    end if
+    path = in_directory(self%directory, 'history.csv')
+    if (self%csv%is_open() .and. .not. file_exists(path)) &
+      & call fail(error, path//' has been removed while it is written')
+  end subroutine check_there
+
+  !> Put the files in their places, once: here, and not before, older results go.
+  subroutine start_files(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    if (self%started) return
+    call mark_unfinished(self%directory, self%stem, error)
+    if (allocated(error)) return
+    call remove_checkpoints(self%directory, self%stem)
+    if (self%use_vtkhdf) then
+      call self%vtkhdf%publish(error)
+    else
+      call remove_file(in_directory(self%directory, self%stem//'.vtkhdf'))
+    end if
+    if (allocated(error)) return
+    call remove_series(self%directory, self%stem, merge(1, 0, self%use_vtu))
+    call remove_file(in_directory(self%directory, 'iterations.csv'))
+    if (size(self%columns) > 0) then
+      call self%csv%open(in_directory(self%directory, 'history.csv'), self%columns, error)
+    else
+      call remove_file(in_directory(self%directory, 'history.csv'))
+    end if
+    self%started = .not. allocated(error)
+  end subroutine start_files
+
+  !> Add a row of the history: a value for each column. Rows reach the files with each output, at
+  !> least about once a second, and with `close`.
+  subroutine add_row(self, values, error)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%open) then
+      call fail(error, 'a history row is given to results that are not open')
+      return
+    end if
+    call self%history%add(values, error)
+    if (allocated(error) .or. .not. self%started .or. self%in_output) return
+    if (self%history%is_due()) call write_rows(self, error)
+  end subroutine add_row
+
+  !> Add a line about an iteration of a relaxation to `iterations.csv`. Of a run that goes on, lines
+  !> up to step `last` stay.
+  subroutine add_iteration(self, line, last, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: line
+    integer, intent(in) :: last
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%started .or. self%failed) return
+    if (.not. self%iterations%has_begun()) call self%iterations%begin( &
+      & in_directory(self%directory, 'iterations.csv'), self%resumed, last, error)
+    if (.not. allocated(error)) call self%iterations%add(line, error)
+    if (allocated(error)) call explain_need(self, 'iterations.csv', int(len(line), i8), error)
+  end subroutine add_iteration
+
+  !> Keep the warnings so far, a line for each, in place of those of an earlier call: at once in
+  !> `warnings.txt`, and in the HDF5 file when the results are complete. What goes wrong with them
+  !> is no reason to end a run.
+  subroutine put_warnings(self, text)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: text
+    type(sink_type) :: sink
+    type(error_type), allocatable :: ignored
+
+    if (.not. self%started .or. self%failed) return
+    if (allocated(self%warnings)) then
+      if (self%warnings == text) return
+    end if
+    self%warnings = text
+    if (text == '') then
+      call remove_file(in_directory(self%directory, 'warnings.txt'))
+      return
+    end if
+    call sink%open(in_directory(self%directory, 'warnings.txt'), ignored)
+    if (allocated(ignored)) return
+    call sink%put(text, ignored)
+    call sink%close(ignored)
+  end subroutine put_warnings
+
+  !> Write the rows that wait.
+  subroutine write_rows(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: table(:, :)
+
+    call self%history%take(table)
+    if (self%use_vtkhdf) call self%vtkhdf%append_rows(table, error)
+    if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%append(table, error)
+    if (allocated(error)) call explain_need(self, 'the history', &
+      & 8_i8*size(table, kind=i8), error)
+  end subroutine write_rows
+
+  !> Say which output failed.
+  subroutine explain_output(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(inout) :: error
+    integer(i8) :: bytes
+
+    bytes = 0
+    if (self%use_vtkhdf) bytes = self%vtkhdf%output_bytes()
+    if (self%use_vtu) bytes = bytes + self%vtu%output_bytes()
+    call explain_need(self, 'output '//to_text(self%outputs + 1)//' at '// &
+      & with_unit(self%time, 's'), bytes, error)
+  end subroutine explain_output
+
+  !> Say what failed, how much it needed and what is safe. From here on nothing more is written.
+  subroutine explain_need(self, what, bytes, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: what
+    integer(i8), intent(in) :: bytes
+    type(error_type), allocatable, intent(inout) :: error
+
+    self%failed = .true.
+    error%message = 'results, '//what//': '//error%message//' ('//what//' needs ' &
+      & //with_unit(real(bytes, wp), 'B', 3)//'; complete before it: '//to_text(self%outputs) &
+      & //' outputs)'
+  end subroutine explain_need
+
+  !> Wait until all that was written is on the disk, with the rows that wait.
+  subroutine sync(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. (self%open .and. self%started)) return
+    call write_rows(self, error)
+    if (self%use_vtkhdf .and. .not. allocated(error)) call self%vtkhdf%sync(error)
+    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%sync(error)
+    if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
+    if (.not. allocated(error)) call self%iterations%sync(error)
+  end subroutine sync
+
+  !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
+  pure function rows_and_times(self, but_rows, but_outputs) result(kept)
+    class(results_type), intent(in) :: self
+    integer, intent(in) :: but_rows, but_outputs
+    type(kept_type) :: kept
+
+    kept%rows = self%history%first_rows(but_rows)
+    kept%times = self%times(:self%outputs - but_outputs)
+  end function rows_and_times
+
+  !> Whether these are the files of a run that goes on, with all that was written before the first
+  !> output.
+  pure logical function goes_on(self)
+    class(results_type), intent(in) :: self
+    goes_on = self%resumed
+  end function goes_on
+
+  !> Complete the files. Those of a run that was `stopped` stay as they are, to go on another time;
+  !> with `keep_mark` they stay marked as unfinished. After an error in writing they stay as they
+  !> were at the last complete output; if nothing was written, nothing is left behind.
+  subroutine close_results(self, error, stopped, keep_mark)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    logical, intent(in), optional :: stopped, keep_mark
+    type(error_type), allocatable :: ignored
+    logical :: leave, complete
+
+    if (.not. self%open) return
+    leave = .false.
+    if (present(stopped)) leave = stopped
+    complete = .not. leave
+    if (present(keep_mark)) complete = complete .and. .not. keep_mark
+    self%open = .false.
+    if (self%use_vtu) call self%vtu%abandon()
+    call self%iterations%close(ignored)
+    if (allocated(ignored) .and. .not. self%failed) call move_alloc(ignored, error)
+    if (.not. (self%failed .or. allocated(error))) then
+      if (.not. self%started .and. self%history%has_rows()) call start_files(self, error)
+      if (self%started .and. .not. allocated(error)) call write_rows(self, error)
+    end if
+    if (self%started .and. .not. self%failed .and. .not. allocated(error)) &
+      & call check_there(self, error)
+    if (self%failed .or. allocated(error) .or. .not. self%started) then
+      if (self%use_vtkhdf) call self%vtkhdf%abandon()
+      if (self%csv%is_open()) call self%csv%close(ignored)
+      return
+    end if
+    if (self%use_vtkhdf) then
+      if (leave) then
+        call self%vtkhdf%leave(error)
+      else
+        if (allocated(self%warnings)) call self%vtkhdf%put_warnings(self%warnings)
+        call self%vtkhdf%finish(error)
+      end if
+    end if
+    if (self%csv%is_open()) then
+      call self%csv%close(ignored)
+      if (allocated(ignored) .and. .not. allocated(error)) call move_alloc(ignored, error)
+    end if
+    if (complete .and. .not. allocated(error)) call mark_complete(self%directory, self%stem)
+  end subroutine close_results
+
+end module pd_output_results_results

@@ -1,0 +1,30 @@
+!> What the results are made of: fields over the points and columns of the history.
+module pd_output_results_types
+  use pd_base_kinds, only: wp
+  implicit none (type, external)
+  private
+  public :: field_type, column_type, kept_type, label_length
+
+  integer, parameter :: label_length = 160  !! longest name of a field or column [characters]
+
+  !> A quantity that every output holds at every point.
+  type :: field_type
+    character(label_length) :: name = ''
+    integer :: components = 1              !! 1, or 3 for vectors in any dimension (unused ones 0)
+    character(32) :: unit = ''             !! SI, for instance 'm/s'; '1' for none
+  end type field_type
+
+  !> A quantity that every row of the history holds.
+  type :: column_type
+    character(label_length) :: name = ''
+    character(32) :: unit = ''             !! SI; '1' for none
+  end type column_type
+
+  !> What of the results a checkpoint counts on.
+  type :: kept_type
+    real(wp), allocatable :: rows(:, :)      !! the history (column, row)
+    real(wp), allocatable :: times(:)        !! of the outputs [s]
+    character(:), allocatable :: scene_text  !! the resolved scene of the run that wrote them
+  end type kept_type
+
+end module pd_output_results_types

@@ -1,0 +1,511 @@
+!> The results file: one HDF5 file that VTK reads as a time series of points (VTKHDF, PolyData).
+!>
+!> It must be whole whenever its writer dies. HDF5 doesn't write its own records in one step, so
+!> they hardly ever change: the file is laid out under another name with room for all planned
+!> outputs (the system stores only what is written), closed, and opened again. From then on an
+!> output is plain data written into places that exist, and after it eight bytes that count: NSteps,
+!> the length of a history column. A file that needs more room is copied into a bigger one, which
+!> then takes its name in one step.
+module pd_output_results_vtkhdf
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_text, only: to_text
+  use pd_output_results_datasets, only: get_chunk, get_shape, put_array, read_rows, set_rows, &
+    & write_rows
+  use pd_output_results_files, only: remove_file, rename_file, sync_path
+  use pd_output_results_hdf5, only: change_attribute, close_file, create_file, flush_file, &
+    & get_attribute, get_text, hdf5_file, make_group, object_exists, open_file, put_text, &
+    & remove_object, start_hdf5
+  use pd_output_results_layout, only: block_rows, copy_scene, copy_static, layout_type, &
+    & put_geometry, put_scene, to_single, write_vectors
+  use pd_output_results_types, only: column_type, field_type, kept_type
+  implicit none (type, external)
+  private
+  public :: vtkhdf_file
+
+  integer(i8), parameter :: default_outputs = 16_i8, default_rows = 4096_i8
+
+  !> A results file under way.
+  type :: vtkhdf_file
+    private
+    type(hdf5_file) :: file
+    type(layout_type) :: layout
+    character(:), allocatable :: path     !! the final name
+    character(:), allocatable :: current  !! the present name
+    integer(i8) :: outputs = 0            !! complete ones
+    integer(i8) :: rows = 0               !! complete ones
+    logical :: sealed = .false.           !! laid out for good
+  contains
+    procedure :: create
+    procedure :: resume
+    procedure, private :: put_points_real, put_points_i4, put_points_i1
+    !> Add an array over the points to `/points`, before the first output.
+    generic :: put_points => put_points_real, put_points_i4, put_points_i1
+    procedure :: begin_output
+    procedure, private :: put_scalar, put_vector
+    !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
+    generic :: put_field => put_scalar, put_vector
+    procedure :: end_output
+    procedure :: append_rows
+    procedure :: publish
+    procedure :: sync
+    procedure :: put_warnings
+    procedure :: finish
+    procedure :: leave
+    procedure :: abandon
+    procedure :: output_bytes
+    procedure :: layout_bytes
+  end type vtkhdf_file
+
+contains
+
+  !> Lay out a file for `planned_outputs` outputs of `fields` and `planned_rows` history rows of
+  !> `columns` (0 = unknown) at the points `positions(n, 3)` [m]. It is
+  !> made under another name until `publish`.
+  subroutine create(self, path, positions, fields, planned_outputs, columns, planned_rows, single, &
+    & scene_text, command, version, error)
+    class(vtkhdf_file), intent(out) :: self
+    character(*), intent(in) :: path
+    real(wp), intent(in) :: positions(:, :)
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    logical, intent(in) :: single
+    character(*), intent(in) :: scene_text, command, version
+    type(error_type), allocatable, intent(out) :: error
+
+    self%path = path
+    self%current = path//'.part'
+    call plan_layout(self, size(positions, 1, kind=i8), fields, planned_outputs, columns, &
+      & planned_rows, single)
+    call start_hdf5(error)
+    if (allocated(error)) return
+    call remove_file(path//'.grow')  ! a killed run may have left it
+    call create_file(self%current, self%file, error)
+    if (allocated(error)) then
+      call remove_file(self%current)  ! there may be a file, with nothing in it
+      return
+    end if
+    call self%layout%make_heart(self%file, error)
+    if (.not. allocated(error)) call put_geometry(self%file, positions, error)
+    if (.not. allocated(error)) call put_scene(self%file, scene_text, command, version, error)
+    if (.not. allocated(error)) call make_group(self%file, '/points', error)
+    if (.not. allocated(error)) call self%layout%make_time_series(self%file, error)
+    if (allocated(error)) call self%abandon()
+  end subroutine create
+
+  !> What the file is to hold, and room for how much of it.
+  subroutine plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    type(vtkhdf_file), intent(inout) :: self
+    integer(i8), intent(in) :: points
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    logical, intent(in) :: single
+
+    allocate (self%layout%fields, source=fields)
+    allocate (self%layout%columns, source=columns)
+    self%layout%points = points
+    self%layout%single = single
+    self%layout%capacity = default_outputs
+    if (planned_outputs > 0) self%layout%capacity = planned_outputs
+    self%layout%row_capacity = default_rows
+    if (planned_rows > 0) self%layout%row_capacity = planned_rows
+  end subroutine plan_layout
+
+  !> Go on with a file that was left at or after the outputs and rows in `kept`: what is beyond them
+  !> is cut off. The other arguments are those of `create`; a changed `scene_text` is written.
+  subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
+    & scene_text, command, version, kept, error)
+    class(vtkhdf_file), intent(out) :: self
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: points
+    type(field_type), intent(in) :: fields(:)
+    integer, intent(in) :: planned_outputs
+    type(column_type), intent(in) :: columns(:)
+    integer, intent(in) :: planned_rows
+    logical, intent(in) :: single
+    character(*), intent(in) :: scene_text, command, version
+    type(kept_type), intent(in) :: kept
+    type(error_type), allocatable, intent(out) :: error
+    type(layout_type) :: plan
+    character(:), allocatable :: text
+    logical :: narrow
+
+    self%path = path
+    self%current = path
+    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    call start_hdf5(error)
+    if (allocated(error)) return
+    call remove_file(path//'.grow')
+    call remove_file(path//'.part')
+    call open_file(path, .true., self%file, error)
+    if (allocated(error)) return
+    self%sealed = .true.
+    call get_text(self%file, '/scene/text', text, error)
+    if (.not. allocated(error)) call check_kept(self, kept, error)
+    if (.not. allocated(error) .and. text /= kept%scene_text .and. text /= scene_text) &
+      & call fail(error, path//' holds the results of another scene than the checkpoint')
+    if (allocated(error)) return
+    self%outputs = size(kept%times, kind=i8)
+    self%rows = size(kept%rows, 2, kind=i8)
+
+    plan = self%layout
+    call find_capacity(self, error)
+    if (allocated(error)) return
+    narrow = self%layout%capacity < max(plan%capacity, self%outputs + 1) .or. &
+      & self%layout%row_capacity < max(plan%row_capacity, self%rows + 1)
+    if (narrow .or. text /= scene_text) then
+      call enlarge(self, max(plan%capacity, self%outputs + 1), &
+        & max(plan%row_capacity, self%rows + 1), error, scene_text, command, version)
+    else
+      call cut_back(self, error)
+    end if
+  end subroutine resume
+
+  !> Whether the file has what the checkpoint counts on.
+  subroutine check_kept(self, kept, error)
+    class(vtkhdf_file), intent(in) :: self
+    type(kept_type), intent(in) :: kept
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(i8) :: outputs, rows
+
+    call get_attribute(self%file, '/VTKHDF/Steps', 'NSteps', outputs, error)
+    if (.not. allocated(error)) call get_attribute(self%file, '/history', 'rows', rows, error)
+    if (allocated(error)) return
+    if (outputs < size(kept%times) .or. rows < size(kept%rows, 2)) then
+      call fail(error, self%path//' holds '//to_text(outputs)//' outputs and '//to_text(rows)// &
+        & ' rows of history, less than the '//to_text(size(kept%times))//' and '// &
+        & to_text(size(kept%rows, 2))//' that the checkpoint counts on')
+      return
+    end if
+    allocate (values(size(kept%times)))
+    call read_rows(self%file, '/VTKHDF/Steps/Values', 0_i8, values, error)
+    if (allocated(error)) return
+    if (any(abs(values - kept%times) > 0.0_wp)) call fail(error, self%path// &
+      & ' has outputs at other times than the checkpoint: it belongs to another run')
+  end subroutine check_kept
+
+  !> Room for how many outputs and rows a file was laid out for.
+  subroutine find_capacity(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    integer :: components
+
+    call get_shape(self%file, '/VTKHDF/Steps/PartOffsets', components, self%layout%capacity, error)
+    if (allocated(error) .or. size(self%layout%columns) == 0) return
+    call get_chunk(self%file, '/history/'//trim(self%layout%columns(1)%name), &
+      & self%layout%row_capacity, error)
+  end subroutine find_capacity
+
+  !> Let the file count its outputs and rows as they are counted here, which is less than before.
+  subroutine cut_back(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    ! as when they are added, the count never says more than a column has
+    call change_attribute(self%file, '/history', 'rows', self%rows, error)
+    if (.not. allocated(error)) call flush_file(self%file, error)
+    if (.not. allocated(error)) call set_columns(self, max(1_i8, self%rows), error)
+    if (.not. allocated(error)) call set_rows(self%file, '/VTKHDF/Steps/Values', 1, &
+      & max(1_i8, self%outputs), error)
+    if (.not. allocated(error)) call change_attribute(self%file, '/VTKHDF/Steps', 'NSteps', &
+      & self%outputs, error)
+    if (.not. allocated(error)) call flush_file(self%file, error)
+  end subroutine cut_back
+
+  subroutine put_points_real(self, name, values, error)
+    class(vtkhdf_file), intent(inout) :: self
+    character(*), intent(in) :: name
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    call check_points(self, name, size(values, kind=i8), error)
+    if (.not. allocated(error)) call put_array(self%file, '/points/'//trim(name), values, error)
+  end subroutine put_points_real
+
+  subroutine put_points_i4(self, name, values, error)
+    class(vtkhdf_file), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i4), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    call check_points(self, name, size(values, kind=i8), error)
+    if (.not. allocated(error)) call put_array(self%file, '/points/'//trim(name), values, error)
+  end subroutine put_points_i4
+
+  subroutine put_points_i1(self, name, values, error)
+    class(vtkhdf_file), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(i1), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    call check_points(self, name, size(values, kind=i8), error)
+    if (.not. allocated(error)) call put_array(self%file, '/points/'//trim(name), values, error)
+  end subroutine put_points_i1
+
+  !> An array over the points has a value for each, and comes while the file is laid out.
+  subroutine check_points(self, name, count, error)
+    class(vtkhdf_file), intent(in) :: self
+    character(*), intent(in) :: name
+    integer(i8), intent(in) :: count
+    type(error_type), allocatable, intent(out) :: error
+
+    if (self%sealed) then
+      call fail(error, 'points/'//trim(name)//' must be given before the first output')
+    else if (count /= self%layout%points) then
+      call fail(error, 'points/'//trim(name)//' needs one value for each point')
+    end if
+  end subroutine check_points
+
+  !> End the layout: from here on HDF5's own records stay as they are.
+  subroutine seal(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    if (self%sealed) return
+    call close_file(self%file, error)
+    if (.not. allocated(error)) call open_file(self%current, .true., self%file, error)
+    self%sealed = .not. allocated(error)
+  end subroutine seal
+
+  !> Make room for the next output.
+  subroutine begin_output(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    call seal(self, error)
+    if (allocated(error)) return
+    if (self%outputs >= self%layout%capacity) &
+      & call enlarge(self, 2*self%layout%capacity, self%layout%row_capacity, error)
+  end subroutine begin_output
+
+  !> Write field `i` of the output under way: `values(n)`.
+  subroutine put_scalar(self, i, values, error)
+    class(vtkhdf_file), intent(inout) :: self
+    integer, intent(in) :: i
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: path
+    real(sp), allocatable :: short(:)
+    integer(i8) :: first, count, at
+
+    path = '/VTKHDF/PointData/'//trim(self%layout%fields(i)%name)
+    at = self%outputs*self%layout%points
+    if (.not. self%layout%single) then
+      call write_rows(self%file, path, at, values, error)
+      return
+    end if
+    do first = 0, self%layout%points - 1, block_rows
+      count = min(int(block_rows, i8), self%layout%points - first)
+      short = to_single(values(first + 1:first + count))
+      call write_rows(self%file, path, at + first, short, error)
+      if (allocated(error)) return
+    end do
+  end subroutine put_scalar
+
+  !> Write field `i` of the output under way: `values(n, 3)`.
+  subroutine put_vector(self, i, values, error)
+    class(vtkhdf_file), intent(inout) :: self
+    integer, intent(in) :: i
+    real(wp), intent(in) :: values(:, :)
+    type(error_type), allocatable, intent(out) :: error
+
+    call write_vectors(self%file, '/VTKHDF/PointData/'//trim(self%layout%fields(i)%name), &
+      & self%outputs*self%layout%points, values, self%layout%single, error)
+  end subroutine put_vector
+
+  !> Complete the output under way at `time` [s]: from here on it counts.
+  subroutine end_output(self, time, error)
+    class(vtkhdf_file), intent(inout) :: self
+    real(wp), intent(in) :: time
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+
+    call set_rows(self%file, '/VTKHDF/Steps/Values', 1, self%outputs + 1, error)
+    if (allocated(error)) return
+    call write_rows(self%file, '/VTKHDF/Steps/Values', self%outputs, [time], error)
+    if (.not. allocated(error)) call change_attribute(self%file, '/VTKHDF/Steps', 'NSteps', &
+      & self%outputs + 1, error)
+    if (allocated(error)) then
+      ! the new length is still in memory only: take it back
+      call set_rows(self%file, '/VTKHDF/Steps/Values', 1, max(1_i8, self%outputs), ignored)
+      return
+    end if
+    call flush_file(self%file, error)
+    if (.not. allocated(error)) self%outputs = self%outputs + 1
+  end subroutine end_output
+
+  !> Append `table(rows, columns)` to the history.
+  subroutine append_rows(self, table, error)
+    class(vtkhdf_file), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: table(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+    integer(i8) :: rows
+    integer :: i
+
+    rows = self%rows + size(table, 1, kind=i8)
+    if (size(table, 1) == 0) return
+    call seal(self, error)
+    if (allocated(error)) return
+    if (rows > self%layout%row_capacity) &
+      & call enlarge(self, self%layout%capacity, max(rows, 2*self%layout%row_capacity), error)
+    if (.not. allocated(error)) call set_columns(self, rows, error)
+    do i = 1, size(self%layout%columns)
+      if (allocated(error)) exit
+      call write_rows(self%file, '/history/'//trim(self%layout%columns(i)%name), self%rows, &
+        & table(:, i), error)
+    end do
+    if (allocated(error)) then
+      ! the new lengths are still in memory only: take them back
+      call set_columns(self, max(1_i8, self%rows), ignored)
+      return
+    end if
+    ! the count follows the columns' lengths, so that it never says more than a column has
+    call flush_file(self%file, error)
+    if (.not. allocated(error)) call change_attribute(self%file, '/history', 'rows', rows, error)
+    if (.not. allocated(error)) call flush_file(self%file, error)
+    if (.not. allocated(error)) self%rows = rows
+  end subroutine append_rows
+
+  !> Give all columns of the history the same length.
+  subroutine set_columns(self, rows, error)
+    class(vtkhdf_file), intent(in) :: self
+    integer(i8), intent(in) :: rows
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = 1, size(self%layout%columns)
+      call set_rows(self%file, '/history/'//trim(self%layout%columns(i)%name), 1, rows, error)
+      if (allocated(error)) return
+    end do
+  end subroutine set_columns
+
+  !> Copy the file into one with more room, which takes its place; with another scene, if one is
+  !> given.
+  subroutine enlarge(self, capacity, row_capacity, error, scene_text, command, version)
+    class(vtkhdf_file), intent(inout) :: self
+    integer(i8), intent(in) :: capacity, row_capacity
+    type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: scene_text, command, version
+    type(error_type), allocatable :: ignored
+    type(hdf5_file) :: bigger
+    character(:), allocatable :: name
+    integer(i8) :: old_capacity, old_rows
+
+    old_capacity = self%layout%capacity
+    old_rows = self%layout%row_capacity
+    self%layout%capacity = capacity
+    self%layout%row_capacity = row_capacity
+    name = self%path//'.grow'
+    call create_file(name, bigger, error)
+    if (.not. allocated(error)) call self%layout%make_heart(bigger, error)
+    if (.not. allocated(error)) call copy_static(self%file, bigger, error)
+    if (.not. allocated(error)) then
+      if (present(scene_text)) then
+        call put_scene(bigger, scene_text, command, version, error)
+      else
+        call copy_scene(self%file, bigger, error)
+      end if
+    end if
+    if (.not. allocated(error)) call self%layout%make_time_series(bigger, error)
+    if (.not. allocated(error)) call self%layout%copy_time_series(self%file, &
+      & self%outputs, self%rows, bigger, error)
+    if (.not. allocated(error)) then
+      call close_file(bigger, error)
+    else
+      call close_file(bigger, ignored)
+    end if
+    if (.not. allocated(error)) call close_file(self%file, error)
+    if (.not. allocated(error)) call rename_file(name, self%current, error)
+    if (.not. allocated(error)) then
+      call open_file(self%current, .true., self%file, error)
+    else
+      call remove_file(name)
+      self%layout%capacity = old_capacity
+      self%layout%row_capacity = old_rows
+    end if
+  end subroutine enlarge
+
+  !> Give the file its final name, in place of an older one.
+  subroutine publish(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    if (self%current == self%path) return
+    call seal(self, error)
+    if (.not. allocated(error)) call rename_file(self%current, self%path, error)
+    if (allocated(error)) return
+    self%current = self%path
+    self%file%name = self%path
+  end subroutine publish
+
+  !> Wait until all that was written is on the disk.
+  subroutine sync(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    call flush_file(self%file, error)
+    if (.not. allocated(error)) call sync_path(self%current, error)
+  end subroutine sync
+
+  !> Close the file with the room that it has, to go on with it another time.
+  subroutine leave(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    call close_file(self%file, error)
+  end subroutine leave
+
+  !> Keep the warnings of a run as `/scene/warnings`, in place of those that are there. To be called
+  !> before `finish`, since it changes HDF5's own records. A file without them is as good.
+  subroutine put_warnings(self, text)
+    class(vtkhdf_file), intent(inout) :: self
+    character(*), intent(in) :: text
+    type(error_type), allocatable :: ignored
+
+    if (self%file%id < 0) return
+    if (object_exists(self%file, '/scene/warnings')) &
+      & call remove_object(self%file, '/scene/warnings', ignored)
+    if (text /= '') call put_text(self%file, '/scene/warnings', text, ignored)
+  end subroutine put_warnings
+
+  !> Cut off room that wasn't needed and close the file.
+  subroutine finish(self, error)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+
+    if (self%file%id < 0) return
+    call self%layout%trim_time_series(self%file, self%outputs, self%rows, error)
+    if (.not. allocated(error)) call close_file(self%file, error)
+  end subroutine finish
+
+  !> Write nothing more. A file that has its final name is left as it was at its last complete
+  !> output: closing it would write records that belong to what failed, so its identifier is
+  !> given up instead. One that never got its final name is removed.
+  subroutine abandon(self)
+    class(vtkhdf_file), intent(inout) :: self
+    type(error_type), allocatable :: ignored
+
+    if (allocated(self%current)) then
+      if (self%current /= self%path) then
+        call close_file(self%file, ignored)
+        call remove_file(self%current)
+      end if
+    end if
+    self%file%id = -1
+  end subroutine abandon
+
+  !> Bytes that one output takes.
+  pure integer(i8) function output_bytes(self)
+    class(vtkhdf_file), intent(in) :: self
+    output_bytes = self%layout%output_bytes()
+  end function output_bytes
+
+  !> Bytes that are written before the first output.
+  pure integer(i8) function layout_bytes(self)
+    class(vtkhdf_file), intent(in) :: self
+    layout_bytes = self%layout%fixed_bytes()
+  end function layout_bytes
+
+end module pd_output_results_vtkhdf

@@ -1,0 +1,403 @@
+!> A series of .vtu files, one for each output, with a .pvd file that lists their times: for
+!> programs that don't read VTKHDF. Arrays are base64 within the XML, which every reader knows.
+!>
+!> Each file gets its name when it is complete, and the list names only complete files.
+module pd_output_results_vtu
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp, sp, i1, i8
+  use pd_base_text, only: newline
+  use pd_output_results_base64, only: base64_encoder, base64_length
+  use pd_output_results_files, only: file_exists, in_directory, remove_file, rename_file, sync_path
+  use pd_output_results_layout, only: block_rows, to_single
+  use pd_output_results_sink, only: sink_type
+  use pd_output_results_types, only: field_type
+  implicit none (type, external)
+  private
+  public :: vtu_series, remove_series
+
+  integer(i1), parameter :: vertex_cell = 1_i1
+
+  !> A series under way.
+  type :: vtu_series
+    private
+    character(:), allocatable :: directory, stem
+    type(field_type), allocatable :: fields(:)
+    real(wp), allocatable :: positions(:, :)
+    real(wp), allocatable :: times(:)
+    integer :: outputs = 0
+    integer :: synced = 0    !! outputs that are certainly on the disk
+    logical :: single = .false.
+    type(sink_type) :: sink
+  contains
+    procedure :: create
+    procedure :: resume
+    procedure :: sync
+    procedure :: begin_output
+    procedure, private :: put_scalar, put_vector
+    !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
+    generic :: put_field => put_scalar, put_vector
+    procedure :: end_output
+    procedure :: output_bytes
+    procedure :: abandon
+  end type vtu_series
+
+  !> An array within the XML that is being written.
+  type :: array_type
+    type(base64_encoder) :: encoder
+    character(:), allocatable :: text
+  end type array_type
+
+contains
+
+  !> Begin a series `stem_000000.vtu` ... in `directory` of `fields` at `positions(n, 3)` [m].
+  subroutine create(self, directory, stem, positions, fields, single)
+    class(vtu_series), intent(out) :: self
+    character(*), intent(in) :: directory, stem
+    real(wp), intent(in) :: positions(:, :)
+    type(field_type), intent(in) :: fields(:)
+    logical, intent(in) :: single
+
+    self%directory = directory
+    self%stem = stem
+    allocate (self%fields, source=fields)
+    allocate (self%positions, source=positions)
+    allocate (self%times(16))
+    self%single = single
+  end subroutine create
+
+  !> Go on with a series, made ready by `create`, after the outputs at `times` [s]; later ones go.
+  subroutine resume(self, times, error)
+    class(vtu_series), intent(inout) :: self
+    real(wp), intent(in) :: times(:)
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: name
+    integer :: i
+
+    do i = 1, size(times)
+      name = in_directory(self%directory, member(self%stem, i - 1))
+      if (file_exists(name)) cycle
+      call fail(error, 'there is no '//name//', which the checkpoint counts on')
+      return
+    end do
+    self%outputs = size(times)
+    self%synced = self%outputs
+    self%times = [times, spread(0.0_wp, 1, size(self%times))]
+    call write_list(self, self%outputs, error)
+    if (allocated(error)) return
+    call remove_series(self%directory, self%stem, self%outputs)
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs)//'.part'))
+  end subroutine resume
+
+  !> Wait until all complete outputs are on the disk.
+  subroutine sync(self, error)
+    class(vtu_series), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = self%synced, self%outputs - 1
+      call sync_path(in_directory(self%directory, member(self%stem, i)), error)
+      if (allocated(error)) return
+    end do
+    self%synced = self%outputs
+    call sync_path(in_directory(self%directory, self%stem//'.pvd'), error)
+  end subroutine sync
+
+  !> `stem_000012.vtu`
+  pure function member(stem, index) result(name)
+    character(*), intent(in) :: stem
+    integer, intent(in) :: index
+    character(:), allocatable :: name
+    character(16) :: number
+
+    write (number, '(i0.6)') index
+    name = stem//'_'//trim(number)//'.vtu'
+  end function member
+
+  !> Begin the file of the next output: points and cells.
+  subroutine begin_output(self, error)
+    class(vtu_series), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    character(24) :: n
+
+    write (n, '(i0)') size(self%positions, 1)
+    call self%sink%open(in_directory(self%directory, member(self%stem, self%outputs)//'.part'), &
+      & error)
+    if (allocated(error)) return
+    call self%sink%line('<?xml version="1.0"?>'//newline &
+      & //'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"' &
+      & //' header_type="UInt64">'//newline//'<UnstructuredGrid>'//newline &
+      & //'<Piece NumberOfPoints="'//trim(n)//'" NumberOfCells="'//trim(n)//'">'//newline &
+      & //'<Points>', error)
+    if (.not. allocated(error)) &
+      & call put_vectors(self%sink, 'Points', self%positions, .false., error)
+    if (.not. allocated(error)) call self%sink%line('</Points>'//newline//'<Cells>', error)
+    if (.not. allocated(error)) call put_cells(self%sink, size(self%positions, 1), error)
+    if (.not. allocated(error)) call self%sink%line('</Cells>'//newline//'<PointData>', error)
+  end subroutine begin_output
+
+  !> A vertex at each point.
+  subroutine put_cells(sink, n, error)
+    type(sink_type), intent(inout) :: sink
+    integer, intent(in) :: n
+    type(error_type), allocatable, intent(out) :: error
+    type(array_type) :: array
+    integer(i8), allocatable, target :: numbers(:)
+    integer(i1), pointer, contiguous :: bytes(:)
+    integer(i1), allocatable :: kinds(:)
+    integer :: pass, first, count, i
+
+    allocate (numbers(min(n, block_rows)))
+    do pass = 0, 1  ! connectivity 0 .. n-1, offsets 1 .. n
+      call begin_array(sink, array, 'Int64', merge('offsets     ', 'connectivity', pass == 1), &
+        & 1, 8_i8*n, error)
+      do first = 0, n - 1, block_rows
+        if (allocated(error)) return
+        count = min(block_rows, n - first)
+        do i = 1, count
+          numbers(i) = first + i - 1 + pass
+        end do
+        call c_f_pointer(c_loc(numbers), bytes, [8*count])
+        call put_bytes(sink, array, bytes, error)
+      end do
+      if (.not. allocated(error)) call end_array(sink, array, error)
+      if (allocated(error)) return
+    end do
+    allocate (kinds(min(n, block_rows)), source=vertex_cell)
+    call begin_array(sink, array, 'UInt8', 'types', 1, int(n, i8), error)
+    do first = 0, n - 1, block_rows
+      if (allocated(error)) return
+      call put_bytes(sink, array, kinds(:min(block_rows, n - first)), error)
+    end do
+    if (.not. allocated(error)) call end_array(sink, array, error)
+  end subroutine put_cells
+
+  !> Begin an array of `bytes` bytes; its encoded bytes start with their number.
+  subroutine begin_array(sink, array, kind_name, name, components, bytes, error)
+    type(sink_type), intent(inout) :: sink
+    type(array_type), intent(inout) :: array
+    character(*), intent(in) :: kind_name, name
+    integer, intent(in) :: components
+    integer(i8), intent(in) :: bytes
+    type(error_type), allocatable, intent(out) :: error
+    character(8) :: number
+
+    write (number, '(i0)') components
+    call sink%put('<DataArray type="'//kind_name//'" Name="'//trim(name) &
+      & //'" NumberOfComponents="'//trim(number)//'" format="binary">', error)
+    if (.not. allocated(error)) call put_bytes(sink, array, transfer(bytes, [0_i1]), error)
+  end subroutine begin_array
+
+  subroutine put_bytes(sink, array, bytes, error)
+    type(sink_type), intent(inout) :: sink
+    type(array_type), intent(inout) :: array
+    integer(i1), contiguous, intent(in) :: bytes(:)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: length, needed
+
+    needed = base64_length(size(bytes))
+    if (allocated(array%text)) then
+      if (len(array%text) < needed) deallocate (array%text)
+    end if
+    if (.not. allocated(array%text)) allocate (character(needed) :: array%text)
+    call array%encoder%put(bytes, array%text, length)
+    call sink%put(array%text(:length), error)
+  end subroutine put_bytes
+
+  subroutine end_array(sink, array, error)
+    type(sink_type), intent(inout) :: sink
+    type(array_type), intent(inout) :: array
+    type(error_type), allocatable, intent(out) :: error
+    integer :: length
+
+    call array%encoder%finish(array%text, length)
+    call sink%line(array%text(:length)//'</DataArray>', error)
+  end subroutine end_array
+
+  !> Write `values(n, 3)` as an array of vectors, block by block.
+  subroutine put_vectors(sink, name, values, single, error)
+    type(sink_type), intent(inout) :: sink
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: values(:, :)
+    logical, intent(in) :: single
+    type(error_type), allocatable, intent(out) :: error
+    type(array_type) :: array
+    real(wp), allocatable :: turned(:)
+    integer :: n, first, count, width, i
+
+    n = size(values, 1)
+    width = size(values, 2)
+    allocate (turned(width*min(n, block_rows)))
+    call begin_array(sink, array, merge('Float32', 'Float64', single), name, width, &
+      & merge(4_i8, 8_i8, single)*n*width, error)
+    do first = 0, n - 1, block_rows
+      if (allocated(error)) return
+      count = min(block_rows, n - first)
+      do i = 1, count
+        turned(width*(i - 1) + 1:width*i) = values(first + i, :)
+      end do
+      call put_reals(sink, array, turned(:width*count), single, error)
+    end do
+    if (.not. allocated(error)) call end_array(sink, array, error)
+  end subroutine put_vectors
+
+  !> Write reals in the wanted precision.
+  subroutine put_reals(sink, array, values, single, error)
+    type(sink_type), intent(inout) :: sink
+    type(array_type), intent(inout) :: array
+    real(wp), contiguous, target, intent(in) :: values(:)
+    logical, intent(in) :: single
+    type(error_type), allocatable, intent(out) :: error
+    real(sp), allocatable, target :: short(:)
+    integer(i1), pointer, contiguous :: bytes(:)
+
+    if (single) then
+      allocate (short, source=to_single(values))
+      call c_f_pointer(c_loc(short), bytes, [4*size(values)])
+    else
+      call c_f_pointer(c_loc(values), bytes, [8*size(values)])
+    end if
+    call put_bytes(sink, array, bytes, error)
+  end subroutine put_reals
+
+  subroutine put_scalar(self, i, values, error)
+    class(vtu_series), intent(inout) :: self
+    integer, intent(in) :: i
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    type(array_type) :: array
+    integer :: n, first, count
+
+    n = size(values)
+    call begin_array(self%sink, array, merge('Float32', 'Float64', self%single), &
+      & trim(self%fields(i)%name), 1, merge(4_i8, 8_i8, self%single)*n, error)
+    do first = 0, n - 1, block_rows
+      if (allocated(error)) return
+      count = min(block_rows, n - first)
+      call put_reals(self%sink, array, values(first + 1:first + count), self%single, error)
+    end do
+    if (.not. allocated(error)) call end_array(self%sink, array, error)
+  end subroutine put_scalar
+
+  subroutine put_vector(self, i, values, error)
+    class(vtu_series), intent(inout) :: self
+    integer, intent(in) :: i
+    real(wp), intent(in) :: values(:, :)
+    type(error_type), allocatable, intent(out) :: error
+    call put_vectors(self%sink, trim(self%fields(i)%name), values, self%single, error)
+  end subroutine put_vector
+
+  !> Complete the file of the output at `time` [s] and list it.
+  subroutine end_output(self, time, error)
+    class(vtu_series), intent(inout) :: self
+    real(wp), intent(in) :: time
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: name
+    real(wp), allocatable :: longer(:)
+
+    name = in_directory(self%directory, member(self%stem, self%outputs))
+    call self%sink%line('</PointData>'//newline//'</Piece>'//newline//'</UnstructuredGrid>' &
+      & //newline//'</VTKFile>', error)
+    if (.not. allocated(error)) call self%sink%close(error)
+    if (.not. allocated(error)) call rename_file(name//'.part', name, error)
+    if (allocated(error)) return
+    if (self%outputs == size(self%times)) then
+      allocate (longer(2*self%outputs))
+      longer(:self%outputs) = self%times
+      call move_alloc(longer, self%times)
+    end if
+    self%times(self%outputs + 1) = time
+    call write_list(self, self%outputs + 1, error)
+    if (.not. allocated(error)) self%outputs = self%outputs + 1
+  end subroutine end_output
+
+  !> Write the list of times and files, and put it in the place of the one before.
+  subroutine write_list(self, outputs, error)
+    class(vtu_series), intent(in) :: self
+    integer, intent(in) :: outputs
+    type(error_type), allocatable, intent(out) :: error
+    type(error_type), allocatable :: ignored
+    type(sink_type) :: list
+    character(:), allocatable :: name
+    character(24) :: time
+    integer :: i
+
+    name = in_directory(self%directory, self%stem//'.pvd')
+    call list%open(name//'.part', error)
+    if (allocated(error)) return
+    call list%line('<?xml version="1.0"?>'//newline//'<VTKFile type="Collection" version="0.1"' &
+      & //' byte_order="LittleEndian">'//newline//'<Collection>', error)
+    do i = 1, outputs
+      if (allocated(error)) exit
+      write (time, '(es24.16e3)') self%times(i)
+      call list%line('<DataSet timestep="'//trim(adjustl(time))//'" part="0" file="' &
+        & //escaped(member(self%stem, i - 1))//'"/>', error)
+    end do
+    if (.not. allocated(error)) call list%line('</Collection>'//newline//'</VTKFile>', error)
+    if (.not. allocated(error)) then
+      call list%close(error)
+    else
+      call list%close(ignored)
+    end if
+    if (.not. allocated(error)) call rename_file(name//'.part', name, error)
+    if (allocated(error)) call remove_file(name//'.part')
+  end subroutine write_list
+
+  !> Bytes of one file, within some hundreds.
+  pure integer(i8) function output_bytes(self)
+    class(vtu_series), intent(in) :: self
+    integer(i8) :: width
+
+    width = 3*8 + 2*8 + 1 + sum(self%fields%components)*merge(4, 8, self%single)
+    output_bytes = 4*(size(self%positions, 1)*width)/3 + 1024
+  end function output_bytes
+
+  !> Text as XML wants it within quotes.
+  pure function escaped(text) result(safe)
+    character(*), intent(in) :: text
+    character(:), allocatable :: safe
+    integer :: i
+
+    safe = ''
+    do i = 1, len(text)
+      select case (text(i:i))
+      case ('&')
+        safe = safe//'&amp;'
+      case ('<')
+        safe = safe//'&lt;'
+      case ('"')
+        safe = safe//'&quot;'
+      case default
+        safe = safe//text(i:i)
+      end select
+    end do
+  end function escaped
+
+  !> Give up the output under way and remove what there is of it.
+  subroutine abandon(self)
+    class(vtu_series), intent(inout) :: self
+    type(error_type), allocatable :: ignored
+
+    if (.not. self%sink%is_open()) return
+    call self%sink%close(ignored)
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs)//'.part'))
+  end subroutine abandon
+
+  !> Remove the files of an older series from number `first` (0 = the first) on. The last goes
+  !> first, so that an end in the midst leaves no gap that would hide the others.
+  subroutine remove_series(directory, stem, first)
+    character(*), intent(in) :: directory, stem
+    integer, intent(in) :: first
+    integer :: last, i
+
+    if (first == 0) call remove_file(in_directory(directory, stem//'.pvd'))
+    last = first
+    do while (file_exists(in_directory(directory, member(stem, last))))
+      last = last + 1
+    end do
+    do i = last - 1, first, -1
+      call remove_file(in_directory(directory, member(stem, i)))
+    end do
+  end subroutine remove_series
+
+end module pd_output_results_vtu

@@ -1,0 +1,257 @@
+!> Everything that can be known of a scene before its points are built: what is needed is there,
+!> alternatives exclude each other, names refer to something. Fills in what goes without saying.
+module pd_scene_content_check
+  use pd_base_kinds, only: wp, i2
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text
+  use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
+  use pd_scene_content_check_bodies, only: check_body, check_shape, check_material, check_crack
+  use pd_scene_content_groups, only: default_fields, default_probe_fields
+  use pd_scene_content_rules, only: rule_fault, given, check_known, check_unique, check_vector
+  use pd_scene_format_source, only: source_type
+  use pd_scene_content_types, only: scene_type, is_set, name_length
+  implicit none (type, external)
+  private
+  public :: check_scene, allocate_groups
+
+contains
+
+  !> Check a scene and complete it: afterwards every list is allocated, every body has its
+  !> material, Poisson's ratios, ramps, the factor of relaxation and the lists of fields are the
+  !> ones to compute with. `source` gives the messages their places. A complete scene stays as it
+  !> is.
+  subroutine check_scene(scene, error, source)
+    type(scene_type), intent(inout) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    call allocate_groups(scene)
+    call check_numbers(scene, error, source)
+    if (allocated(error)) return
+    call check_settings(scene, error, source)
+    if (allocated(error)) return
+    call check_names(scene, error, source)
+    if (allocated(error)) return
+    associate (d => scene%header%dimension)
+      do i = 1, size(scene%materials)
+        call check_material(scene, i, error, source)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(scene%bodies)
+        call check_body(scene, i, error, source)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(scene%removed)
+        call check_shape(scene%removed(i), d, 'remove', i, error, source)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(scene%regions)
+        call check_shape(scene%regions(i), d, 'region', i, error, source)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(scene%cracks)
+        call check_crack(scene%cracks(i), d, i, error, source)
+        if (allocated(error)) return
+      end do
+    end associate
+    do i = 1, size(scene%no_fail)
+      call check_no_fail(scene, i, error, source)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%initial)
+      call check_initial(scene, i, error, source)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%boundaries)
+      call check_boundary(scene, i, error, source)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%loads)
+      call check_load(scene, i, error, source)
+      if (allocated(error)) return
+    end do
+    call check_output(scene, error, source)
+    if (allocated(error)) return
+    call check_studies(scene, error, source)
+  end subroutine check_scene
+
+  !> Lists that nobody has filled get size 0, so that loops need no question.
+  subroutine allocate_groups(scene)
+    type(scene_type), intent(inout) :: scene
+
+    if (.not. allocated(scene%file)) scene%file = ''
+    if (.not. allocated(scene%text)) scene%text = ''
+    if (.not. allocated(scene%bodies)) allocate (scene%bodies(0))
+    if (.not. allocated(scene%removed)) allocate (scene%removed(0))
+    if (.not. allocated(scene%regions)) allocate (scene%regions(0))
+    if (.not. allocated(scene%materials)) allocate (scene%materials(0))
+    if (.not. allocated(scene%cracks)) allocate (scene%cracks(0))
+    if (.not. allocated(scene%no_fail)) allocate (scene%no_fail(0))
+    if (.not. allocated(scene%initial)) allocate (scene%initial(0))
+    if (.not. allocated(scene%boundaries)) allocate (scene%boundaries(0))
+    if (.not. allocated(scene%loads)) allocate (scene%loads(0))
+    if (.not. allocated(scene%probes)) allocate (scene%probes(0))
+    if (.not. allocated(scene%studies)) allocate (scene%studies(0))
+  end subroutine allocate_groups
+
+  !> Bodies, materials and layers have numbers of 16 bits.
+  subroutine check_numbers(scene, error, source)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer, parameter :: most = huge(1_i2)
+    character(8), parameter :: groups(3) = [character(8) :: 'body', 'material', 'boundary']
+    integer :: numbers(3), i
+
+    numbers = [size(scene%bodies), size(scene%materials), size(scene%boundaries)]
+    do i = 1, size(groups)
+      if (numbers(i) <= most) cycle
+      call rule_fault(error, trim(groups(i)), most + 1, '', 'too many groups &'//trim(groups(i))// &
+        & ': '//to_text(numbers(i)), 'there may be '//to_text(most), source)
+      return
+    end do
+  end subroutine check_numbers
+
+  !> The groups that stand once, and the two without which there is nothing to compute.
+  subroutine check_settings(scene, error, source)
+    type(scene_type), intent(inout) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    if (scene%header%dimension < 1 .or. scene%header%dimension > 3) then
+      call rule_fault(error, 'scene', 1, 'dimension', "group &scene lacks the key 'dimension'", &
+        & 'expected 1, 2 or 3', source)
+    else if (size(scene%materials) == 0) then
+      call rule_fault(error, 'material', 1, '', 'the scene has no group &material', &
+        & 'expected at least one', source)
+    else if (size(scene%bodies) == 0) then
+      call rule_fault(error, 'body', 1, '', 'the scene has no group &body', &
+        & 'expected at least one', source)
+    else if (scene%header%precision == 'mixed' .and. scene%time%method == 'relaxation') then
+      ! residual forces would be those of rounding at a tolerance of some 1e-5
+      call rule_fault(error, 'scene', 1, 'precision', "'mixed' is not for relaxation", &
+        & "expected 'double', or another &time method", source)
+    else if (scene%header%precision == 'mixed' .and. scene%horizon%family == 'list') then
+      call rule_fault(error, 'scene', 1, 'precision', "'mixed' needs lattice families", &
+        & "expected 'double', or another &horizon family", source)
+    else if (given('horizon', 1, 'ratio', source) .and. is_set(scene%horizon%length)) then
+      call rule_fault(error, 'horizon', 1, 'length', "'ratio' and 'length' are both given", &
+        & 'give one of them', source)
+    else if (given('time', 1, 'safety', source) .and. is_set(scene%time%step)) then
+      call rule_fault(error, 'time', 1, 'step', "'step' and 'safety' are both given", &
+        & 'give one of them', source)
+    else if (scene%time%steps > 0 .and. is_set(scene%time%duration)) then
+      call rule_fault(error, 'time', 1, 'duration', "'steps' and 'duration' are both given", &
+        & 'give one of them', source)
+    else if (scene%time%method == 'explicit' .and. scene%time%steps == 0 .and. &
+      & .not. is_set(scene%time%duration)) then
+      call rule_fault(error, 'time', 1, '', "group &time lacks the key 'steps' or 'duration'", &
+        & 'explicit steps in time need one of them', source)
+    else if (scene%output%every > 0 .and. is_set(scene%output%interval)) then
+      call rule_fault(error, 'output', 1, 'interval', "'every' and 'interval' are both given", &
+        & 'give one of them', source)
+    end if
+    if (.not. is_set(scene%relaxation%safety)) then
+      scene%relaxation%safety = 5.0_wp
+      if (scene%relaxation%density_matrix == 'frame_invariant') scene%relaxation%safety = 1.0_wp
+    end if
+  end subroutine check_settings
+
+  !> Names of one kind of group differ.
+  subroutine check_names(scene, error, source)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    call check_unique([character(name_length) :: (scene%bodies(i)%name, &
+      & i=1, size(scene%bodies))], 'body', error, source)
+    if (allocated(error)) return
+    call check_unique([character(name_length) :: (scene%materials(i)%name, &
+      & i=1, size(scene%materials))], 'material', error, source)
+    if (allocated(error)) return
+    call check_unique([character(name_length) :: (scene%regions(i)%name, &
+      & i=1, size(scene%regions))], 'region', error, source)
+    if (allocated(error)) return
+    call check_unique([character(name_length) :: (scene%boundaries(i)%name, &
+      & i=1, size(scene%boundaries))], 'boundary', error, source)
+    if (allocated(error)) return
+    call check_unique([character(name_length) :: (scene%probes(i)%name, &
+      & i=1, size(scene%probes))], 'probe', error, source)
+  end subroutine check_names
+
+  !> One `&no_fail`: a region or a shape.
+  subroutine check_no_fail(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    associate (zone => scene%no_fail(number))
+      if (zone%region == '' .and. zone%shape == '') then
+        call rule_fault(error, 'no_fail', number, '', &
+          & "group &no_fail lacks the key 'region' or 'shape'", 'expected one of them', source)
+      else if (zone%region /= '' .and. zone%shape /= '') then
+        call rule_fault(error, 'no_fail', number, 'shape', "'region' and 'shape' are both given", &
+          & 'give one of them', source)
+      else if (zone%region /= '') then
+        call check_known(zone%region, [character(name_length) :: (scene%regions(i)%name, &
+          & i=1, size(scene%regions))], 'region', 'no_fail', number, 'region', error, source)
+      else
+        call check_shape(zone, scene%header%dimension, 'no_fail', number, error, source)
+      end if
+    end associate
+  end subroutine check_no_fail
+
+  !> Probes lie somewhere, and fields that are not named are the default ones.
+  subroutine check_output(scene, error, source)
+    type(scene_type), intent(inout) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    if (.not. allocated(scene%output%fields)) then
+      allocate (scene%output%fields(size(default_fields)))
+      scene%output%fields(:) = default_fields
+    end if
+    do i = 1, size(scene%probes)
+      associate (probe => scene%probes(i))
+        if (probe%name == '') then
+          call rule_fault(error, 'probe', i, '', "group &probe lacks the key 'name'", &
+            & 'its columns begin with it', source)
+          return
+        end if
+        call check_vector(probe%point, scene%header%dimension, 'point', 'probe', i, error, source)
+        if (allocated(error)) return
+        if (.not. allocated(probe%fields)) then
+          allocate (probe%fields(size(default_probe_fields)))
+          probe%fields(:) = default_probe_fields
+        end if
+      end associate
+    end do
+  end subroutine check_output
+
+  !> Every `&study` varies something, and where it measures a field in a region there is one.
+  subroutine check_studies(scene, error, source)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i, r
+
+    do i = 1, size(scene%studies)
+      associate (study => scene%studies(i))
+        if (study%vary == '' .or. .not. allocated(study%values)) then
+          call rule_fault(error, 'study', i, '', "group &study lacks the key 'vary' or 'values'", &
+            & 'expected a key and its values', source)
+        else
+          call check_known(study%region, [character(name_length) :: (scene%regions(r)%name, &
+            & r=1, size(scene%regions))], 'region', 'study', i, 'region', error, source)
+        end if
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine check_studies
+
+end module pd_scene_content_check

@@ -1,0 +1,272 @@
+!> Rules of what acts on the bodies: initial state, boundaries, loads, and their course in time.
+module pd_scene_content_check_actions
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text
+  use pd_scene_content_check_bodies, only: check_file
+  use pd_scene_content_rules, only: rule_fault, check_known, check_components
+  use pd_scene_format_source, only: source_type
+  use pd_scene_content_types, only: scene_type, is_set, name_length
+  implicit none (type, external)
+  private
+  public :: check_initial, check_boundary, check_load
+
+contains
+
+  !> One `&initial`; in relaxation its temperature change grows over the load steps unless it says
+  !> otherwise.
+  subroutine check_initial(scene, number, error, source)
+    type(scene_type), intent(inout) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: d
+
+    d = scene%header%dimension
+    associate (initial => scene%initial(number))
+      call check_components(initial%displacement, d, 'displacement', 'initial', number, error, &
+        & source)
+      if (allocated(error)) return
+      call check_components(initial%velocity, d, 'velocity', 'initial', number, error, source)
+      if (allocated(error)) return
+      call check_gradient(initial%displacement_gradient, 'displacement_gradient')
+      call check_gradient(initial%velocity_gradient, 'velocity_gradient')
+      if (allocated(error)) return
+      call check_known(initial%region, region_names(scene), 'region', 'initial', number, &
+        & 'region', error, source)
+      if (allocated(error)) return
+      if (initial%file /= '' .and. initial%region /= '') then
+        call rule_fault(error, 'initial', number, 'region', "'file' and 'region' are both given", &
+          & 'the file has a row for every point', source)
+      else if (initial%file /= '') then
+        call check_file(initial%file, scene%file, 'initial', number, error, source)
+      else if (.not. (any(is_set(initial%displacement)) .or. any(is_set(initial%velocity)) .or. &
+        & is_set(initial%temperature_change) .or. &
+        & any(abs(initial%displacement_gradient) > 0.0_wp) .or. &
+        & any(abs(initial%velocity_gradient) > 0.0_wp))) then
+        call rule_fault(error, 'initial', number, '', 'group &initial gives nothing', &
+          & 'expected displacement_x.., velocity_x.., a gradient, temperature_change or file', &
+          & source)
+      end if
+      if (allocated(error)) return
+      if (.not. is_set(initial%temperature_change) .and. initial%file == '') then
+        if (allocated(initial%times) .or. is_set(initial%ramp_time)) call rule_fault(error, &
+          & 'initial', number, merge('times    ', 'ramp_time', allocated(initial%times)), &
+          & 'a course in time without a temperature_change', &
+          & 'displacements and velocities of &initial hold at t = 0', source)
+        return
+      end if
+      call check_course(scene, initial%ramp_time, initial%times, initial%values, 'initial', &
+        & number, error, source)
+    end associate
+
+  contains
+
+    !> An error for elements of directions that the dimension does not have.
+    subroutine check_gradient(gradient, key)
+      real(wp), intent(in) :: gradient(3, 3)
+      character(*), intent(in) :: key
+
+      if (allocated(error)) return
+      if (all(abs(gradient(d + 1:, :)) <= 0.0_wp) .and. all(abs(gradient(:, d + 1:)) <= 0.0_wp)) &
+        & return
+      call rule_fault(error, 'initial', number, key, "'"//key//"' has elements outside of "// &
+        & 'dimension '//to_text(d), 'without subscripts the values run down the columns of a '// &
+        & '3 x 3 matrix; name elements as in '//key//'(1,1) = ...', source)
+    end subroutine check_gradient
+
+  end subroutine check_initial
+
+  !> One `&boundary`; in relaxation its ramp goes over the load steps unless it says otherwise.
+  subroutine check_boundary(scene, number, error, source)
+    type(scene_type), intent(inout) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(*), parameter :: directions = 'xyz'
+    integer :: i, d
+
+    d = scene%header%dimension
+    associate (boundary => scene%boundaries(number))
+      call check_place(scene, boundary%body, boundary%side, boundary%region, 'boundary', number, &
+        & error, source)
+      if (allocated(error)) return
+      call check_components(boundary%displacement, d, 'displacement', 'boundary', number, error, &
+        & source)
+      if (allocated(error)) return
+      call check_components(boundary%velocity, d, 'velocity', 'boundary', number, error, source)
+      if (allocated(error)) return
+      if (.not. any(is_set(boundary%displacement)) .and. .not. any(is_set(boundary%velocity))) then
+        call rule_fault(error, 'boundary', number, '', 'group &boundary imposes nothing', &
+          & 'expected displacement_x.. or velocity_x..', source)
+        return
+      end if
+      do i = 1, d
+        if (.not. is_set(boundary%displacement(i)) .or. .not. is_set(boundary%velocity(i))) cycle
+        call rule_fault(error, 'boundary', number, 'velocity_'//directions(i:i), &
+          & "'displacement_"//directions(i:i)//"' and 'velocity_"//directions(i:i)// &
+          & "' are both imposed", 'give one of them; each follows from the other', source)
+        return
+      end do
+      do i = 1, number - 1
+        if (boundary%side == '' .or. scene%boundaries(i)%side /= boundary%side .or. &
+          & scene%boundaries(i)%body /= boundary%body) cycle
+        call rule_fault(error, 'boundary', number, 'side', "side '"//trim(boundary%side)// &
+          & "' has a layer already", 'from &boundary number '//to_text(i), source)
+        return
+      end do
+      call check_course(scene, boundary%ramp_time, boundary%times, boundary%values, 'boundary', &
+        & number, error, source)
+    end associate
+  end subroutine check_boundary
+
+  !> One `&load`; the only body and, in relaxation, the ramp over the load steps go without saying.
+  subroutine check_load(scene, number, error, source)
+    type(scene_type), intent(inout) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: d
+
+    d = scene%header%dimension
+    associate (load => scene%loads(number))
+      if (load%side /= '' .and. load%body == '') then
+        if (size(scene%bodies) > 1) then
+          call rule_fault(error, 'load', number, '', "group &load lacks the key 'body'", &
+            & 'there are '//to_text(size(scene%bodies))//' bodies to choose from', source)
+          return
+        end if
+        load%body = scene%bodies(1)%name
+      end if
+      call check_place(scene, load%body, load%side, load%region, 'load', number, error, source)
+      if (allocated(error)) return
+      call check_components(load%force, d, 'force', 'load', number, error, source)
+      if (allocated(error)) return
+      call check_components(load%body_force, d, 'body_force', 'load', number, error, source)
+      if (allocated(error)) return
+      if (.not. is_set(load%pressure) .and. .not. any(is_set(load%force)) .and. &
+        & .not. any(is_set(load%body_force))) then
+        call rule_fault(error, 'load', number, '', 'group &load loads nothing', &
+          & 'expected pressure, force_x.. or body_force_x..', source)
+        return
+      end if
+      if (is_set(load%pressure) .and. load%region /= '') then
+        call rule_fault(error, 'load', number, 'pressure', "'pressure' with a region", &
+          & "a pressure needs a 'side'; a region takes force_x.. or body_force_x..", source)
+        return
+      end if
+      call check_course(scene, load%ramp_time, load%times, load%values, 'load', number, error, &
+        & source)
+    end associate
+  end subroutine check_load
+
+  !> Where a boundary or load acts: a side of a lattice, or a region.
+  subroutine check_place(scene, body, side, region, group, number, error, source)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: body, side, region, group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+    logical :: cloud
+
+    if (side == '' .and. region == '') then
+      call rule_fault(error, group, number, '', 'group &'//group//" lacks the key 'side' or "// &
+        & "'region'", "expected one of 'x_min' .. 'z_max', or the name of a region", source)
+      return
+    else if (side /= '' .and. region /= '') then
+      call rule_fault(error, group, number, 'region', "'side' and 'region' are both given", &
+        & 'give one of them', source)
+      return
+    else if (region /= '' .and. body /= '') then
+      call rule_fault(error, group, number, 'body', "'body' and 'region' are both given", &
+        & "'body' goes with 'side'", source)
+      return
+    else if (region /= '') then
+      call check_known(region, region_names(scene), 'region', group, number, 'region', error, &
+        & source)
+      return
+    end if
+    if (index('xyz', side(1:1)) > scene%header%dimension) then
+      call rule_fault(error, group, number, 'side', "side '"//trim(side)// &
+        & "' in a scene of dimension "//to_text(scene%header%dimension), &
+        & 'there is no direction '//side(1:1), source)
+      return
+    end if
+    call check_known(body, [character(name_length) :: (scene%bodies(i)%name, &
+      & i=1, size(scene%bodies))], 'body', group, number, 'body', error, source)
+    if (allocated(error)) return
+    cloud = .false.
+    do i = 1, size(scene%bodies)
+      if (body /= '' .and. scene%bodies(i)%name /= body) cycle
+      cloud = cloud .or. scene%bodies(i)%file /= ''
+    end do
+    if (cloud) call rule_fault(error, group, number, 'side', &
+      & "a 'side' of a body that is a cloud", "a cloud has no sides; use a 'region'", source)
+  end subroutine check_place
+
+  !> At once, by a ramp, or by times and values. In relaxation, where time runs from 0 to 1 over the
+  !> load steps, a course that says nothing is a ramp over all of them, and none may go beyond 1,
+  !> for what stands there would never act.
+  subroutine check_course(scene, ramp_time, times, values, group, number, error, source)
+    type(scene_type), intent(in) :: scene                 !! for its method
+    real(wp), intent(inout) :: ramp_time                  !! length of the ramp [s]
+    real(wp), allocatable, intent(in) :: times(:)         !! of the table [s]
+    real(wp), allocatable, intent(in) :: values(:)        !! factors at `times` [-]
+    character(*), intent(in) :: group                     !! name of the group, for messages
+    integer, intent(in) :: number                         !! which group of this name
+    type(error_type), allocatable, intent(out) :: error   !! the broken rule
+    type(source_type), intent(in), optional :: source     !! the scanned file, for places
+    character(*), parameter :: load_time = 'in relaxation time runs from 0 to 1 over the load steps'
+    logical :: relaxes
+    integer :: i
+
+    relaxes = scene%time%method == 'relaxation'
+    if (allocated(times) .neqv. allocated(values)) then
+      if (allocated(times)) then
+        call rule_fault(error, group, number, 'times', "'times' without 'values'", &
+          & 'expected a factor for each time', source)
+      else
+        call rule_fault(error, group, number, 'values', "'values' without 'times'", &
+          & 'expected a time for each factor', source)
+      end if
+      return
+    end if
+    if (.not. allocated(times)) then
+      if (relaxes .and. .not. is_set(ramp_time)) ramp_time = 1.0_wp
+      if (relaxes .and. ramp_time > 1.0_wp) call rule_fault(error, group, number, 'ramp_time', &
+        & "the ramp does not end: 'ramp_time' is "//to_text(ramp_time), load_time// &
+        & '; expected at most 1', source)
+      return
+    end if
+    if (is_set(ramp_time)) then
+      call rule_fault(error, group, number, 'ramp_time', "'ramp_time' and 'times' are both given", &
+        & 'give one of them', source)
+    else if (size(times) /= size(values)) then
+      call rule_fault(error, group, number, 'values', "'times' and 'values' differ in length", &
+        & to_text(size(times))//' times, '//to_text(size(values))//' values', source)
+    else
+      do i = 2, size(times)
+        if (times(i) > times(i - 1)) cycle
+        call rule_fault(error, group, number, 'times', "'times' do not increase", &
+          & to_text(times(i))//' after '//to_text(times(i - 1)), source)
+        return
+      end do
+      if (relaxes .and. any(times > 1.0_wp)) call rule_fault(error, group, number, 'times', &
+        & "the time "//to_text(maxval(times))//" of 'times' is never reached", load_time// &
+        & '; expected at most 1', source)
+    end if
+  end subroutine check_course
+
+  !> The names of all regions.
+  function region_names(scene) result(names)
+    type(scene_type), intent(in) :: scene
+    character(name_length) :: names(size(scene%regions))
+    integer :: i
+
+    do i = 1, size(names)
+      names(i) = scene%regions(i)%name
+    end do
+  end function region_names
+
+end module pd_scene_content_check_actions

@@ -1,0 +1,373 @@
+!> Rules of what is there at the start: bodies, shapes, materials and cracks.
+module pd_scene_content_check_bodies
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text, with_unit
+  use pd_scene_format_file, only: resolve_path
+  use pd_scene_content_rules, only: rule_fault, given, check_known, check_vector, check_finite_box
+  use pd_scene_format_source, only: source_type
+  use pd_scene_content_types, only: scene_type, body_group, shape_group, material_group, &
+    & crack_group, is_set, name_length
+  implicit none (type, external)
+  private
+  public :: check_body, check_shape, check_material, check_crack, check_file, needed_ratio
+
+  real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
+  !> What a point of a lattice takes at the peak, while families are built, measured on cubes
+  !> [bytes].
+  real(wp), parameter :: memory_per_point = 400.0_wp
+  real(wp), parameter :: most_points = 1.0e9_wp         !! points and slots have 32-bit numbers
+  real(wp), parameter :: ratio_tolerance = 1.0e-3_wp    !! 0.333 is meant to be 1/3
+  integer, parameter :: most_trials = 10000             !! counts that are tried for a proposal
+
+contains
+
+  !> One `&body`: its material, and its lattice or its file. The only material is the default.
+  subroutine check_body(scene, number, error, source)
+    type(scene_type), intent(inout) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i, d
+    logical :: lattice
+
+    d = scene%header%dimension
+    associate (body => scene%bodies(number))
+      if (body%material == '' .and. size(scene%materials) > 1) then
+        call rule_fault(error, 'body', number, '', "group &body lacks the key 'material'", &
+          & 'there are '//to_text(size(scene%materials))//' materials to choose from', source)
+        return
+      end if
+      if (body%material == '') body%material = scene%materials(1)%name
+      call check_known(body%material, [character(name_length) :: (scene%materials(i)%name, &
+        & i=1, size(scene%materials))], 'material', 'body', number, 'material', error, source)
+      if (allocated(error)) return
+      lattice = any(is_set(body%lower)) .or. any(is_set(body%upper)) .or. any(body%points /= 0)
+      if (body%file /= '') then
+        if (lattice) then
+          call rule_fault(error, 'body', number, 'file', &
+            & 'a body is a lattice or a cloud, not both', &
+            & "give either 'file' or 'lower', 'upper' and 'points'", source)
+        else
+          call check_file(body%file, scene%file, 'body', number, error, source)
+        end if
+        return
+      end if
+      if (.not. lattice) then
+        call rule_fault(error, 'body', number, '', 'a body without points', &
+          & "expected 'lower', 'upper' and 'points' for a lattice, or 'file' for a cloud", source)
+        return
+      end if
+      call check_vector(body%lower, d, 'lower', 'body', number, error, source)
+      if (allocated(error)) return
+      call check_vector(body%upper, d, 'upper', 'body', number, error, source)
+      if (allocated(error)) return
+      call check_finite_box(body%lower(:d), body%upper(:d), 'body', number, error, source)
+      if (allocated(error)) return
+      if (any(body%points(:d) < 1) .or. any(body%points(d + 1:) > 1)) then
+        call rule_fault(error, 'body', number, 'points', "'points' needs "//to_text(d)// &
+          & trim(merge(' count ', ' counts', d == 1))//' in a scene of dimension '//to_text(d), &
+          & 'one count along each direction', source)
+        return
+      end if
+      if (product(real(body%points(:d), wp)) > most_points) then
+        call rule_fault(error, 'body', number, 'points', 'too many points: '// &
+          & to_text(product(real(body%points(:d), wp)), 3), 'a body has at most '// &
+          & to_text(most_points, 3)//'; these would need about '//with_unit(memory_per_point &
+          & *product(real(body%points(:d), wp)), 'B', 3)//' of memory', source)
+        return
+      end if
+      call check_spacing(body, d, number, error, source)
+    end associate
+  end subroutine check_body
+
+  !> The spacing must be the same along all directions.
+  subroutine check_spacing(body, d, number, error, source)
+    type(body_group), intent(in) :: body
+    integer, intent(in) :: d
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    real(wp) :: length(d), spacing(d), mean
+    integer :: i, k, counts(d), start
+    character(:), allocatable :: note
+
+    length = body%upper(:d) - body%lower(:d)
+    spacing = length/real(body%points(:d), wp)
+    if (maxval(spacing) <= minval(spacing)*(1.0_wp + spacing_tolerance)) return
+    note = ''
+    ! First the counts that keep one of the user's, then those around the mean spacing.
+    do i = 1, d
+      call fit(spacing(i))
+    end do
+    mean = exp(sum(log(spacing))/real(d, wp))
+    start = max(1, nint(min(length(1)/mean, most_points)))
+    do k = 0, min(start, most_trials)
+      if (len(note) > 0) exit
+      if (k < start) call fit(length(1)/real(start - k, wp))
+      if (len(note) == 0) call fit(length(1)/real(start + k, wp))
+    end do
+    if (len(note) > 0) then
+      note = 'equal with points = '//note
+    else
+      counts = max(1, nint(min(length/mean, most_points)))
+      note = 'no counts near these fit the box; with points = '//listed(counts)// &
+        & ' and spacing '//to_text(mean)//' m its lengths would be '
+      do i = 1, d
+        note = note//to_text(real(counts(i), wp)*mean)//' m'
+        if (i < d) note = note//', '
+      end do
+    end if
+    do i = 1, d
+      if (i == 1) note = note//';  spacings now: '
+      note = note//to_text(spacing(i))
+      if (i < d) note = note//', '
+    end do
+    call rule_fault(error, 'body', number, 'points', &
+      & 'the spacing of the lattice differs between directions', note//' m', source)
+
+  contains
+
+    !> Add the counts at spacing `h` to the note if they fill the box.
+    subroutine fit(h)
+      real(wp), intent(in) :: h
+      integer :: filled(d)
+
+      if (any(length/h > most_points)) return
+      filled = nint(length/h)
+      if (any(filled < 1)) return
+      if (any(abs(real(filled, wp)*h - length) > 0.5_wp*spacing_tolerance*length)) return
+      if (len(note) > 0) then
+        if (index(note, listed(filled)) > 0) return
+        note = note//' or '
+      end if
+      note = note//listed(filled)
+    end subroutine fit
+
+  end subroutine check_spacing
+
+  !> `100, 50`
+  pure function listed(counts) result(text)
+    integer, intent(in) :: counts(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    text = to_text(counts(1))
+    do i = 2, size(counts)
+      text = text//', '//to_text(counts(i))
+    end do
+  end function listed
+
+  !> A file that a group names must be there.
+  subroutine check_file(name, scene_file, group, number, error, source)
+    character(*), intent(in) :: name
+    character(:), allocatable, intent(in) :: scene_file
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(:), allocatable :: path
+    logical :: exists
+
+    path = trim(name)
+    if (allocated(scene_file)) path = resolve_path(trim(name), scene_file)
+    inquire (file=path, exist=exists)
+    if (.not. exists) call rule_fault(error, group, number, 'file', "cannot find the file '"// &
+      & trim(name)//"'", "looked for '"//path//"', then for that name in the working directory", &
+      & source)
+  end subroutine check_file
+
+  !> The shape keys of `&remove`, `&region` and `&no_fail`: those of its kind and no others.
+  subroutine check_shape(shape, dimension, group, number, error, source)
+    type(shape_group), intent(in) :: shape
+    integer, intent(in) :: dimension
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    select case (shape%shape)
+    case ('box')
+      call refuse('centre')
+      call refuse('radius')
+      call refuse('axis')
+      if (allocated(error)) return
+      if (.not. any(is_set(shape%lower(:dimension))) .and. &
+        & .not. any(is_set(shape%upper(:dimension)))) then
+        call rule_fault(error, group, number, 'shape', 'a box without bounds', &
+          & "expected 'lower', 'upper' or both; a component not given is unbounded", source)
+      end if
+    case ('sphere')
+      call refuse('lower')
+      call refuse('upper')
+      call refuse('axis')
+      call need_radius()
+    case ('cylinder')
+      call need_radius()
+    case default
+      call rule_fault(error, group, number, 'shape', 'group &'//group//" lacks the key 'shape'", &
+        & "expected 'box', 'sphere' or 'cylinder'", source)
+    end select
+    if (allocated(error)) return
+    call check_finite_box(shape%lower, shape%upper, group, number, error, source)
+
+  contains
+
+    !> An error if a key of another kind of shape is given.
+    subroutine refuse(key)
+      character(*), intent(in) :: key
+      if (allocated(error) .or. .not. given(group, number, key, source)) return
+      call rule_fault(error, group, number, key, "'"//key//"' is no key of a "// &
+        & trim(shape%shape), "it belongs to another kind of 'shape'", source)
+    end subroutine refuse
+
+    !> An error if a round shape has no radius.
+    subroutine need_radius()
+      if (allocated(error) .or. is_set(shape%radius)) return
+      call rule_fault(error, group, number, 'shape', 'a '//trim(shape%shape)// &
+        & " without the key 'radius'", 'expected its radius [m]', source)
+    end subroutine need_radius
+
+  end subroutine check_shape
+
+  !> The Poisson's ratio of the bond-based model.
+  pure real(wp) function needed_ratio(dimension, plane) result(ratio)
+    integer, intent(in) :: dimension
+    character(*), intent(in) :: plane
+
+    ratio = 0.25_wp
+    if (dimension == 2 .and. plane == 'stress') ratio = 1.0_wp/3.0_wp
+  end function needed_ratio
+
+  !> One `&material`; fills in the Poisson's ratio and the density that go without saying.
+  subroutine check_material(scene, number, error, source)
+    type(scene_type), intent(inout) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    associate (material => scene%materials(number))
+      if (.not. is_set(material%youngs_modulus)) then
+        call rule_fault(error, 'material', number, '', &
+          & "group &material lacks the key 'youngs_modulus'", "Young's modulus E [Pa]", source)
+      else if (is_set(material%critical_stretch) .and. &
+        & is_set(material%critical_energy_release_rate)) then
+        call rule_fault(error, 'material', number, 'critical_energy_release_rate', &
+          & "'critical_stretch' and 'critical_energy_release_rate' are both given", &
+          & 'give one of them; each follows from the other', source)
+      else if (.not. is_set(material%density) .and. scene%time%method == 'explicit') then
+        call rule_fault(error, 'material', number, '', &
+          & "group &material lacks the key 'density'", &
+          & 'explicit steps in time need the mass density [kg/m3]', source)
+      else
+        call check_ratio(material, scene%header%dimension, scene%header%plane, number, error, &
+          & source)
+      end if
+      ! Relaxation has a mass of its own; 1 keeps what is derived from the density finite.
+      if (.not. is_set(material%density)) material%density = 1.0_wp
+    end associate
+  end subroutine check_material
+
+  !> Poisson's ratio: in its range, and the one of the bond-based model where that is asked for.
+  subroutine check_ratio(material, dimension, plane, number, error, source)
+    type(material_group), intent(inout) :: material
+    integer, intent(in) :: dimension
+    character(*), intent(in) :: plane
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    real(wp) :: needed
+    character(:), allocatable :: kind
+
+    needed = needed_ratio(dimension, plane)
+    if (dimension == 1) then
+      if (.not. is_set(material%poissons_ratio)) material%poissons_ratio = 0.0_wp
+      return
+    end if
+    kind = 'in 3D'
+    if (dimension == 2) kind = 'in plane '//trim(plane)
+    if (material%model == 'bond_based') then
+      if (is_set(material%poissons_ratio) .and. .not. material%ignore_poissons_ratio .and. &
+        & abs(material%poissons_ratio - needed) > ratio_tolerance) then
+        call rule_fault(error, 'material', number, 'poissons_ratio', 'the bond-based model '// &
+          & "cannot have Poisson's ratio "//to_text(material%poissons_ratio), kind//' it has '// &
+          & trim(merge('1/3', '1/4', needed > 0.3_wp))//"; use model = 'state_based', or "// &
+          & 'ignore_poissons_ratio = .true.', source)
+        return
+      end if
+      ! What is computed with is what the resolved scene shows.
+      material%poissons_ratio = needed
+    else if (.not. is_set(material%poissons_ratio)) then
+      call rule_fault(error, 'material', number, '', &
+        & "group &material lacks the key 'poissons_ratio'", &
+        & 'the state-based model needs it '//kind, source)
+    else if (material%poissons_ratio >= 0.5_wp .and. .not. (dimension == 2 .and. &
+      & plane == 'stress')) then
+      call rule_fault(error, 'material', number, 'poissons_ratio', &
+        & "'poissons_ratio' is out of range", 'expected > -1 and < 0.5 '//kind, source)
+    end if
+  end subroutine check_ratio
+
+  !> One `&crack`: one kind, the one of the dimension, complete and not degenerate.
+  subroutine check_crack(crack, dimension, number, error, source)
+    type(crack_group), intent(in) :: crack
+    integer, intent(in) :: dimension
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    logical :: segment, parallelogram, disc
+    character(:), allocatable :: kinds
+    real(wp) :: cross(3)
+
+    segment = any(is_set(crack%from)) .or. any(is_set(crack%to))
+    parallelogram = any(is_set(crack%corner)) .or. any(is_set(crack%edge_1)) .or. &
+      & any(is_set(crack%edge_2))
+    disc = any(is_set(crack%centre)) .or. any(is_set(crack%normal)) .or. is_set(crack%radius)
+    if (dimension == 1) then
+      call rule_fault(error, 'crack', number, '', 'a crack in a scene of dimension 1', &
+        & 'cracks are segments (2D), parallelograms or discs (3D)', source)
+    else if (count([segment, parallelogram, disc]) /= 1 .or. (segment .neqv. dimension == 2)) then
+      if (dimension == 2) then
+        kinds = "expected a segment: 'from' and 'to'"
+      else
+        kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', or a disc: "// &
+          & "'centre', 'normal', 'radius'"
+      end if
+      call rule_fault(error, 'crack', number, '', 'this is no crack of dimension '// &
+        & to_text(dimension), kinds, source)
+    else if (segment) then
+      call check_vector(crack%from, 2, 'from', 'crack', number, error, source)
+      if (allocated(error)) return
+      call check_vector(crack%to, 2, 'to', 'crack', number, error, source)
+      if (allocated(error)) return
+      if (all(abs(crack%from(:2) - crack%to(:2)) <= 0.0_wp)) call rule_fault(error, 'crack', &
+        & number, 'to', 'a crack without length', "'from' and 'to' are the same point", source)
+    else if (parallelogram) then
+      call check_vector(crack%corner, 3, 'corner', 'crack', number, error, source)
+      if (allocated(error)) return
+      call check_vector(crack%edge_1, 3, 'edge_1', 'crack', number, error, source)
+      if (allocated(error)) return
+      call check_vector(crack%edge_2, 3, 'edge_2', 'crack', number, error, source)
+      if (allocated(error)) return
+      cross = [crack%edge_1(2)*crack%edge_2(3) - crack%edge_1(3)*crack%edge_2(2), &
+        & crack%edge_1(3)*crack%edge_2(1) - crack%edge_1(1)*crack%edge_2(3), &
+        & crack%edge_1(1)*crack%edge_2(2) - crack%edge_1(2)*crack%edge_2(1)]
+      if (norm2(cross) <= 1.0e-12_wp*norm2(crack%edge_1)*norm2(crack%edge_2)) &
+        & call rule_fault(error, 'crack', number, 'edge_2', 'a crack without area', &
+        & "'edge_1' and 'edge_2' are parallel or zero", source)
+    else
+      call check_vector(crack%centre, 3, 'centre', 'crack', number, error, source)
+      if (allocated(error)) return
+      call check_vector(crack%normal, 3, 'normal', 'crack', number, error, source)
+      if (allocated(error)) return
+      if (norm2(crack%normal) <= 0.0_wp) then
+        call rule_fault(error, 'crack', number, 'normal', "'normal' is zero", &
+          & 'expected a direction', source)
+      else if (.not. is_set(crack%radius)) then
+        call rule_fault(error, 'crack', number, '', "group &crack lacks the key 'radius'", &
+          & 'expected the radius of the disc [m]', source)
+      end if
+    end if
+  end subroutine check_crack
+
+end module pd_scene_content_check_bodies

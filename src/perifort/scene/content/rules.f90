@@ -1,0 +1,256 @@
+!> Tools for the rules that a scene must keep: a fault at the place of a key, names that must
+!> exist, components that the dimension does not have.
+!>
+!> A scene built in memory has no source; its faults then name the group and the key only.
+module pd_scene_content_rules
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: error_type, fail
+  use pd_base_text, only: join, nearest_name, newline, to_text
+  use pd_scene_format_source, only: source_type, scan_source, source_fault
+  use pd_scene_content_types, only: scene_type, is_set, name_length
+  implicit none (type, external)
+  private
+  public :: rule_fault, scene_fault, place_fault, given, check_known, check_unique, &
+    & check_components, check_vector, check_finite_box, find_section, find_entry
+
+contains
+
+  !> A broken rule, at the key of the `number`-th group of this name, or at the group itself if
+  !> the key is not given or ''.
+  subroutine rule_fault(error, group, number, key, message, note, source)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key, message, note
+    type(source_type), intent(in), optional :: source
+    character(:), allocatable :: text
+    integer :: section, entry
+
+    if (.not. present(source)) then
+      text = message//newline//' --> group &'//group//' number '//to_text(number)
+      if (len(key) > 0) text = text//', key '//key
+      if (len(note) > 0) text = text//newline//'  = '//note
+      call fail(error, text)
+      return
+    end if
+    section = find_section(source, group, number)
+    if (section == 0) then
+      call source_fault(source, 0, 0, 0, message, note, error)
+      return
+    end if
+    entry = find_entry(source, section, key)
+    if (entry == 0) then
+      associate (place => source%sections(section))
+        call source_fault(source, place%line, place%column, place%width, message, note, error)
+      end associate
+    else
+      associate (place => source%entries(entry))
+        call source_fault(source, place%line, place%column, place%width, message, note, error)
+      end associate
+    end if
+  end subroutine rule_fault
+
+  !> A fault that only the points of a scene show, at the place of the key that is to blame: as
+  !> `rule_fault`, for a scene that has been read before. Its text is scanned again, which costs
+  !> nothing that matters once something is wrong.
+  subroutine scene_fault(error, scene, group, number, key, message, note)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key, message, note
+    type(source_type) :: source
+    type(error_type), allocatable :: ignored
+
+    if (allocated(scene%text)) then
+      if (len(scene%text) > 0) then
+        call scan_source(scene%text, scene%file, source, ignored)
+        if (.not. allocated(ignored)) then
+          call rule_fault(error, group, number, key, message, note, source)
+          return
+        end if
+      end if
+    end if
+    call rule_fault(error, group, number, key, message, note)
+  end subroutine scene_fault
+
+  !> Give the error of a procedure that knows nothing of scene files a place: that of the group it
+  !> blames, or of the one named here. One that has a place keeps it.
+  subroutine place_fault(error, scene, group, number, key)
+    type(error_type), allocatable, intent(inout) :: error
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key
+    type(error_type), allocatable :: placed
+
+    if (.not. allocated(error)) return
+    if (index(error%message, newline//' --> ') > 0) return
+    if (allocated(error%group)) then
+      call scene_fault(placed, scene, error%group, error%number, '', error%message, '')
+    else
+      call scene_fault(placed, scene, group, number, key, error%message, '')
+    end if
+    placed%status = error%status
+    call move_alloc(placed, error)
+  end subroutine place_fault
+
+  !> Whether the file gives this key; false for a scene built in memory.
+  pure logical function given(group, number, key, source)
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key
+    type(source_type), intent(in), optional :: source
+    integer :: section
+
+    given = .false.
+    if (.not. present(source)) return
+    section = find_section(source, group, number)
+    if (section > 0) given = find_entry(source, section, key) > 0
+  end function given
+
+  !> The place of the `number`-th group of a name, 0 if there is none.
+  pure integer function find_section(source, group, number) result(section)
+    type(source_type), intent(in) :: source
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    integer :: i, found
+
+    section = 0
+    found = 0
+    do i = 1, source%section_count
+      if (source%sections(i)%name /= group) cycle
+      found = found + 1
+      if (found == number) section = i
+    end do
+  end function find_section
+
+  !> The place of a key in a group, 0 if it is not given.
+  pure integer function find_entry(source, section, key) result(entry)
+    type(source_type), intent(in) :: source
+    integer, intent(in) :: section
+    character(*), intent(in) :: key
+    integer :: i
+
+    entry = 0
+    do i = source%sections(section)%last, source%sections(section)%first, -1
+      if (source%entries(i)%key == key) entry = i
+    end do
+  end function find_entry
+
+  !> A name must be one of `names`; blank ones among these do not count.
+  subroutine check_known(name, names, kind, group, number, key, error, source)
+    character(*), intent(in) :: name
+    character(*), intent(in) :: names(:)
+    character(*), intent(in) :: kind, group
+    integer, intent(in) :: number
+    character(*), intent(in) :: key
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(name_length), allocatable :: known(:)
+    character(:), allocatable :: note, nearest
+
+    if (len_trim(name) == 0 .or. any(names == name)) return
+    allocate (known(count(names /= '')))
+    known(:) = pack(names, names /= '')
+    if (size(known) == 0) then
+      note = 'no '//kind//' has a name'
+    else
+      note = 'known: '//join(known, ', ')
+      nearest = nearest_name(name, known)
+      if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note
+    end if
+    call rule_fault(error, group, number, key, 'no '//kind//" is named '"//trim(name)//"'", &
+      & note, source)
+  end subroutine check_known
+
+  !> Names must differ; blank ones do not count.
+  subroutine check_unique(names, group, error, source)
+    character(*), intent(in) :: names(:)
+    character(*), intent(in) :: group
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    do i = 2, size(names)
+      if (names(i) == '' .or. all(names(:i - 1) /= names(i))) cycle
+      call rule_fault(error, group, i, 'name', "the name '"//trim(names(i))// &
+        & "' is used by another &"//group, 'names must differ', source)
+      return
+    end do
+  end subroutine check_unique
+
+  !> Keys `<key>_x`.. of directions that the dimension does not have must not be given.
+  subroutine check_components(value, dimension, key, group, number, error, source)
+    real(wp), intent(in) :: value(3)
+    integer, intent(in) :: dimension
+    character(*), intent(in) :: key, group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(*), parameter :: directions = 'xyz'
+    integer :: i
+
+    do i = dimension + 1, 3
+      if (.not. is_set(value(i))) cycle
+      call rule_fault(error, group, number, key//'_'//directions(i:i), "'"//key//'_'// &
+        & directions(i:i)//"' in a scene of dimension "//to_text(dimension), &
+        & 'there is no direction '//directions(i:i), source)
+      return
+    end do
+  end subroutine check_components
+
+  !> A position or direction: all components of the dimension given, none other but zeros.
+  subroutine check_vector(value, dimension, key, group, number, error, source)
+    real(wp), intent(in) :: value(3)
+    integer, intent(in) :: dimension
+    character(*), intent(in) :: key, group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    if (.not. any(is_set(value))) then
+      call rule_fault(error, group, number, key, 'group &'//group//" lacks the key '"//key//"'", &
+        & 'expected '//counted(dimension), source)
+    else if (.not. all(is_set(value(:dimension)))) then
+      call rule_fault(error, group, number, key, "'"//key//"' has too few values", &
+        & 'expected '//counted(dimension)//' in a scene of dimension '//to_text(dimension), source)
+    else
+      do i = dimension + 1, 3
+        if (.not. is_set(value(i)) .or. abs(value(i)) <= 0.0_wp) cycle
+        call rule_fault(error, group, number, key, "'"//key//"' has too many values", &
+          & 'expected '//counted(dimension)//' in a scene of dimension '//to_text(dimension), &
+          & source)
+        return
+      end do
+    end if
+  end subroutine check_vector
+
+  !> Where both corners bound a direction, the lower one must be below the upper.
+  subroutine check_finite_box(lower, upper, group, number, error, source)
+    real(wp), intent(in) :: lower(:), upper(:)
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(*), parameter :: directions = 'xyz'
+    integer :: i
+
+    do i = 1, size(lower)
+      if (.not. is_set(lower(i)) .or. .not. is_set(upper(i)) .or. lower(i) < upper(i)) cycle
+      call rule_fault(error, group, number, 'upper', "'upper' is not above 'lower' along "// &
+        & directions(i:i), 'lower: '//to_text(lower(i))//', upper: '//to_text(upper(i)), source)
+      return
+    end do
+  end subroutine check_finite_box
+
+  !> `1 value`, `2 values`.
+  pure function counted(n) result(text)
+    integer, intent(in) :: n
+    character(:), allocatable :: text
+    text = to_text(n)//' value'
+    if (n > 1) text = text//'s'
+  end function counted
+
+end module pd_scene_content_rules

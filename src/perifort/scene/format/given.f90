@@ -1,0 +1,20 @@
+!> What a value looks like that the user has not given, and how long names may be.
+module pd_scene_format_given
+  use pd_base_kinds, only: wp
+  implicit none (type, external)
+  private
+  public :: is_set, name_length, path_length, unset
+
+  integer, parameter :: name_length = 64    !! longest name of a body, region, ... [characters]
+  integer, parameter :: path_length = 1024  !! longest file name [characters]
+  real(wp), parameter :: unset = -huge(1.0_wp)  !! a real the user has not given
+
+contains
+
+  !> Whether the user has given this value.
+  elemental logical function is_set(value)
+    real(wp), intent(in) :: value
+    is_set = value > unset
+  end function is_set
+
+end module pd_scene_format_given

@@ -1,0 +1,75 @@
+!> Families of a scene: a lattice where the points allow it, a list otherwise.
+module pd_set_up_families
+  use pd_base_error, only: error_type, internal_fault
+  use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
+  use pd_family_list, only: list_family_type, new_list_family
+  use pd_family_volume, only: volume_rule_type
+  use pd_force_list, only: prepare_list
+  use pd_force_weights, only: build_weights
+  use pd_motion_system, only: system_type
+  use pd_scene_content_rules, only: place_fault, scene_fault
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_memory, only: any_critical
+  implicit none (type, external)
+  private
+  public :: make_family, finish_family
+
+contains
+
+  !> Families of the kind that suits the points; the body is arranged in their slots.
+  subroutine make_family(scene, rule, system, error)
+    type(scene_type), intent(in) :: scene
+    type(volume_rule_type), intent(in) :: rule
+    type(system_type), intent(inout) :: system
+    type(error_type), allocatable, intent(out) :: error
+    type(lattice_family_type), allocatable :: lattice
+    type(list_family_type), allocatable :: list
+    character(:), allocatable :: reason
+    logical :: suits, mixed
+
+    if (scene%horizon%family == 'list') then
+      suits = .false.
+      reason = 'asked for'
+    else
+      call lattice_suits(system%body, rule, suits, reason)
+    end if
+    if (scene%horizon%family == 'lattice' .and. .not. suits) then
+      call scene_fault(error, scene, 'horizon', 1, 'family', &
+        & 'the scene cannot have lattice families, which &horizon family asks for', reason)
+      return
+    end if
+    mixed = scene%header%precision == 'mixed'
+    if (mixed .and. .not. suits) then
+      call scene_fault(error, scene, 'scene', 1, 'precision', &
+        & "precision = 'mixed' needs lattice families, but the scene gets lists", reason)
+      return
+    end if
+    if (suits) then
+      allocate (lattice)
+      call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), &
+        & mixed, lattice, error)
+      call place_fault(error, scene, 'body', 1, 'points')
+      if (allocated(error)) return
+      call move_alloc(lattice, system%family)
+    else
+      allocate (list)
+      call new_list_family(system%body, rule, list)
+      list%reason = reason
+      call move_alloc(list, system%family)
+    end if
+  end subroutine make_family
+
+  !> What a family keeps of the model: the weights of its bonds.
+  subroutine finish_family(system)
+    type(system_type), intent(inout) :: system
+    select type (family => system%family)
+    type is (lattice_family_type)
+      call build_weights(family, system%model)
+    type is (list_family_type)
+      call prepare_list(family, system%model)
+    class default
+      call internal_fault('finish_family does not know a kind of family')
+    end select
+  end subroutine finish_family
+
+end module pd_set_up_families

@@ -1,0 +1,121 @@
+!> Whether a scene fits into the memory, before any of its points is made.
+module pd_set_up_memory
+  use pd_base_kinds, only: wp, i8
+  use pd_base_error, only: error_type
+  use pd_base_system, only: available_memory
+  use pd_base_text, only: to_text, with_unit
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type, is_set
+  use pd_body_generate, only: horizon_of
+  implicit none (type, external)
+  private
+  public :: check_memory, predicted_memory, any_critical
+
+contains
+
+  !> An error if the lattice bodies of a scene need more memory than there is, at the body with the
+  !> most points.
+  subroutine check_memory(scene, error)
+    type(scene_type), intent(in) :: scene                !! a checked scene
+    type(error_type), allocatable, intent(out) :: error  !! too many points
+    real(wp) :: need, there
+
+    need = predicted_memory(scene)
+    there = real(available_memory(), wp)
+    if (need <= there) return
+    call scene_fault(error, scene, 'body', largest_body(scene), 'points', 'the scene has '// &
+      & to_text(int(sum(numbers_of_points(scene)), i8))//' points and needs about '// &
+      & with_unit(need, 'B', 3)//' of memory', 'only '//with_unit(there, 'B', 3)//' are available')
+  end subroutine check_memory
+
+  !> Largest memory that a run of a scene takes [bytes], without its clouds, whose points are not
+  !> known before they are read; 0 without lattice bodies. The constants are fitted to the largest
+  !> resident sets of runs of 2e5 points in each dimension, with horizons of 3 to 6 spacings
+  !> (doc/performance.md, memory).
+  pure real(wp) function predicted_memory(scene) result(bytes)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    real(wp), parameter :: program = 20.0e6_wp                          !! without points
+    real(wp), parameter :: per_point(3) = [165.0_wp, 280.0_wp, 500.0_wp]  !! in 1D, 2D, 3D
+    real(wp), parameter :: per_list_point = 60.0_wp, per_list_bond = 1.0_wp  !! bits and members
+    real(wp), parameter :: per_exact_bond = 16.0_wp                     !! partial volumes of lists
+    real(wp), parameter :: per_weight = 16.0_wp                         !! tables of lattices
+    real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded
+    real(wp), parameter :: per_solver = 80.0_wp, per_rule = 24.0_wp     !! a component
+    real(wp), parameter :: block = 8.0_wp                               !! slots with one table
+    real(wp), parameter :: pi = acos(-1.0_wp)
+    real(wp) :: points, ratio, members, kinds
+    integer :: dim
+    logical :: breaking
+
+    bytes = 0.0_wp
+    dim = scene%header%dimension
+    points = sum(numbers_of_points(scene))
+    if (points <= 0.0_wp) return
+    ratio = max(1.0_wp, horizon_ratio(scene))
+    select case (dim)
+    case (1); members = 2*ratio
+    case (2); members = pi*min(ratio, 1.0e6_wp)**2
+    case default; members = 4*pi/3*min(ratio, 1.0e6_wp)**3
+    end select
+    members = min(points, members)
+    breaking = size(scene%cracks) > 0 .or. any_critical(scene)
+    bytes = program + points*per_point(dim)
+    if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
+      bytes = bytes + points*(per_list_point + per_list_bond*members)
+      if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members
+    else
+      ! blocks near the surfaces have weights of their own
+      kinds = min(points/block, (2*min(ratio, 1.0e4_wp) + 1)**dim)
+      bytes = bytes + kinds*members*block*per_weight
+      if (breaking) bytes = bytes + points*per_bit*members
+    end if
+    if (scene%time%method == 'relaxation') then
+      bytes = bytes + points*dim*per_solver
+    else if (index(scene%time%integrator, 'adams') == 1 .or. &
+      & scene%time%integrator == 'runge_kutta') then
+      bytes = bytes + points*dim*per_rule
+    end if
+  end function predicted_memory
+
+  !> Number of points of each body's lattice, 0 for clouds.
+  pure function numbers_of_points(scene) result(numbers)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    real(wp) :: numbers(size(scene%bodies))
+    integer :: i
+
+    numbers = 0.0_wp
+    do i = 1, size(numbers)
+      if (scene%bodies(i)%file == '') &
+        & numbers(i) = product(real(scene%bodies(i)%points(:scene%header%dimension), wp))
+    end do
+  end function numbers_of_points
+
+  !> Number of the body with the most lattice points.
+  pure integer function largest_body(scene) result(number)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    number = maxloc(numbers_of_points(scene), dim=1)
+  end function largest_body
+
+  !> Horizon over the largest spacing of the lattice bodies [-].
+  pure real(wp) function horizon_ratio(scene) result(ratio)
+    type(scene_type), intent(in) :: scene  !! a checked scene with a lattice body
+    real(wp) :: spacing
+    integer :: i
+
+    spacing = 0.0_wp
+    do i = 1, size(scene%bodies)
+      associate (body => scene%bodies(i))
+        if (body%file == '') spacing = max(spacing, (body%upper(1) - body%lower(1))/body%points(1))
+      end associate
+    end do
+    ratio = horizon_of(scene, spacing)/spacing
+  end function horizon_ratio
+
+  !> Whether some material of the scene can fail.
+  pure logical function any_critical(scene)
+    type(scene_type), intent(in) :: scene
+    any_critical = any(is_set(scene%materials%critical_stretch)) .or. &
+      & any(is_set(scene%materials%critical_energy_release_rate))
+  end function any_critical
+
+end module pd_set_up_memory

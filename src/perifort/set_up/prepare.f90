@@ -1,0 +1,135 @@
+!> From a scene to a system that can move: the steps of chapter 7 before the first time step.
+module pd_set_up_prepare
+  use pd_base_kinds, only: wp, i2, i8
+  use pd_base_clock, only: phase_timer_type
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text
+  use pd_base_threads, only: team_type
+  use pd_base_warnings, only: warnings_type
+  use pd_body_generate, only: generate_body
+  use pd_body_initial, only: initial_state
+  use pd_body_layers, only: layer_count_type, layer_count_text
+  use pd_body_material, only: material_type
+  use pd_family_cracks, only: cut_bonds
+  use pd_family_neighbours, only: check_overlap
+  use pd_family_surface, only: surface_factors
+  use pd_family_volume, only: volume_rule_type, volume_rule_number
+  use pd_force_breaking, only: damage_of
+  use pd_force_model, only: new_model
+  use pd_motion_system, only: system_type, start_system
+  use pd_scene_content_rules, only: place_fault
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_bounds, only: check_bounds
+  use pd_set_up_conditions, only: motions_of_scene, loads_of_scene, heating_of_scene, &
+    & in_no_fail_zones
+  use pd_set_up_families, only: make_family, finish_family
+  use pd_set_up_materials, only: materials_of_scene
+  use pd_set_up_memory, only: check_memory
+  use pd_set_up_plan, only: plan_type, make_plan
+  implicit none (type, external)
+  private
+  public :: prepare, set_up_type
+
+  !> Everything that stands before the first step.
+  type :: set_up_type
+    type(system_type) :: system
+    type(plan_type) :: plan
+    integer(i8) :: cut = 0_i8                      !! bonds cut by cracks
+    integer :: isolated = 0                        !! points without a bond
+    type(warnings_type) :: warnings                !! found before the first step
+    type(warnings_type) :: notes                   !! what is right and may surprise
+    type(phase_timer_type) :: timer
+    type(team_type) :: team                        !! threads; not begun: as the caller has them
+  end type set_up_type
+
+contains
+
+  !> Points, families, corrections, cracks, conditions and the plan of a scene. With `threads` a
+  !> run's team begins, with so many threads or, if that is 0, with a number that suits the body;
+  !> without, threads are the caller's.
+  subroutine prepare(scene, set_up, error, threads)
+    type(scene_type), intent(in) :: scene
+    type(set_up_type), intent(out) :: set_up
+    type(error_type), allocatable, intent(out) :: error
+    integer, intent(in), optional :: threads
+    type(material_type), allocatable :: materials(:)
+    real(wp), allocatable :: temperature_change(:)
+    integer(i2), allocatable :: heated_by(:)
+    type(layer_count_type), allocatable :: layers(:)
+    real(wp) :: delta
+    integer(i8) :: cut
+    integer :: i
+
+    call check_memory(scene, error)
+    if (allocated(error)) return
+    if (present(threads)) call set_up%team%begin(threads)
+    associate (system => set_up%system, timer => set_up%timer)
+      call timer%start('points')
+      call generate_body(scene, system%body, delta, error, layers)
+      if (allocated(error)) return
+      do i = 1, size(layers)
+        if (layer_count_text(scene, layers(i)) /= '') call set_up%warnings%add('layer '// &
+          & to_text(i), layer_count_text(scene, layers(i)), tell=.false.)
+      end do
+      materials = materials_of_scene(scene, delta)
+      call timer%stop('points')
+
+      call timer%start('families')
+      call make_family(scene, volume_rule_type(volume_rule_number( &
+        & trim(scene%horizon%volume_correction)), delta), system, error)
+      if (allocated(error)) return
+      call check_overlap(system%body, system%family, set_up%isolated, error)
+      call place_fault(error, scene, 'body', 1, 'points')
+      if (allocated(error)) return
+      call timer%stop('families')
+
+      call timer%start('threads')
+      if (present(threads)) call set_up%team%fit(system%family%n_bonds, threads)
+      call timer%stop('threads')
+
+      call timer%start('conditions')
+      call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
+        & heated_by, error)
+      if (allocated(error)) return
+      call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
+        & in_no_fail_zones(scene, system%body), temperature_change, system%model)
+      if (system%model%thermal) call heating_of_scene(scene, heated_by, system%model%expansion, &
+        & system%heating)
+      call motions_of_scene(scene, system%body, system%motions, error)
+      if (allocated(error)) return
+      call loads_of_scene(scene, system%body, system%loads, error)
+      if (allocated(error)) return
+      call timer%stop('conditions')
+
+      call timer%start('surface correction')
+      system%model%surface = scene%horizon%surface_correction == 'energy'
+      if (system%model%surface) call surface_factors(system%body, system%family, materials, &
+        & system%model%D, system%model%S)
+      call finish_family(system)
+      call timer%stop('surface correction')
+
+      call timer%start('cracks')
+      do i = 1, size(scene%cracks)
+        call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
+        if (cut == 0_i8) call set_up%warnings%add('idle crack '//to_text(i), '&crack number '// &
+          & to_text(i)//' cuts no bond, or none that another has not cut', tell=.false.)
+        set_up%cut = set_up%cut + cut
+      end do
+      if (set_up%cut > 0_i8) then
+        allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
+        call damage_of(system%body, system%family, system%state%damage)
+      end if
+      call timer%stop('cracks')
+
+      call timer%start('time step')
+      system%break_late = scene%time%breaking == 'after_forces'
+      call start_system(system)
+      call make_plan(scene, system, set_up%plan, error)
+      if (allocated(error)) return
+      call check_bounds(scene, system, set_up%plan, error)
+      if (allocated(error)) return
+      call timer%stop('time step')
+    end associate
+  end subroutine prepare
+
+end module pd_set_up_prepare

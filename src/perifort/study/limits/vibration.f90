@@ -1,0 +1,289 @@
+!> Free vibration of a scene's body: the same points, bonds, corrections and cracks without loads,
+!> temperature and breaking, constrained components held at rest; also shifted or in another size.
+!> What the program measures of a body's motion, it measures on this.
+module pd_study_limits_vibration
+  use pd_base_kinds, only: wp, i1
+  use pd_base_error, only: error_type
+  use pd_base_numbers, only: noise
+  use pd_body_body, only: body_type, allocate_points, in_point_order
+  use pd_body_material, only: material_type, never
+  use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_family_lattice, only: lanes, lattice_family_type, new_lattice_family
+  use pd_family_list, only: list_family_type, new_list_family
+  use pd_family_surface, only: surface_factors
+  use pd_family_volume, only: volume_rule_type
+  use pd_force_model, only: new_model
+  use pd_force_weights, only: build_weights
+  use pd_motion_conditions, only: motion_type, moved_by_displacement
+  use pd_motion_curve, only: constant_curve
+  use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_system, only: system_type, start_system, inverse_density, energies_type, energies_of
+  use pd_motion_tangent, only: apply_tangent
+  implicit none (type, external)
+  private
+  public :: free_body, random_shape, smoothed, in_points, put_points, energy_watch_type
+
+  !> Keeps the total energy of a run. With velocities at half steps the energy of an instant swings
+  !> about a constant by as much as (omega dt)^2; with `half_steps` that constant is taken, the
+  !> energy less dt^2/8 of the sum of rho V a^2, which the scheme keeps to rounding if all is
+  !> linear.
+  type, extends(observer_type) :: energy_watch_type
+    integer :: every = 0                     !! steps between looks, 0 for none
+    logical :: half_steps = .false.
+    integer :: n = 0                         !! looks so far
+    real(wp), allocatable :: step(:)         !! at which step (n)
+    real(wp), allocatable :: energy(:)       !! kinetic and strain energy [J] (n)
+  contains
+    procedure :: observe
+  end type energy_watch_type
+
+contains
+
+  !> The body of `system`, moved by `shift` [m] along each direction after it was made `factor`
+  !> times as large (thickness and cross section stay), at rest and undeformed.
+  subroutine free_body(system, shift, factor, twin, error)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: shift
+    real(wp), intent(in) :: factor
+    type(system_type), intent(out) :: twin
+    type(error_type), allocatable, intent(out) :: error
+    type(material_type), allocatable :: materials(:)
+    type(lattice_family_type), allocatable :: lattice
+    type(list_family_type), allocatable :: list
+    type(volume_rule_type) :: rule
+    logical :: cut
+
+    call copy_points(system%body, shift, factor, twin%body)
+    materials = resized(system%model%materials, system%body%dim, factor)
+    rule = system%family%rule
+    rule%delta = factor*rule%delta
+    cut = .false.
+    if (size(system%state%damage) > 0) cut = any(system%state%damage > 0.0_wp)
+    select type (family => system%family)
+    type is (lattice_family_type)
+      allocate (lattice)
+      call new_lattice_family(twin%body, rule, cut, &
+        & family%grids(1)%alignment > lanes, lattice, error)
+      if (allocated(error)) return
+      call move_alloc(lattice, twin%family)
+    class default  ! a list holds any points
+      allocate (list)
+      call new_list_family(twin%body, rule, list)
+      call move_alloc(list, twin%family)
+    end select
+    call new_model(twin%body, materials, system%model%projected, &
+      & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), twin%model)
+    twin%model%surface = system%model%surface
+    if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
+      & twin%model%S)
+    select type (family => twin%family)
+    type is (lattice_family_type)
+      call build_weights(family, twin%model)
+    class default  ! lists prepare themselves in their first pass
+      continue
+    end select
+    if (cut) call copy_cuts(system, twin)
+    call hold(system, twin)
+    allocate (twin%state%u(twin%body%n_slots, twin%body%dim), source=0.0_wp)
+    allocate (twin%state%v, source=twin%state%u)
+    call start_system(twin)
+  end subroutine free_body
+
+  !> The points in their order, elsewhere and in another size.
+  subroutine copy_points(body, shift, factor, copy)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: shift, factor
+    type(body_type), intent(out) :: copy
+    integer :: c, g
+
+    call allocate_points(copy, body%dim, body%n_points)
+    do c = 1, body%dim
+      copy%x(:, c) = factor*body%x(body%slot, c) + shift
+    end do
+    copy%volume = body%volume(body%slot)*factor**body%dim
+    copy%spacing = body%spacing(body%slot)*factor
+    copy%body = body%body(body%slot)
+    copy%material = body%material(body%slot)
+    copy%layer = body%layer(body%slot)
+    copy%grid = body%grid(body%slot)
+    copy%grids = body%grids
+    do g = 1, size(copy%grids)
+      copy%grids(g)%origin(:body%dim) = factor*copy%grids(g)%origin(:body%dim) + shift
+      copy%grids(g)%spacing = factor*copy%grids(g)%spacing
+    end do
+  end subroutine copy_points
+
+  !> The same materials for a horizon `factor` times as long; none can fail or expand.
+  pure function resized(materials, dim, factor) result(others)
+    type(material_type), intent(in) :: materials(:)
+    integer, intent(in) :: dim
+    real(wp), intent(in) :: factor
+    type(material_type), allocatable :: others(:)
+
+    allocate (others, source=materials)
+    others%b = materials%b/factor**(dim + 2)
+    others%d = materials%d/factor**(dim + 1)
+    others%q = materials%q/factor**(dim + 1)
+    others%p = materials%p/factor**dim
+    others%t = materials%t/factor**dim
+    others%critical_stretch = never
+    others%expansion = 0.0_wp
+  end function resized
+
+  !> Cut in `twin` the bonds that are broken in `system`.
+  subroutine copy_cuts(system, twin)
+    type(system_type), intent(in) :: system
+    type(system_type), intent(inout) :: twin
+    type(bonds_type) :: bonds, others
+    integer :: i, b, m, k
+
+    call allocate_bonds(system%family, bonds)
+    call allocate_bonds(twin%family, others)
+    do i = 1, system%body%n_points
+      if (.not. system%state%damage(system%body%slot(i)) > 0.0_wp) cycle
+      call system%family%bonds_of(int(system%body%slot(i)), bonds)
+      k = twin%body%slot(i)
+      call twin%family%bonds_of(k, others)
+      do b = 1, bonds%n
+        if (bonds%intact(b)) cycle
+        m = findloc(twin%body%point(others%j(:others%n)), system%body%point(bonds%j(b)), dim=1)
+        if (m > 0) call twin%family%break_bond(k, m)
+      end do
+    end do
+  end subroutine copy_cuts
+
+  !> Hold what is constrained in `system`: a motion for each direction.
+  subroutine hold(system, twin)
+    type(system_type), intent(in) :: system
+    type(system_type), intent(inout) :: twin
+    integer :: c
+
+    allocate (twin%motions(system%body%dim))
+    do c = 1, system%body%dim
+      associate (motion => twin%motions(c))
+        motion%name = 'held'
+        motion%slots = pack(twin%body%slot, system%held(system%body%slot, c) == 1_i1)
+        motion%kind(c) = moved_by_displacement
+        motion%curve = constant_curve()
+      end associate
+    end do
+  end subroutine hold
+
+  !> Displacements of all frequencies alike: at random, always the same; 0 where held. [-]
+  subroutine random_shape(system, shape)
+    type(system_type), intent(in) :: system
+    real(wp), allocatable, intent(out) :: shape(:, :)
+    integer :: i, c, state
+
+    allocate (shape(system%body%n_slots, system%body%dim), source=0.0_wp)
+    state = 4711
+    do i = 1, system%body%n_points
+      do c = 1, system%body%dim
+        shape(system%body%slot(i), c) = noise(state)
+        if (system%held(system%body%slot(i), c) == 1_i1) shape(system%body%slot(i), c) = 0.0_wp
+      end do
+    end do
+    shape = shape/largest_gradient(system, shape)
+  end subroutine random_shape
+
+  !> What remains of `shape` when the high frequencies are taken out of it: each pass multiplies the
+  !> part of frequency omega by 1 - (omega step/2)^2, `step` = 2/(largest omega) [s].
+  subroutine smoothed(system, step, passes, shape)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: step
+    integer, intent(in) :: passes
+    real(wp), intent(inout), contiguous :: shape(:, :)
+    real(wp), allocatable :: kw(:, :), undeformed(:, :)
+    integer :: i, k, c
+
+    allocate (kw, undeformed, source=0*shape)
+    do i = 1, passes
+      call apply_tangent(system, undeformed, shape, kw)
+      do c = 1, size(shape, 2)
+        do k = 1, size(shape, 1)
+          if (system%body%point(k) > 0 .and. system%held(k, c) == 0_i1) &
+            & shape(k, c) = shape(k, c) - step**2/4*inverse_density(system%model, k)*kw(k, c)
+        end do
+      end do
+    end do
+    shape = shape/largest_gradient(system, shape)
+  end subroutine smoothed
+
+  !> The largest displacement of a bond's end against the other over its length, in any direction,
+  !> so that it counts where a motion stretches nothing (a chain in space), too; 1 if there is none.
+  real(wp) function largest_gradient(system, u) result(largest)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: u(:, :)
+    type(bonds_type) :: bonds
+    integer :: k, i
+
+    largest = 0.0_wp
+    !$omp parallel default(none) shared(system, u) private(bonds, k, i) reduction(max:largest)
+    call allocate_bonds(system%family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, system%body%n_slots
+      if (system%body%point(k) == 0) cycle
+      call system%family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        if (bonds%intact(i)) largest = max(largest, norm2(u(bonds%j(i), :) - u(k, :)) &
+          & /bonds%length(i))
+      end do
+    end do
+    !$omp end parallel
+    if (.not. largest > 0.0_wp) largest = 1.0_wp
+  end function largest_gradient
+
+  !> Values of slots in the order of the points.
+  subroutine in_points(body, values, ordered)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: values(:, :)
+    real(wp), allocatable, intent(out) :: ordered(:, :)
+    integer :: c
+
+    allocate (ordered(body%n_points, size(values, 2)))
+    do c = 1, size(values, 2)
+      call in_point_order(body, values(:, c), ordered(:, c))
+    end do
+  end subroutine in_points
+
+  !> `factor` times values in the order of the points into their slots.
+  pure subroutine put_points(body, ordered, factor, values)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: ordered(:, :)
+    real(wp), intent(in) :: factor
+    real(wp), intent(inout) :: values(:, :)
+
+    values = 0.0_wp
+    values(body%slot, :) = factor*ordered
+  end subroutine put_points
+
+  !> Look at the energy now and then.
+  subroutine observe(observer, system, instant, error)
+    class(energy_watch_type), intent(inout) :: observer
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    type(error_type), allocatable, intent(out) :: error
+    type(energies_type) :: energies, of_kick
+    real(wp), allocatable :: v(:, :), kick(:, :)
+    integer :: k
+
+    if (allocated(error)) return
+    if (observer%every == 0) return
+    if (mod(instant%step, observer%every) /= 0) return
+    allocate (kick, mold=system%state%v)
+    do k = 1, size(kick, 1)
+      kick(k, :) = instant%dt/2*inverse_density(system%model, k)*system%state%force(k, :)
+    end do
+    where (system%held == 1_i1) kick = 0.0_wp
+    v = system%state%v
+    if (instant%kick > 0.0_wp) v = v + kick
+    if (observer%half_steps) call energies_of(system, kick, of_kick)
+    call energies_of(system, v, energies)
+    energies%kinetic = energies%kinetic - of_kick%kinetic
+    if (observer%n == 0) allocate (observer%step(0), observer%energy(0))
+    observer%n = observer%n + 1
+    observer%step = [observer%step, real(instant%step, wp)]
+    observer%energy = [observer%energy, energies%kinetic + energies%strain]
+  end subroutine observe
+
+end module pd_study_limits_vibration

@@ -1,0 +1,268 @@
+!> Answers in closed form (doc/theory.md, 12): what a field is at a point and a time.
+!>
+!> A form is plain numbers; `pd_study_trade_analytic` takes them from a scene.
+module pd_study_trade_closed_form
+  use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
+  implicit none (type, external)
+  private
+  public :: closed_form_type, field_at, form_wave, form_linear, form_hole, form_chain, &
+    & chain_frequency, components_of
+
+  integer, parameter :: form_wave = 1    !! a bar released from uniform strain
+  integer, parameter :: form_linear = 2  !! displacements linear in x, at rest
+  integer, parameter :: form_hole = 3    !! a hole in an infinite plate
+  integer, parameter :: form_chain = 4   !! one wave number on a chain of points
+
+  type :: closed_form_type
+    integer :: kind = 0
+    integer :: dim = 1
+    character(:), allocatable :: name
+    real(wp) :: modulus = 0.0_wp         !! E; plane strain: E/(1 - nu2) [Pa]
+    real(wp) :: ratio = 0.0_wp           !! nu; plane strain: nu/(1 - nu)
+    ! form_linear: u = gradient (x - origin) + shift
+    real(wp) :: gradient(3, 3) = 0.0_wp  !! [-]
+    real(wp) :: origin(3) = 0.0_wp       !! of form_wave the held end, of form_hole the centre [m]
+    real(wp) :: shift(3) = 0.0_wp        !! [m]
+    ! form_wave: held at origin, free at a distance of `length` in the direction of `side`
+    real(wp) :: length = 0.0_wp          !! [m]
+    real(wp) :: side = 1.0_wp
+    real(wp) :: speed = 0.0_wp           !! sqrt(E/rho) [m/s]
+    ! form_hole: `stress` along direction `axis`, far away
+    real(wp) :: radius = 0.0_wp          !! [m]
+    real(wp) :: stress = 0.0_wp          !! [Pa]
+    integer :: axis = 1
+    ! form_chain
+    real(wp) :: spacing = 0.0_wp         !! [m]
+    real(wp) :: frequency = 0.0_wp       !! omega [1/s]
+    real(wp), allocatable :: u(:), v(:)  !! at t = 0, point by point [m], [m/s]
+    real(wp) :: lower = -huge(1.0_wp)    !! it holds from here [m]
+    real(wp) :: upper = huge(1.0_wp)     !! to here [m]
+  end type closed_form_type
+
+contains
+
+  !> Components of a field in `dim` directions.
+  pure integer function components_of(field, dim) result(number)
+    character(*), intent(in) :: field
+    integer, intent(in) :: dim
+    select case (field)
+    case ('displacement', 'velocity', 'force_density'); number = dim
+    case default; number = 1  ! all others are scalars
+    end select
+  end function components_of
+
+  !> The field at `x` (dim) [m] and time `t` [s]; `known` is false where the form says nothing of
+  !> it.
+  pure subroutine field_at(form, field, x, t, values, known)
+    type(closed_form_type), intent(in) :: form
+    character(*), intent(in) :: field
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(in) :: t
+    real(wp), intent(out) :: values(:)
+    logical, intent(out) :: known
+
+    values = 0.0_wp
+    known = all(x >= form%lower) .and. all(x <= form%upper)
+    if (.not. known) return
+    select case (form%kind)
+    case (form_wave)
+      call wave(form, field, x(1), t, values(1), known)
+    case (form_hole)
+      call hole(form, field, x, values, known)
+    case (form_chain)
+      call chain(form, field, x(1), t, values(1), known)
+    case (form_linear)
+      call linear(form, field, x, values, known)
+    case default
+      call internal_fault('field_at does not know a closed form')
+    end select
+  end subroutine field_at
+
+  !> d'Alembert: half of the start runs to each side; it is continued odd about the held end and
+  !> even about the free one, with a period of four lengths.
+  pure subroutine wave(form, field, x, t, value, known)
+    type(closed_form_type), intent(in) :: form
+    character(*), intent(in) :: field
+    real(wp), intent(in) :: x, t
+    real(wp), intent(out) :: value
+    logical, intent(out) :: known
+    real(wp) :: s, run, strain
+
+    known = .true.
+    value = 0.0_wp
+    s = form%side*(x - form%origin(1))
+    run = form%speed*t
+    strain = form%gradient(1, 1)*(slope(s - run) + slope(s + run))/2
+    select case (field)
+    case ('displacement')
+      value = form%side*form%gradient(1, 1)*(start(s - run) + start(s + run))/2
+    case ('velocity')
+      value = form%side*form%gradient(1, 1)*form%speed*(slope(s + run) - slope(s - run))/2
+    case ('dilatation')
+      value = strain
+    case ('energy_density')
+      value = form%modulus*strain**2/2
+    case default
+      known = .false.
+    end select
+
+  contains
+
+    pure real(wp) function start(s)
+      real(wp), intent(in) :: s
+      start = modulo(s + form%length, 4*form%length)
+      if (start <= 2*form%length) then
+        start = start - form%length
+      else
+        start = 3*form%length - start
+      end if
+    end function start
+
+    pure real(wp) function slope(s)
+      real(wp), intent(in) :: s
+      slope = merge(1.0_wp, -1.0_wp, modulo(s + form%length, 4*form%length) <= 2*form%length)
+    end function slope
+  end subroutine wave
+
+  !> u = H (x - origin) + shift.
+  pure subroutine linear(form, field, x, values, known)
+    type(closed_form_type), intent(in) :: form
+    character(*), intent(in) :: field
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(out) :: values(:)
+    logical, intent(out) :: known
+    real(wp) :: strain(3, 3), trace
+    integer :: d, c
+
+    d = form%dim
+    strain = (form%gradient + transpose(form%gradient))/2
+    trace = sum([(strain(c, c), c=1, d)])
+    known = .true.
+    values = 0.0_wp
+    select case (field)
+    case ('displacement')
+      values = form%shift(:d) + matmul(form%gradient(:d, :d), x - form%origin(:d))
+    case ('dilatation')
+      values = trace
+    case ('energy_density')
+      values = energy_of(form, strain(:d, :d), trace)
+    case default  ! at rest, whole and in balance
+      continue
+    end select
+  end subroutine linear
+
+  !> Energy density of a strain [J/m3]: mu e:e + lambda tr(e)^2/2, lambda that of the dimension.
+  pure real(wp) function energy_of(form, strain, trace) result(energy)
+    type(closed_form_type), intent(in) :: form
+    real(wp), intent(in) :: strain(:, :)
+    real(wp), intent(in) :: trace
+    real(wp) :: shear, lame
+
+    associate (e => form%modulus, nu => form%ratio)
+      shear = e/(2*(1 + nu))
+      select case (form%dim)
+      case (3); lame = e*nu/((1 + nu)*(1 - 2*nu))
+      case (2); lame = e*nu/(1 - nu**2)
+      case default
+        energy = e*trace**2/2
+        return
+      end select
+    end associate
+    energy = shear*sum(strain**2) + lame*trace**2/2
+  end function energy_of
+
+  !> Kirsch: a hole in an infinite plate under uniaxial stress S, by Kolosov's potentials
+  !> phi = S/4 (z + 2 a^2/z), psi = -S/2 (z + a^2/z - a^4/z^3) with z = x + i y, x along the load:
+  !> 2 mu (u + i v) = kappa phi - z conj(phi') - conj(psi); kappa = (3 - nu)/(1 + nu) holds for both
+  !> planes with the moduli of the plane.
+  pure subroutine hole(form, field, x, values, known)
+    type(closed_form_type), intent(in) :: form
+    character(*), intent(in) :: field
+    real(wp), intent(in) :: x(:)
+    real(wp), intent(out) :: values(:)
+    logical, intent(out) :: known
+    complex(wp) :: z, phi, phi1, phi2, psi, psi1, u, shear_part
+    real(wp) :: mu, kappa, along, across, mean, half_difference
+    integer :: other
+
+    other = 3 - form%axis
+    values = 0.0_wp
+    z = cmplx(x(form%axis) - form%origin(form%axis), x(other) - form%origin(other), wp)
+    known = abs(z) >= form%radius*(1 - 1.0e-9_wp)
+    if (.not. known) return
+    mu = form%modulus/(2*(1 + form%ratio))
+    kappa = (3 - form%ratio)/(1 + form%ratio)
+    associate (s => form%stress, a => form%radius)
+      phi = s/4*(z + 2*a**2/z)
+      phi1 = s/4*(1 - 2*a**2/z**2)
+      phi2 = s*a**2/z**3
+      psi = -s/2*(z + a**2/z - a**4/z**3)
+      psi1 = -s/2*(1 - a**2/z**2 + 3*a**4/z**4)
+    end associate
+    select case (field)
+    case ('displacement')
+      u = (kappa*phi - z*conjg(phi1) - conjg(psi))/(2*mu)
+      values(form%axis) = real(u, wp)
+      values(other) = aimag(u)
+    case ('dilatation')
+      values = (kappa - 1)/mu*real(phi1, wp)
+    case ('energy_density')
+      mean = 2*real(phi1, wp)
+      shear_part = conjg(z)*phi2 + psi1
+      half_difference = real(shear_part, wp)
+      along = mean - half_difference
+      across = mean + half_difference
+      values = (along**2 + across**2 - 2*form%ratio*along*across)/(2*form%modulus) &
+        & + aimag(shear_part)**2/(2*mu)
+    case ('velocity', 'damage', 'force_density')
+      continue
+    case default
+      known = .false.
+    end select
+  end subroutine hole
+
+  !> Displacements and velocities of one wave number k on an endless chain stay of that wave number
+  !> and turn with its frequency: u = u0 cos(omega t) + v0 sin(omega t)/omega at every point.
+  pure subroutine chain(form, field, x, t, value, known)
+    type(closed_form_type), intent(in) :: form
+    character(*), intent(in) :: field
+    real(wp), intent(in) :: x, t
+    real(wp), intent(out) :: value
+    logical, intent(out) :: known
+    integer :: j
+
+    value = 0.0_wp
+    j = nint((x - form%origin(1))/form%spacing + 0.5_wp)
+    known = j >= 1 .and. j <= size(form%u)
+    if (.not. known) return
+    associate (w => form%frequency)
+      select case (field)
+      case ('displacement')
+        value = form%u(j)*cos(w*t) + form%v(j)*sin(w*t)/w
+      case ('velocity')
+        value = form%v(j)*cos(w*t) - form%u(j)*sin(w*t)*w
+      case default
+        known = .false.
+      end select
+    end associate
+  end subroutine chain
+
+  !> omega [1/s] of wave number `k` [1/m] on an endless chain of the horizon `delta` [m]:
+  !> rho omega^2 = 4 E/delta^2 sum_j fraction(j) (1 - cos(k j h))/j over the neighbours j = 1, 2, ..
+  !> on one side; `fraction` are their volume corrections.
+  pure real(wp) function chain_frequency(k, spacing, delta, modulus, density, fraction) &
+      & result(frequency)
+    real(wp), intent(in) :: k, spacing, delta, modulus, density
+    real(wp), intent(in) :: fraction(:)
+    real(wp) :: total
+    integer :: j
+
+    total = 0.0_wp
+    do j = 1, size(fraction)
+      total = total + fraction(j)*(1 - cos(k*j*spacing))/j
+    end do
+    frequency = sqrt(4*modulus/(density*delta**2)*total)
+  end function chain_frequency
+
+end module pd_study_trade_closed_form

@@ -1,0 +1,732 @@
+!> Runs that are stopped and go on: their results are those of a run in one piece, bit for bit.
+!>
+!> With a limit of time that is over at once, a run stops after every step. So these runs are cut
+!> wherever they can be.
+module test_output_checkpoint_restart
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_error, only: fault_type => error_type, status_input, status_interrupted, &
+    & status_no_answer
+  use pd_base_kinds, only: wp, i1, i8
+  use pd_driver, only: run_scene
+  use pd_output_report_begin, only: run_options_type
+  use pd_output_results_datasets, only: read_rows
+  use pd_output_results_files, only: file_bytes, file_exists, make_directory, remove_file
+  use pd_output_results_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
+  use pd_scene_content_types, only: scene_type, unset
+  use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
+  use bodies, only: box_scene, expect_true, youngs_modulus
+  implicit none (type, external)
+  private
+  public :: collect_output_checkpoint_restart
+
+  character(*), parameter :: here = 'build/test_output_checkpoint_restart'
+  real(wp), parameter :: spacing = 1.0e-3_wp
+  character(*), parameter :: fields(3) = [character(12) :: 'displacement', 'velocity', 'damage']
+
+contains
+
+  subroutine collect_output_checkpoint_restart(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('a running crack, cut after every step', test_crack), &
+      & new_unittest('every integrator, cut after every step', test_integrators), &
+      & new_unittest('on two threads', test_two_threads), &
+      & new_unittest('a block in 3D', test_block), &
+      & new_unittest('a list, bonds that break late', test_list), &
+      & new_unittest('temperatures that vary in time', test_heated), &
+      & new_unittest('a relaxation with a growing crack', test_relaxation), &
+      & new_unittest('relaxations that go other ways', test_ways_to_rest), &
+      & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
+      & new_unittest('results beyond the checkpoint are cut back', test_beyond), &
+      & new_unittest('a finished run is prolonged', test_longer), &
+      & new_unittest('a changed scene is refused', test_changed), &
+      & new_unittest('from a damaged checkpoint to the older one', test_damaged), &
+      & new_unittest('without a checkpoint from the beginning', test_none), &
+      & new_unittest('into another folder with other fields', test_elsewhere), &
+      & new_unittest('checkpoints by time, and never', test_minutes), &
+      & new_unittest('a run outlives a failing checkpoint', test_failing)]
+  end subroutine collect_output_checkpoint_restart
+
+  !> A notched plate whose halves fly apart: 30 steps in which the crack grows. A load acts on all
+  !> points, those whose motion is imposed, too.
+  subroutine plate(scene)
+    type(scene_type), intent(out) :: scene
+
+    call box_scene([12, 12], spacing, 0.3_wp, scene)
+    scene%file = 'plate.nml'
+    deallocate (scene%cracks, scene%boundaries, scene%probes, scene%regions, scene%loads, &
+      & scene%output%fields)
+    allocate (scene%cracks(1), scene%boundaries(3), scene%probes(1), scene%regions(2), &
+      & scene%loads(1))
+    scene%regions(1)%name = 'all'
+    scene%regions%shape = 'box'
+    scene%regions(2)%name = 'corner'
+    scene%regions(2)%upper(:2) = 2*spacing
+    scene%loads(1)%region = 'all'
+    scene%loads(1)%body_force(:2) = 1.0e8_wp
+    scene%boundaries(3)%name = 'pin'
+    scene%boundaries(3)%region = 'corner'
+    scene%boundaries(3)%displacement(1) = 0.0_wp
+    scene%cracks(1)%from(:2) = [-1.0_wp, 6.0_wp]*spacing
+    scene%cracks(1)%to(:2) = [4.0_wp, 6.0_wp]*spacing
+    scene%materials(1)%critical_stretch = 0.01_wp
+    scene%horizon%surface_correction = 'energy'
+    scene%boundaries(1)%name = 'bottom'
+    scene%boundaries(1)%side = 'y_min'
+    scene%boundaries(1)%velocity(2) = -40.0_wp
+    scene%boundaries(2)%name = 'top'
+    scene%boundaries(2)%side = 'y_max'
+    scene%boundaries(2)%velocity(2) = 40.0_wp
+    scene%probes(1)%name = 'corner'
+    scene%probes(1)%point(:2) = 0.0_wp
+    scene%probes(1)%fields = [character(64) :: 'velocity', 'dilatation']
+    scene%time%steps = 30
+    scene%output%every = 7
+    scene%output%history_every = 4
+    scene%output%fields = [character(64) :: fields]
+    scene%output%format = 'both'
+  end subroutine plate
+
+  !> Run a scene into a folder of its own.
+  subroutine run(scene, folder, fault, restart, minutes, threads, checkpoint)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: folder
+    type(fault_type), allocatable, intent(out) :: fault
+    logical, intent(in), optional :: restart
+    real(wp), intent(in), optional :: minutes
+    integer, intent(in), optional :: threads
+    character(*), intent(in), optional :: checkpoint
+    type(run_options_type) :: options
+    integer :: before
+
+    options%output_directory = here//'/'//folder
+    options%quiet = .true.
+    options%threads = 1
+    if (present(restart)) options%restart = restart
+    options%overwrite = .not. options%restart
+    if (present(minutes)) options%max_minutes = minutes
+    if (present(threads)) options%threads = threads
+    if (present(checkpoint)) options%checkpoint = checkpoint
+    options%restart_command = 'perifort run plate.nml --restart'
+    before = omp_get_max_threads()
+    call run_scene(scene, options, fault)
+    call omp_set_num_threads(before)
+  end subroutine run
+
+  !> Run a scene in pieces of one step; `pieces` counts them.
+  subroutine run_in_pieces(scene, folder, threads, pieces, error)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: folder
+    integer, intent(in) :: threads
+    integer, intent(out) :: pieces
+    type(error_type), allocatable, intent(inout) :: error
+    integer, parameter :: most = 2000
+    type(fault_type), allocatable :: fault
+
+    do pieces = 1, most
+      call run(scene, folder, fault, restart=pieces > 1, minutes=1.0e-12_wp, threads=threads)
+      if (.not. allocated(fault)) return
+      if (fault%status == status_interrupted) cycle
+      call test_failed(error, fault%message)
+      return
+    end do
+    call test_failed(error, 'the run does not come to its end')
+  end subroutine run_in_pieces
+
+  subroutine accept(error, fault)
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable, intent(in) :: fault
+    if (allocated(error) .or. .not. allocated(fault)) return
+    call test_failed(error, 'refused: '//fault%message)
+  end subroutine accept
+
+  !> The contents of a file.
+  subroutine read_bytes(path, bytes)
+    character(*), intent(in) :: path
+    integer(i1), allocatable, intent(out) :: bytes(:)
+    integer :: unit
+    allocate (bytes(max(0_i8, file_bytes(path))))
+    if (size(bytes) == 0) return
+    open (newunit=unit, file=path, access='stream', form='unformatted', action='read')
+    read (unit) bytes
+    close (unit)
+  end subroutine read_bytes
+
+  !> Fail unless two files have the same bytes.
+  subroutine expect_same_file(error, first, second)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: first, second
+    integer(i1), allocatable :: a(:), b(:)
+
+    if (allocated(error)) return
+    call read_bytes(first, a)
+    call read_bytes(second, b)
+    call check(error, size(a) > 0 .and. size(b) == size(a), 'sizes of '//first//' and '//second)
+    if (allocated(error)) return
+    call check(error, all(a == b), first//' and '//second//' differ')
+  end subroutine expect_same_file
+
+  !> Fail unless two folders hold the same results: all fields of all outputs, in both formats, and
+  !> the history.
+  subroutine expect_same_results(error, first, second, outputs)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: first, second
+    integer, intent(in) :: outputs
+    character(4) :: number
+    integer :: i
+
+    call expect_same_file(error, here//'/'//first//'/history.csv', here//'/'//second// &
+      & '/history.csv')
+    call expect_same_file(error, here//'/'//first//'/plate.pvd', here//'/'//second//'/plate.pvd')
+    do i = 0, outputs - 1
+      write (number, '(i4.4)') i
+      call expect_same_file(error, here//'/'//first//'/plate_00'//number//'.vtu', &
+        & here//'/'//second//'/plate_00'//number//'.vtu')
+    end do
+    write (number, '(i4.4)') outputs
+    call expect_true(error, .not. file_exists(here//'/'//second//'/plate_00'//number//'.vtu'), &
+      & 'there is an output too many')
+    call expect_true(error, .not. file_exists(here//'/'//second//'/plate.unfinished'), &
+      & 'the results are marked as unfinished')
+    call expect_same_hdf5(error, first, second, outputs)
+  end subroutine expect_same_results
+
+  !> The same of the HDF5 files, whose values are compared as bits.
+  subroutine expect_same_hdf5(error, first, second, outputs)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: first, second
+    integer, intent(in) :: outputs
+    real(wp), allocatable :: a(:), b(:)
+    integer :: i
+
+    do i = 1, size(fields)
+      if (allocated(error)) return
+      call values_of(first, trim(fields(i)), outputs, a, error)
+      call values_of(second, trim(fields(i)), outputs, b, error)
+      if (allocated(error)) return
+      call expect_true(error, size(a) == size(b) .and. size(a) > 0, 'sizes of '//fields(i))
+      if (allocated(error)) return
+      call expect_true(error, all(transfer(a, 0_i8, size(a)) == transfer(b, 0_i8, size(b))), &
+        & trim(fields(i))//' differs')
+    end do
+  end subroutine expect_same_hdf5
+
+  !> Times, rows and a field of all outputs in one line of numbers.
+  subroutine values_of(folder, field, outputs, values, error)
+    character(*), intent(in) :: folder, field
+    integer, intent(in) :: outputs
+    real(wp), allocatable, intent(out) :: values(:)
+    type(error_type), allocatable, intent(inout) :: error
+    type(hdf5_file) :: file
+    type(fault_type), allocatable :: fault, late
+    real(wp), allocatable :: times(:), energy(:), table(:, :), line(:)
+    integer(i8) :: steps, rows
+    integer(i8), allocatable :: points(:)
+
+    allocate (values(0))
+    call open_file(here//'/'//folder//'/plate.vtkhdf', .false., file, fault)
+    if (.not. allocated(fault)) call get_attribute(file, '/VTKHDF/Steps', 'NSteps', steps, fault)
+    if (.not. allocated(fault)) call get_attribute(file, '/history', 'rows', rows, fault)
+    if (.not. allocated(fault)) then
+      call check(error, int(steps), outputs, 'outputs of '//folder)
+      allocate (times(steps), energy(rows), points(1))
+      call read_rows(file, '/VTKHDF/NumberOfPoints', 0_i8, points, fault)
+    end if
+    if (.not. allocated(fault)) call read_rows(file, '/VTKHDF/Steps/Values', 0_i8, times, fault)
+    if (.not. allocated(fault)) call read_rows(file, '/history/strain_energy', 0_i8, energy, fault)
+    if (.not. allocated(fault)) then
+      if (field == 'damage') then
+        allocate (line(steps*points(1)))
+        call read_rows(file, '/VTKHDF/PointData/'//field, 0_i8, line, fault)
+      else
+        allocate (table(3, steps*points(1)))
+        call read_rows(file, '/VTKHDF/PointData/'//field, 0_i8, table, fault)
+        line = [table]
+      end if
+    end if
+    if (.not. allocated(fault)) values = [times, energy, line]
+    call close_file(file, late)
+    call accept(error, fault)
+  end subroutine values_of
+
+  !> The number of broken bonds at the end must not be 0: else nothing was tested.
+  subroutine expect_broken(error, folder)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: folder
+    real(wp), allocatable :: values(:)
+    type(hdf5_file) :: file
+    type(fault_type), allocatable :: fault
+    integer(i8) :: rows
+
+    if (allocated(error)) return
+    call open_file(here//'/'//folder//'/plate.vtkhdf', .false., file, fault)
+    if (.not. allocated(fault)) call get_attribute(file, '/history', 'rows', rows, fault)
+    if (.not. allocated(fault)) then
+      allocate (values(rows))
+      call read_rows(file, '/history/broken_bonds', 0_i8, values, fault)
+      call expect_true(error, values(rows) > values(1), 'no bond breaks on the way')
+    end if
+    call accept(error, fault)
+    call close_file(file, fault)
+  end subroutine expect_broken
+
+  subroutine test_crack(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call plate(scene)
+    call run(scene, 'whole', fault, threads=2)
+    call accept(error, fault)
+    call expect_broken(error, 'whole')
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    if (allocated(error)) return
+    call check(error, pieces, scene%time%steps + 1, 'pieces')
+    call expect_same_results(error, 'whole', 'pieces', 6)
+  end subroutine test_crack
+
+  !> The whole on two threads, pieces on one: the steps of all rules have loops of their own.
+  subroutine test_integrators(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: names(4) = [character(16) :: 'velocity_verlet', 'adams_bashforth', &
+      & 'adams_moulton', 'runge_kutta']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: i, pieces
+
+    call plate(scene)
+    scene%time%steps = 12
+    scene%materials(1)%critical_stretch = 0.003_wp
+    do i = 1, size(names)
+      if (allocated(error)) return
+      scene%time%integrator = names(i)
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      call expect_broken(error, 'whole')
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_same_results(error, 'whole', 'pieces', 3)
+    end do
+  end subroutine test_integrators
+
+  !> Pieces on two threads, the whole on one; a few steps, since threads that wait for a core make
+  !> the start of every piece slow.
+  subroutine test_two_threads(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call plate(scene)
+    scene%time%steps = 8
+    scene%materials(1)%critical_stretch = 0.002_wp
+    call run(scene, 'whole', fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 2, pieces, error)
+    call expect_same_results(error, 'whole', 'pieces', 3)
+  end subroutine test_two_threads
+
+  !> A block torn apart, on two threads in one piece and on one in pieces.
+  subroutine test_block(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene, block
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call plate(scene)
+    block = scene
+    block%header%dimension = 3
+    block%bodies(1)%lower = 0.0_wp
+    block%bodies(1)%upper = [6.0_wp, 7.0_wp, 5.0_wp]*spacing
+    block%bodies(1)%points = [6, 7, 5]
+    deallocate (block%cracks)
+    allocate (block%cracks(0))
+    block%probes(1)%point = 0.0_wp
+    block%materials(1)%critical_stretch = 0.002_wp
+    block%time%steps = 9
+    call run(block, 'whole', fault, threads=2)
+    call accept(error, fault)
+    call expect_broken(error, 'whole')
+    if (allocated(error)) return
+    call run_in_pieces(block, 'pieces', 1, pieces, error)
+    call expect_same_results(error, 'whole', 'pieces', 3)
+  end subroutine test_block
+
+  subroutine test_list(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call plate(scene)
+    scene%horizon%family = 'list'
+    scene%materials(1)%model = 'bond_based'
+    scene%materials(1)%poissons_ratio = 1.0_wp/3.0_wp
+    scene%time%breaking = 'after_forces'
+    scene%time%steps = 12
+    scene%materials(1)%critical_stretch = 0.003_wp
+    call run(scene, 'whole', fault)
+    call accept(error, fault)
+    call expect_broken(error, 'whole')
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    call expect_same_results(error, 'whole', 'pieces', 3)
+  end subroutine test_list
+
+  !> Heat that comes in during the steps, explicit and over load steps.
+  subroutine test_heated(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    do i = 1, 2
+      if (allocated(error)) return
+      if (i == 1) then
+        call plate(scene)
+        scene%time%steps = 12
+      else
+        call slow_plate(scene)
+        scene%relaxation%load_steps = 2
+      end if
+      deallocate (scene%initial)
+      allocate (scene%initial(1))
+      scene%initial(1)%temperature_change = 100.0_wp
+      scene%initial(1)%times = [0.0_wp, merge(1.0e-6_wp, 1.0_wp, i == 1)]
+      scene%initial(1)%values = [0.2_wp, 1.0_wp]
+      scene%materials(1)%thermal_expansion = 1.0e-5_wp
+      call run(scene, 'whole', fault)
+      call accept(error, fault)
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_same_results(error, 'whole', 'pieces', 3)
+    end do
+  end subroutine test_heated
+
+  !> Two load steps, in the second of which bonds break and it relaxes again; cut after every
+  !> iteration and every load step, with a load beside the imposed displacements.
+  subroutine test_relaxation(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: solvers(2) = [character(18) :: 'conjugate_gradient', &
+      & 'dynamic_relaxation']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    call slow_plate(scene)
+    do i = 1, size(solvers)
+      if (allocated(error)) return
+      scene%relaxation%solver = solvers(i)
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      call expect_broken(error, 'whole')
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
+      call expect_same_results(error, 'whole', 'pieces', 2)
+      call expect_same_file(error, here//'/whole/iterations.csv', here//'/pieces/iterations.csv')
+    end do
+  end subroutine test_relaxation
+
+  !> A small plate with a notch, drawn apart in load steps.
+  subroutine slow_plate(scene)
+    type(scene_type), intent(out) :: scene
+    integer :: i
+
+    call plate(scene)
+    scene%bodies(1)%upper(:2) = 6*spacing
+    scene%bodies(1)%points(:2) = 6
+    scene%cracks(1)%from(2) = 3*spacing
+    scene%cracks(1)%to(:2) = [2.0_wp, 3.0_wp]*spacing
+    scene%time%method = 'relaxation'
+    scene%relaxation%load_steps = 1
+    scene%relaxation%tolerance = 0.1_wp
+    scene%output%every = 1
+    scene%output%history_every = 5
+    do i = 1, 2
+      scene%boundaries(i)%displacement(2) = merge(-1, 1, i == 1)*0.08_wp*spacing
+      scene%boundaries(i)%velocity = unset
+    end do
+  end subroutine slow_plate
+
+  !> A slender plate that bends by so much that the conjugate gradient leaves it to dynamic
+  !> relaxation; and one that nothing supports. Both cut after every iteration.
+  subroutine test_ways_to_rest(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, way
+
+    do way = 1, 2
+      if (allocated(error)) return
+      call slow_plate(scene)
+      deallocate (scene%cracks, scene%boundaries, scene%regions, scene%loads)
+      allocate (scene%cracks(0), scene%boundaries(2 - way), scene%regions(0), scene%loads(way))
+      scene%bodies(1)%upper(:2) = [12, 2]*spacing
+      scene%bodies(1)%points(:2) = [12, 2]
+      scene%materials(1)%critical_stretch = unset
+      scene%relaxation%load_steps = way
+      scene%loads(1)%side = 'x_max'
+      if (way == 1) then
+        scene%boundaries(1)%side = 'x_min'
+        scene%boundaries(1)%displacement(:2) = 0.0_wp
+        scene%loads(1)%force(2) = 0.125_wp*youngs_modulus*spacing*scene%header%thickness
+        scene%relaxation%tolerance = 2.0e-2_wp
+      else
+        scene%relaxation%tolerance = 1.0e-4_wp
+        scene%loads(2)%side = 'x_min'
+        scene%loads%pressure = -1.0e-3_wp*youngs_modulus
+      end if
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
+      call expect_same_results(error, 'whole', 'pieces', way + 1)
+      if (way == 1) call expect_same_file(error, here//'/whole/warnings.txt', &
+        & here//'/pieces/warnings.txt')
+    end do
+  end subroutine test_ways_to_rest
+
+  !> Checkpoints are written by time amid a load step, too: a relaxation whose iterations are used
+  !> up goes on from there when it is given more, to the end of one that had them from the start.
+  subroutine test_more_iterations(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call slow_plate(scene)
+    scene%relaxation%tolerance = 1.0e-6_wp
+    call run(scene, 'whole', fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    scene%output%checkpoint_minutes = 1.0e-12_wp
+    scene%relaxation%maximum_iterations = 6
+    call run(scene, 'more', fault)
+    call expect_true(error, allocated(fault), 'six iterations were enough')
+    if (allocated(error)) return
+    call check(error, fault%status, status_no_answer)
+    scene%output%checkpoint_minutes = 0.0_wp
+    scene%relaxation%maximum_iterations = 100000
+    call run(scene, 'more', fault, restart=.true.)
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'more', 2)
+  end subroutine test_more_iterations
+
+  !> The older checkpoint of a run that came to its end: everything after it is computed again, in
+  !> files that are longer, and trimmed.
+  subroutine test_beyond(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call plate(scene)
+    call run(scene, 'whole', fault)
+    call accept(error, fault)
+    scene%output%checkpoint_every = 11
+    call run(scene, 'beyond', fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call run(scene, 'beyond', fault, restart=.true., &
+      & checkpoint=here//'/beyond/plate.checkpoint.old')
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'beyond', 6)
+  end subroutine test_beyond
+
+  !> 20 steps, then 30: the state after 20, which was an output as the last one, is none any more.
+  subroutine test_longer(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call plate(scene)
+    call run(scene, 'whole', fault)
+    call accept(error, fault)
+    scene%time%steps = 20
+    scene%output%checkpoint_every = 100
+    call run(scene, 'longer', fault)
+    call accept(error, fault)
+    call run(scene, 'longer', fault, restart=.true.)
+    call accept(error, fault)
+    call expect_true(error, file_exists(here//'/longer/plate_000003.vtu') .and. &
+      & .not. file_exists(here//'/longer/plate_000004.vtu'), 'a complete run is left alone')
+    scene%time%steps = 30
+    call run(scene, 'longer', fault, restart=.true.)
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'longer', 6)
+    scene%time%steps = 25
+    call run(scene, 'longer', fault, restart=.true.)
+    call expect_true(error, allocated(fault), 'a run was made shorter')
+  end subroutine test_longer
+
+  subroutine test_changed(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene, other
+    type(fault_type), allocatable :: fault
+
+    call plate(scene)
+    call run(scene, 'changed', fault, minutes=1.0e-12_wp)
+    other = scene
+    other%materials(1)%density = 7000.0_wp
+    other%boundaries = scene%boundaries(:2)
+    other%output%every = 3
+    call run(other, 'changed', fault, restart=.true.)
+    call expect_true(error, allocated(fault), 'a changed scene goes on')
+    if (allocated(error)) return
+    call check(error, fault%status, status_input)
+    call expect_true(error, index(fault%message, '&material density: 7850.0 -> 7000.0') > 0 .and. &
+      & index(fault%message, '&boundary number 3: gone') > 0 .and. &
+      & index(fault%message, 'every: ') == 0, fault%message)
+    other = scene
+    other%output%every = 3
+    other%header%title = 'another title'
+    call run(other, 'changed', fault, restart=.true.)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call run(other, 'whole', fault)
+    call expect_same_results(error, 'whole', 'changed', 11)
+  end subroutine test_changed
+
+  !> A byte is changed in the newest: it is refused and the older one is offered, which leads to the
+  !> same end, and is whole as long as the next one isn't.
+  subroutine test_damaged(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: newest = here//'/damaged/plate.checkpoint'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer(i1), allocatable :: bytes(:)
+    integer :: unit
+
+    call plate(scene)
+    call run(scene, 'whole', fault)
+    call run(scene, 'damaged', fault, minutes=1.0e-12_wp)
+    call run(scene, 'damaged', fault, restart=.true., minutes=1.0e-12_wp)
+    call read_bytes(newest, bytes)
+    call check(error, size(bytes) > 1000, 'no checkpoint')
+    if (allocated(error)) return
+    bytes(size(bytes)/2) = not(bytes(size(bytes)/2))
+    open (newunit=unit, file=newest, access='stream', form='unformatted', action='write')
+    write (unit) bytes
+    close (unit)
+    call run(scene, 'damaged', fault, restart=.true.)
+    call expect_true(error, allocated(fault), 'a damaged checkpoint is taken')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'checksum') > 0 .and. &
+      & index(fault%message, '--restart '//newest//'.old') > 0, fault%message)
+    call run(scene, 'damaged', fault, restart=.true., minutes=1.0e-12_wp, checkpoint=newest//'.old')
+    call expect_true(error, allocated(fault), 'the older one is refused')
+    if (allocated(error)) return
+    call check(error, fault%status, status_interrupted)
+    call read_bytes(newest//'.old', bytes)
+    call run(scene, 'damaged', fault, restart=.true., checkpoint=newest//'.old', &
+      & minutes=1.0e-12_wp)
+    call expect_true(error, fault%status == status_interrupted, 'the older one was overwritten')
+    call run(scene, 'damaged', fault, restart=.true.)
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'damaged', 6)
+  end subroutine test_damaged
+
+  !> An empty folder; results of a run that was stopped without a checkpoint; complete ones; those
+  !> of another scene.
+  subroutine test_none(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: newest = here//'/none/plate.checkpoint'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call plate(scene)
+    call run(scene, 'whole', fault)
+    call remove_file(here//'/none/plate.vtkhdf')
+    call remove_file(here//'/none/plate.pvd')
+    call remove_file(here//'/none/history.csv')
+    call run(scene, 'none', fault, restart=.true., minutes=1.0e-12_wp)
+    call expect_true(error, file_exists(newest), 'no checkpoint')
+    call remove_file(newest)
+    call run(scene, 'none', fault, restart=.true.)
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'none', 6)
+    call expect_true(error, .not. file_exists(newest), 'a short run leaves a checkpoint')
+    call run(scene, 'none', fault, restart=.true.)
+    call accept(error, fault)
+    scene%materials(1)%density = 7000.0_wp
+    call run(scene, 'none', fault, restart=.true.)
+    call expect_true(error, allocated(fault), 'results of another scene are taken for its own')
+    call expect_same_results(error, 'whole', 'none', 6)
+    call run(scene, 'none', fault, restart=.true., checkpoint=here//'/none/such')
+    call expect_true(error, allocated(fault), 'a checkpoint that is not there')
+  end subroutine test_none
+
+  !> Other fields do not fit into the files that are there, but another folder takes them, with the
+  !> whole history.
+  subroutine test_elsewhere(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: path = here//'/elsewhere/plate.vtkhdf'
+    type(scene_type) :: scene, other
+    type(fault_type), allocatable :: fault
+    type(hdf5_file) :: file
+
+    call plate(scene)
+    call run(scene, 'whole', fault)
+    scene%output%checkpoint_every = 10
+    call run(scene, 'from', fault)
+    other = scene
+    other%output%fields = [character(64) :: 'dilatation']
+    call run(other, 'from', fault, restart=.true., checkpoint=here//'/from/plate.checkpoint.old')
+    call expect_true(error, allocated(fault), 'other fields in the same file')
+    call remove_file(path)
+    call remove_file(here//'/elsewhere/plate.pvd')
+    call remove_file(here//'/elsewhere/history.csv')
+    call run(other, 'elsewhere', fault, restart=.true., &
+      & checkpoint=here//'/from/plate.checkpoint.old')
+    call accept(error, fault)
+    call expect_same_file(error, here//'/whole/history.csv', here//'/elsewhere/history.csv')
+    call open_file(path, .false., file, fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call expect_true(error, object_exists(file, '/VTKHDF/PointData/dilatation') .and. &
+      & object_exists(file, '/points/volume'), 'what is in the file')
+    call close_file(file, fault)
+  end subroutine test_elsewhere
+
+  !> Minutes that are over at once give checkpoints, the last of which is that of the end; without
+  !> minutes there are none, but for an interruption.
+  subroutine test_minutes(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: newest = here//'/minutes/plate.checkpoint'
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call plate(scene)
+    scene%time%steps = 5
+    scene%output%checkpoint_minutes = 1.0e-12_wp
+    call run(scene, 'minutes', fault)
+    call accept(error, fault)
+    call expect_true(error, file_exists(newest) .and. file_exists(newest//'.old'), 'by time')
+    scene%output%checkpoint_minutes = 0.0_wp
+    call run(scene, 'minutes', fault)
+    call accept(error, fault)
+    call expect_true(error, .not. file_exists(newest) .and. .not. file_exists(newest//'.old'), &
+      & 'never, and those of the run before are gone')
+    call run(scene, 'minutes', fault, minutes=1.0e-12_wp)
+    call expect_true(error, file_exists(newest), 'when the run is stopped')
+  end subroutine test_minutes
+
+  !> A folder stands where the checkpoint is to be written.
+  subroutine test_failing(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call plate(scene)
+    call run(scene, 'whole', fault)
+    call make_directory(here//'/failing/plate.checkpoint.part/x', fault)
+    scene%output%checkpoint_every = 20
+    call run(scene, 'failing', fault)
+    call accept(error, fault)
+    call expect_same_results(error, 'whole', 'failing', 6)
+  end subroutine test_failing
+
+end module test_output_checkpoint_restart
