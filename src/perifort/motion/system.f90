@@ -17,7 +17,8 @@ module pd_motion_system
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & renew_forces, break_now, account, energies_type, energies_of, add_loads, inverse_density, velocities_now
+    & renew_forces, break_now, account, energies_type, energies_of, add_loads, inverse_density, &
+    & velocities_now
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type

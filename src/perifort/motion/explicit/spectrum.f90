@@ -135,8 +135,8 @@ contains
 
   !> The largest frequency with the stiffness q of every slot times its `share`, rounded up by at
   !> most half a per cent (by more where that makes too many materials): slots of one material and
-  !> of shares that are rounded to one number have a material of their own in a copy of the model, with
-  !> which a lattice makes its weights anew in every pass.
+  !> of shares that are rounded to one number have a material of their own in a copy of the model,
+  !> with which a lattice makes its weights anew in every pass.
   subroutine stiffened_frequency(system, share, options, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: share(:)               !! at least 1 (n_slots) [-]
