@@ -108,7 +108,7 @@ contains
         call make_room()
         call displace(u, step, w, moved)
         call forces_at(system, moved, kw, options, model)
-        call one_sided_difference(forces, step, kw)
+        call one_sided_difference(1/step, forces, kw)
       case (central)
         allocate (behind(size(w, 1), size(w, 2)))
         call make_room()
@@ -200,17 +200,18 @@ contains
     end do
   end subroutine central_difference
 
-  !> `ahead` = (`here` - `ahead`)/`step`.
-  subroutine one_sided_difference(here, step, ahead)
+  !> `ahead` = `factor` (`here` - `ahead`).
+  subroutine one_sided_difference(factor, here, ahead)
+    real(wp), intent(in) :: factor
     real(wp), intent(in), contiguous :: here(:, :)
-    real(wp), intent(in) :: step
     real(wp), intent(inout), contiguous :: ahead(:, :)
     integer :: k, c
 
     do c = 1, size(ahead, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(here, step, ahead, c) private(k)
+      !$omp parallel do simd schedule(static) default(none) shared(factor, here, ahead, c) &
+      !$omp private(k)
       do k = 1, size(ahead, 1)
-        ahead(k, c) = (here(k, c) - ahead(k, c))/step
+        ahead(k, c) = factor*(here(k, c) - ahead(k, c))
       end do
     end do
   end subroutine one_sided_difference
