@@ -14,8 +14,8 @@ module force_subjects
   use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
     & volume_linear_extended, &
     & volume_exact
-  use pd_force_forces, only: dilatation_pass, force_pass
-  use pd_force_model, only: model_type, new_model
+  use pd_force_forces, only: internal_force
+  use pd_force_model, only: model_type, new_model, options_of
   use pd_force_weights, only: build_weights
   use pd_scene_content_types, only: crack_group
   use bodies, only: noise, youngs_modulus
@@ -320,9 +320,8 @@ contains
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
     allocate (strained(size(u, 1)), source=0_i1)
-    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
+    call internal_force(subject%family, subject%model, options_of(subject%model), u, p, force, &
       & strained)
-    call force_pass(subject%family, subject%model, u, p, force, strained)
   end subroutine fast_force
 
   !> A gradient with all components, also where the dimension has no use for them.

@@ -9,8 +9,8 @@ module test_force_contract
   use pd_family_lattice, only: lattice_family_type
   use pd_family_volume, only: volume_none
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
-  use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
-  use pd_force_model, only: model_type
+  use pd_force_forces, only: energy_pass, internal_force, up_to_marks
+  use pd_force_model, only: model_type, options_of
   use pd_force_polynomial, only: fast_limit, fast_ranges, narrow, wide, single
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use comparisons, only: expect_close, max_abs
@@ -503,11 +503,8 @@ contains
     real(wp), allocatable :: force(:, :), p(:)
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
-    if (subject%model%dilatation) then
-      call dilatation_pass(subject%family, subject%model, u, p, strained)
-    else
-      call force_pass(subject%family, subject%model, u, p, force, strained)
-    end if
+    call internal_force(subject%family, subject%model, options_of(subject%model), u, p, force, &
+      & strained, up_to_marks)
   end subroutine mark
 
   !> Pairs within the horizon whose stretch |y|/|xi| - 1 is beyond the smaller of the ends' limits,
@@ -642,7 +639,7 @@ contains
     do i = 1, size(critical)
       do r = 1, size(ranges)
         model%least_critical = critical(i)
-        associate (limit => fast_limit(model, ranges(r)))
+        associate (limit => fast_limit(model, options_of(model), ranges(r)))
           call expect_true(error, limit >= 0.0_wp .and. limit <= fast_ranges(ranges(r)), &
             & 'limit of e at a critical stretch of '//text_of(critical(i)))
           if (critical(i) < 1.0_wp) call expect_true(error, limit <= 1 - (1 - critical(i))**2, &

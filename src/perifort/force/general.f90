@@ -3,7 +3,7 @@
 module pd_force_general
   use pd_base_kinds, only: wp, i1, i8
   use pd_family_lattice, only: weights_type, lanes
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
   public :: general_dilatation, general_force, general_energy, crushed, mark_slot
@@ -16,8 +16,10 @@ contains
 
   !> Add Gd s Lambda vc V of the first `n` offsets' bonds to `theta` (n_slots), of both ends if
   !> `both`. `weight` (lanes, n) may be less than all bonds.
-  subroutine general_dilatation(model, both, n, weights, weight, first, u, theta, strained)
+  subroutine general_dilatation(model, options, both, n, weights, weight, first, u, theta, &
+    & strained)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     logical, intent(in) :: both
     integer, intent(in) :: n
     type(weights_type), intent(in) :: weights
@@ -32,7 +34,8 @@ contains
     integer :: m
 
     do m = 1, n
-      call deform(model, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, r, along)
+      call deform(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, &
+        & r, along)
       share = weight(:, m)*s*lambda
       theta(first:first + lanes - 1) = theta(first:first + lanes - 1) + share
       j = first + weights%shift(m)
@@ -43,8 +46,9 @@ contains
 
   !> Add what the first `n` offsets' bonds pull to `force` (n_slots, dim), at both ends if `both`.
   !> `stretch` (lanes, n) may be less than all bonds.
-  subroutine general_force(model, both, n, weights, stretch, first, u, p, force, strained)
+  subroutine general_force(model, options, both, n, weights, stretch, first, u, p, force, strained)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     logical, intent(in) :: both
     integer, intent(in) :: n
     type(weights_type), intent(in) :: weights
@@ -59,10 +63,11 @@ contains
     integer :: m, c
 
     do m = 1, n
-      call deform(model, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, r, along)
+      call deform(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, &
+        & r, along)
       magnitude = stretch(:, m)*s
       j = first + weights%shift(m)
-      if (model%dilatation) magnitude = magnitude + (p(first:first + lanes - 1) &
+      if (options%dilatation) magnitude = magnitude + (p(first:first + lanes - 1) &
         & + p(j:j + lanes - 1))*weights%dilatation(:, m)*lambda
       magnitude = magnitude*r
       do c = 1, model%dim
@@ -76,8 +81,9 @@ contains
 
   !> Sums of the bonds of the block at slot `first`, for its energy: (q_k + q_j) Gb s^2 |xi| vc V,
   !> with q_k twice where materials differ, and Gd s Lambda vc V.
-  subroutine general_energy(model, weights, first, u, stretches, theta)
+  subroutine general_energy(model, options, weights, first, u, stretches, theta)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(weights_type), intent(in) :: weights
     integer(i8), intent(in) :: first
     real(wp), intent(in), contiguous :: u(:, :)
@@ -90,8 +96,9 @@ contains
     theta = 0.0_wp
     stretches = 0.0_wp
     do m = 1, weights%n
-      call deform(model, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, r, along)
-      if (model%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
+      call deform(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, &
+        & r, along)
+      if (options%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
       if (size(model%materials) > 1) then
         ! the weights hold q_k + q_j, the energy takes q_k/2 of the slot's own material
         j = first + weights%shift(m)
@@ -107,8 +114,9 @@ contains
 
   !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda,
   !> r = |xi|/|y| and the bond's direction over |xi|.
-  pure subroutine deform(model, first, shift, g, u, s, lambda, r, along)
+  pure subroutine deform(model, options, first, shift, g, u, s, lambda, r, along)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     integer(i8), intent(in) :: first, shift
     real(wp), intent(in) :: g(4)
     real(wp), intent(in), contiguous :: u(:, :)
@@ -132,8 +140,8 @@ contains
     s = e/(1 + sqrt(y))
     r = merge(1/sqrt(max(y, crushed)), 0.0_wp, y > crushed)
     lambda = (1 + x)*r
-    if (.not. model%projected) lambda = 1.0_wp
-    if (model%thermal) then
+    if (.not. options%projected) lambda = 1.0_wp
+    if (options%thermal) then
       s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
     end if
   end subroutine deform

@@ -10,7 +10,7 @@ module pd_force_list
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
     & general_energy, store_weights, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
   private
@@ -55,9 +55,10 @@ contains
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
   !> intact bond beyond its limit.
-  subroutine list_dilatation(family, model, u, p, strained)
+  subroutine list_dilatation(family, model, options, u, p, strained)
     type(list_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
@@ -68,21 +69,21 @@ contains
     integer :: c, k, l
 
     call prepare_list(family, model)
-    call new_loops(family, model, for_theta, loops)
+    call new_loops(family, model, options, for_theta, loops)
     call gather_state(family, u)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, p, strained, loops) private(work, sums, strain, c, k, l)
+    !$omp shared(family, model, options, p, strained, loops) private(work, sums, strain, c, k, l)
     do c = 1, size(family%large)
       call take_up(family, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       strain = little
-      call sum_up(family, model, loops, work, strain, sums)
+      call sum_up(family, model, options, loops, work, strain, sums)
       family%large(c) = strain
       if (strain == beyond) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
-        call general_theta(family, model, work, sums(:, 1))
+        call general_theta(family, model, options, work, sums(:, 1))
         if (model%breaking) call mark(model, work, strained)
       end if
       do l = 1, lanes
@@ -96,9 +97,10 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `list_dilatation` at the same displacements.
-  subroutine list_force(family, model, u, p, force, strained)
+  subroutine list_force(family, model, options, u, p, force, strained)
     type(list_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(inout), contiguous :: force(:, :)
@@ -110,21 +112,21 @@ contains
     integer :: c, d
 
     call prepare_list(family, model)
-    call new_loops(family, model, for_force, loops)
+    call new_loops(family, model, options, for_force, loops)
     call gather_state(family, u, p)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, force, strained, loops) private(work, sums, strain, c, d)
+    !$omp shared(family, model, options, force, strained, loops) private(work, sums, strain, c, d)
     do c = 1, size(family%large)
       call take_up(family, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       ! the pass before has looked at the strain
-      strain = merge(family%large(c), little, model%dilatation)
-      call sum_up(family, model, loops, work, strain, sums)
+      strain = merge(family%large(c), little, options%dilatation)
+      call sum_up(family, model, options, loops, work, strain, sums)
       if (strain == beyond) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
-        call general_force(family, model, work, sums)
+        call general_force(family, model, options, work, sums)
         if (model%breaking) call mark(model, work, strained)
       end if
       do d = 1, model%dim
@@ -139,6 +141,7 @@ contains
     type(model_type), intent(in) :: model
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
+    type(force_options_type) :: options
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
@@ -146,17 +149,18 @@ contains
     integer :: c, k, l
 
     call prepare_list(family, model)
-    call new_loops(family, model, for_energy, loops)
+    options = options_of(model)
+    call new_loops(family, model, options, for_energy, loops)
     call gather_state(family, u)
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model, energy, loops) &
-    !$omp private(work, sums, missed, c, k, l)
+    !$omp parallel do schedule(dynamic, 32) default(none) &
+    !$omp shared(family, model, options, energy, loops) private(work, sums, missed, c, k, l)
     do c = 1, size(family%large)
       call take_up(family, c, work)
-      if (model%thermal) then
+      if (options%thermal) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
         end associate
-        call general_energy(family, model, work, sums(:, 1), sums(:, 2))
+        call general_energy(family, model, options, work, sums(:, 1), sums(:, 2))
       else
         call run_loop(family, work, loops%stored, loops%task, sums, missed)
       end if
@@ -164,7 +168,7 @@ contains
         k = work%first + l - 1
         associate (m => model%materials(model%material(k)))
           energy(k) = sums(l, 1)
-          if (model%dilatation) energy(k) = energy(k) + m%a*(m%t*sums(l, 2))**2
+          if (options%dilatation) energy(k) = energy(k) + m%a*(m%t*sums(l, 2))**2
         end associate
       end do
     end do
@@ -173,26 +177,28 @@ contains
   ! ---------------------------------------------------------------- one cluster
 
   !> The loops of a pass.
-  subroutine new_loops(family, model, pass, loops)
+  subroutine new_loops(family, model, options, pass, loops)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     integer, intent(in) :: pass
     type(loops_type), intent(out) :: loops
 
-    call choose_loop(family%dim, pass, .false., model%dilatation, model%projected, loops%plain)
-    call choose_loop(family%dim, pass, .true., model%dilatation, model%projected, loops%stored)
+    call choose_loop(family%dim, pass, .false., options%dilatation, options%projected, loops%plain)
+    call choose_loop(family%dim, pass, .true., options%dilatation, options%projected, loops%stored)
     call new_task(family, model, loops%task)
-    loops%narrow = fast_limit(model, narrow)
-    loops%wide = fast_limit(model, wide)
+    loops%narrow = fast_limit(model, options, narrow)
+    loops%wide = fast_limit(model, options, wide)
     ! where bonds break early, it serves no more than the narrow one
     if (loops%wide <= loops%narrow) loops%wide = 0.0_wp
   end subroutine new_loops
 
   !> Sums of a cluster by the loops that serve its strain, which is at least `strain`; on return
   !> `strain` says which did, or that none does.
-  subroutine sum_up(family, model, loops, work, strain, sums)
+  subroutine sum_up(family, model, options, loops, work, strain, sums)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(loops_type), intent(in) :: loops
     type(work_type), intent(in) :: work
     integer(i1), intent(inout) :: strain
@@ -201,7 +207,8 @@ contains
     logical :: missed
 
     task = loops%task
-    if (family%plain(work%cluster) == 1_i1) call plain_task(family, model, work%cluster, task)
+    if (family%plain(work%cluster) == 1_i1) &
+      & call plain_task(family, model, options, work%cluster, task)
     if (strain == little .and. loops%narrow > 0.0_wp) then
       task%limit = loops%narrow
       call run_either(family, work, loops, task, sums, missed)

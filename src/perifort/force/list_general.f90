@@ -9,7 +9,7 @@ module pd_force_list_general
   use pd_family_volume, only: volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
   public :: work_type, fill_tables, general_theta, general_force, general_energy, store_weights
@@ -154,39 +154,41 @@ contains
   end subroutine store_weights
 
   !> theta of the lanes.
-  pure subroutine general_theta(family, model, work, theta)
+  pure subroutine general_theta(family, model, options, work, theta)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
     real(wp), intent(out) :: theta(lanes)
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
 
-    call begin(model, work)
+    call begin(model, options, work)
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, work, i, s, lambda, r, y, p)
+      call deform(family, model, options, work, i, s, lambda, r, y, p)
       theta = theta + work%dilatation(:, i)*s*lambda
     end do
   end subroutine general_theta
 
   !> Force density of the lanes (lanes, 3) [N/m3].
-  pure subroutine general_force(family, model, work, force)
+  pure subroutine general_force(family, model, options, work, force)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
     real(wp), intent(out) :: force(lanes, 3)
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i, c
 
-    call begin(model, work)
+    call begin(model, options, work)
     force = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, work, i, s, lambda, r, y, p)
+      call deform(family, model, options, work, i, s, lambda, r, y, p)
       s = work%stretch(:, i)*s
-      if (model%dilatation) &
+      if (options%dilatation) &
         & s = s + (work%own(:, at_p) + p)*work%dilatation(:, i)*work%geometry(:, i)*lambda
       do c = 1, 3
         force(:, c) = force(:, c) + s*r*y(:, c)
@@ -196,39 +198,42 @@ contains
 
   !> Strain energy density of the lanes' stretches [J/m3], from tables with each lane's own q twice,
   !> and theta.
-  pure subroutine general_energy(family, model, work, energy, theta)
+  pure subroutine general_energy(family, model, options, work, energy, theta)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
     real(wp), intent(out) :: energy(lanes), theta(lanes)
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
 
-    call begin(model, work)
+    call begin(model, options, work)
     energy = 0.0_wp
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, work, i, s, lambda, r, y, p)
+      call deform(family, model, options, work, i, s, lambda, r, y, p)
       energy = energy + 0.25_wp*work%stretch(:, i)*s**2/work%geometry(:, i)
-      if (model%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
+      if (options%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
     end do
   end subroutine general_energy
 
-  pure subroutine begin(model, work)
+  pure subroutine begin(model, options, work)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
 
     work%tension = 0.0_wp
     work%compression = 0.0_wp
-    if (model%thermal) work%heat = model%expansion(work%first:work%first + lanes - 1)/2
+    if (options%thermal) work%heat = model%expansion(work%first:work%first + lanes - 1)/2
   end subroutine begin
 
   !> State of a cluster's bonds in its `i`-th pack: mechanical stretch, Lambda, r = |xi|/|y|, the
   !> deformed bond y [m] and p of the other end.
-  pure subroutine deform(family, model, work, i, s, lambda, r, y, p)
+  pure subroutine deform(family, model, options, work, i, s, lambda, r, y, p)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
     integer, intent(in) :: i
     real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), y(lanes, 3), p(lanes)
@@ -249,9 +254,9 @@ contains
     end do
     p = merge(family%at(at_p, j), family%at(at_p, m), from)
     heat = 0.0_wp
-    if (model%thermal) heat = work%heat &
+    if (options%thermal) heat = work%heat &
       & + merge(model%expansion(j), model%expansion(m), from)/2
-    printed = merge(1.0_wp, 0.0_wp, model%projected)
+    printed = merge(1.0_wp, 0.0_wp, options%projected)
     plain = 1 - printed
     !$omp simd private(x, e, length)
     do l = 1, lanes

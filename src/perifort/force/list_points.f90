@@ -9,7 +9,7 @@ module pd_force_list_points
   use pd_family_volume, only: volume_none, volume_linear, volume_linear_extended, volume_exact
   use pd_force_list_fast, only: task_type, no_correction, one_spacing, own_spacing, &
     & stored_fraction
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
   public :: survey, new_task, plain_task
@@ -123,9 +123,10 @@ contains
   end subroutine set_spacing
 
   !> What the loops of plain cluster `c` multiply with.
-  pure subroutine plain_task(family, model, c, task)
+  pure subroutine plain_task(family, model, options, c, task)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     integer, intent(in) :: c
     type(task_type), intent(inout) :: task
     real(wp) :: Gb
@@ -139,7 +140,7 @@ contains
         task%factor = given(given_D)
       end if
       task%q = 2*given(given_q)*Gb/task%factor
-      if (.not. model%dilatation) task%factor = 2*given(given_q)*Gb
+      if (.not. options%dilatation) task%factor = 2*given(given_q)*Gb
     end associate
   end subroutine plain_task
 

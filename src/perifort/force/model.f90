@@ -6,14 +6,23 @@ module pd_force_model
   use pd_body_material, only: material_type, never
   implicit none (type, external)
   private
-  public :: model_type, new_model, no_fail, bond_limit, dilatation_of, no_dilatation, projected, &
-    & unprojected
+  public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit
+  public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
 
   !> Kinds of dilatation that loops are compiled for: the force has none; it has the factor Lambda
   !> as printed; Lambda = 1.
   integer, parameter :: no_dilatation = 1, projected = 2, unprojected = 3
+
+  !> What an evaluation of the forces takes in. It is given by value with each evaluation: whoever
+  !> needs other forces than the model's asks for them so, and the model stays as it is.
+  type :: force_options_type
+    logical :: dilatation = .false.   !! the dilatation's part of the force
+    logical :: projected = .true.     !! Lambda = yhat . xi/|xi| as printed, else Lambda = 1
+    logical :: thermal = .false.      !! thermal strain
+    logical :: double = .false.       !! bonds in double precision, whatever the family has
+  end type force_options_type
 
   type :: model_type
     integer :: dim = 0
@@ -22,8 +31,6 @@ module pd_force_model
     logical :: surface = .false.      !! factors Gd and Gb differ from 1
     logical :: thermal = .false.      !! some temperature change
     logical :: breaking = .false.     !! some bond can fail
-    logical :: for_differences = .false. !! forces are for the differences of a tangent: bonds in
-                                         !! double precision, whatever the family has
     logical :: compression = .false.  !! some bonds break in compression too
     type(material_type), allocatable :: materials(:)
     integer(i2), allocatable :: material(:)  !! of each slot
@@ -74,12 +81,21 @@ contains
     end if
   end subroutine new_model
 
-  !> The kind of dilatation of the model's force.
-  pure integer function dilatation_of(model) result(kind)
+  !> What the forces of the model itself take in.
+  pure type(force_options_type) function options_of(model) result(options)
     type(model_type), intent(in) :: model
 
+    options%dilatation = model%dilatation
+    options%projected = model%projected
+    options%thermal = model%thermal
+  end function options_of
+
+  !> The kind of dilatation of a force.
+  pure integer function dilatation_of(options) result(kind)
+    type(force_options_type), intent(in) :: options
+
     kind = no_dilatation
-    if (model%dilatation) kind = merge(projected, unprojected, model%projected)
+    if (options%dilatation) kind = merge(projected, unprojected, options%projected)
   end function dilatation_of
 
   !> Limits of the mechanical stretch of the bond k-j: it breaks above `upper` or below `lower`.

@@ -7,7 +7,7 @@ module pd_force_weights
   use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, &
     & both_ends, lanes, word_bits
   use pd_family_surface, only: bond_factor
-  use pd_force_model, only: model_type
+  use pd_force_model, only: model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, single
   implicit none (type, external)
   private
@@ -30,7 +30,8 @@ contains
     integer(i8) :: bytes, most
     integer :: b, i, made
 
-    if (fast_limit(model, merge(single, narrow, family%mixed)) <= 0.0_wp) call use_double(family)
+    if (fast_limit(model, options_of(model), merge(single, narrow, family%mixed)) <= 0.0_wp) &
+      & call use_double(family)
     if (family%mixed) call allocate_singles(family, model)
     ! without surface factors, members farther away than a block's own do not count
     if (.not. model%surface) family%class_of = merge(int(model%material, i4), 0_i4, &

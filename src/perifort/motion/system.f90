@@ -6,8 +6,8 @@ module pd_motion_system
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
-  use pd_force_forces, only: dilatation_pass, force_pass, energy_pass
-  use pd_force_model, only: model_type
+  use pd_force_forces, only: internal_force, energy_pass, up_to_marks, after_marks
+  use pd_force_model, only: model_type, options_of
   use pd_force_reference, only: point_dilatation, point_force
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
     & moved_by_velocity
@@ -17,7 +17,8 @@ module pd_motion_system
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & break_now, account, energies_type, energies_of, add_loads, inverse_density, velocities_now
+    & renew_forces, break_now, account, energies_type, energies_of, add_loads, inverse_density, &
+    & velocities_now
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -133,26 +134,34 @@ contains
     early = breaking .and. system%model%breaking .and. .not. system%break_late
     late = breaking .and. system%model%breaking .and. system%break_late
     if (late) call settle_account(system)
-    associate (state => system%state, model => system%model)
-      call impose(system%motions, t, state%u, state%v)
-      call bring_temperature(system, t)
-      if (model%dilatation) then
-        call dilatation_pass(system%family, model, state%u, state%p, system%strained)
-        if (early) then
-          call break_marked(system, t, pair, slots)
-          call renew_dilatation(system, slots)
-        end if
-        call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
+    call impose(system%motions, t, system%state%u, system%state%v)
+    call bring_temperature(system, t)
+    if (early) then
+      call renew_forces(system, up_to_marks)
+      call break_marked(system, t, pair, slots)
+      if (system%model%dilatation) then
+        call renew_dilatation(system, slots)
       else
-        call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
-        if (early) then
-          call break_marked(system, t, pair, slots)
-          call renew_force(system, slots)
-        end if
+        call renew_force(system, slots)
       end if
-    end associate
+      call renew_forces(system, after_marks)
+    else
+      call renew_forces(system)
+    end if
     if (late) call break_marked(system, t, pair, slots)
   end subroutine evaluate
+
+  !> The model's forces at the present displacements into the system's state; nothing is imposed and
+  !> no bond breaks. Of an evaluation's `part`s (`pd_force_forces`) it makes the whole by default.
+  subroutine renew_forces(system, part)
+    type(system_type), intent(inout) :: system
+    integer, intent(in), optional :: part
+
+    associate (state => system%state)
+      call internal_force(system%family, system%model, options_of(system%model), state%u, state%p, &
+        & state%force, system%strained, part)
+    end associate
+  end subroutine renew_forces
 
   !> Bring the thermal strains to time `t`.
   subroutine bring_temperature(system, t)

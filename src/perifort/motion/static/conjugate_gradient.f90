@@ -7,7 +7,6 @@ module pd_motion_static_conjugate_gradient
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
-  use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_static_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
     & check_drowned, rounding_note
@@ -20,7 +19,7 @@ module pd_motion_static_conjugate_gradient
   use pd_motion_static_residual, only: relaxation_type, squared_force
   use pd_motion_static_rigid, only: rigid_type, remove_free_motions
   use pd_motion_static_start, only: move_along
-  use pd_motion_system, only: system_type, add_loads
+  use pd_motion_system, only: system_type, renew_forces
   implicit none (type, external)
   private
   public :: relax_by_conjugate_gradient
@@ -402,16 +401,6 @@ contains
     call renew_forces(system)
     call take_residual(system, t, krylov, sums)
   end subroutine look
-
-  !> Forces at the present displacements, nothing imposed.
-  subroutine renew_forces(system)
-    type(system_type), intent(inout) :: system
-    associate (state => system%state, model => system%model)
-      if (model%dilatation) &
-        & call dilatation_pass(system%family, model, state%u, state%p, system%strained)
-      call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
-    end associate
-  end subroutine renew_forces
 
   !> After a solve with the tangent that has not taken much of the residual: a shorter step.
   subroutine shorten(system, t, krylov, sums, failed)

@@ -4,9 +4,10 @@
 module pd_motion_static_krylov
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: block_length
+  use pd_force_model, only: force_options_type, options_of
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
   use pd_motion_system, only: system_type, add_loads
-  use pd_motion_tangent, only: forces_at
+  use pd_motion_tangent, only: at_rest, forces_at, one_sided, tangent_product, tangent_type
   implicit none (type, external)
   private
   public :: make_room, linearise, take_residual, first_direction
@@ -178,21 +179,20 @@ contains
     krylov%deformed = deformed
     if (.not. deformed) return
     if (.not. allocated(krylov%forces)) allocate (krylov%forces, mold=krylov%origin)
-    call unprojected_forces(system, krylov%origin, krylov%forces)
+    call forces_at(system, krylov%origin, krylov%forces, forces_of(system, deformed))
   end subroutine linearise
 
-  !> Forces with the unprojected dilatation: they are a gradient, and their tangent is symmetric.
-  subroutine unprojected_forces(system, u, force)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: force(:, :)
-    logical :: projected
+  !> What the forces take in whose tangent is the stiffness. Those of a deformed body have the
+  !> unprojected dilatation: they are a gradient, and their tangent is symmetric. At no displacement
+  !> both dilatations have the same, symmetric stiffness, and heat has none.
+  pure type(force_options_type) function forces_of(system, deformed) result(options)
+    type(system_type), intent(in) :: system
+    logical, intent(in) :: deformed
 
-    projected = system%model%projected
-    system%model%projected = .false.
-    call forces_at(system, u, force)
-    system%model%projected = projected
-  end subroutine unprojected_forces
+    options = options_of(system%model)
+    options%projected = .not. deformed
+    if (.not. deformed) options%thermal = .false.
+  end function forces_of
 
   !> `product` = stiffness times `direction`, which may move constrained components, too. Either
   !> costs one evaluation of the forces, the undeformed stiffness (with the bonds that are intact
@@ -201,42 +201,20 @@ contains
   subroutine apply_stiffness(system, krylov)
     type(system_type), intent(inout) :: system
     type(krylov_type), intent(inout) :: krylov
-    logical :: projected, thermal
-    real(wp) :: step
-    integer :: k, c
+    type(tangent_type) :: tangent
 
-    if (.not. krylov%deformed) then
-      ! at no displacement both dilatations have the same, symmetric stiffness, and heat has none
-      projected = system%model%projected
-      thermal = system%model%thermal
-      system%model%projected = .true.
-      system%model%thermal = .false.
-      call forces_at(system, krylov%direction, krylov%product)
-      system%model%projected = projected
-      system%model%thermal = thermal
-      do c = 1, size(krylov%product, 2)
-        !$omp parallel do simd schedule(static) default(none) shared(krylov, c) private(k)
-        do k = 1, size(krylov%product, 1)
-          krylov%product(k, c) = -krylov%product(k, c)
-        end do
-      end do
-      return
+    tangent%options = forces_of(system, krylov%deformed)
+    if (krylov%deformed) then
+      tangent%difference = one_sided
+      tangent%step = difference_size*system%family%rule%delta/krylov%largest
+      call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
+        & krylov%moved, krylov%forces)
+    else
+      ! directions are so small that they need no other factor
+      tangent%difference = at_rest
+      call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
+        & krylov%moved)
     end if
-    if (.not. allocated(krylov%moved)) allocate (krylov%moved, mold=krylov%origin)
-    step = difference_size*system%family%rule%delta/krylov%largest
-    do c = 1, size(krylov%product, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)
-      do k = 1, size(krylov%product, 1)
-        krylov%moved(k, c) = krylov%origin(k, c) + step*krylov%direction(k, c)
-      end do
-    end do
-    call unprojected_forces(system, krylov%moved, krylov%product)
-    do c = 1, size(krylov%product, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)
-      do k = 1, size(krylov%product, 1)
-        krylov%product(k, c) = (krylov%forces(k, c) - krylov%product(k, c))/step
-      end do
-    end do
   end subroutine apply_stiffness
 
   !> Go `length` along the direction: displacements, the forces that follow linearly, the residual.

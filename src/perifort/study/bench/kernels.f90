@@ -10,7 +10,7 @@ module pd_study_bench_kernels
   use pd_family_family, only: family_type
   use pd_family_lattice, only: both_ends, lattice_family_type
   use pd_family_list, only: list_family_type
-  use pd_force_model, only: dilatation_of, no_dilatation, unprojected
+  use pd_force_model, only: dilatation_of, options_of, no_dilatation, unprojected
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: evaluate, system_type
@@ -88,7 +88,8 @@ contains
         timing%bonds = system%family%n_bonds
         timing%bytes = memory_of(system)
         timing%build = set_up%timer%seconds('families') + set_up%timer%seconds('surface correction')
-        timing%flops = flops_of_bond(system%family, dilatation_of(system%model))*timing%bonds
+        timing%flops = flops_of_bond(system%family, dilatation_of(options_of(system%model))) &
+          & *timing%bonds
         timing%traffic = bytes_of_step(system)
         call start_moving(system, scene)
         call time_steps(system, set_up%plan%step, seconds, timing, error)
