@@ -50,13 +50,13 @@ contains
       options%max_minutes = line%max_minutes
       options%restart_command = restart_command(line)
       if (line%command == 'study') then
-        call run_study(line%argument, options, error)
+        call run_study(line%argument, options, error, line%changes)
         return
       else if (line%command == 'choose') then
-        call run_choose(line%argument, options, line%error, line%time, error)
+        call run_choose(line%argument, options, line%error, line%time, error, line%changes)
         return
       end if
-      call read_scene(line%argument, scene, error)
+      call read_scene(line%argument, scene, error, line%changes)
       if (allocated(error)) return
       select case (line%command)
       case ('run')

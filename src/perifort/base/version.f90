@@ -5,7 +5,7 @@ module pd_base_version
   private
   public :: program_version, compiler_name, compiler_flags
 
-  character(*), parameter :: program_version = '0.1.0'  !! the same as in fpm.toml
+  character(*), parameter :: program_version = '0.2.0'  !! the same as in fpm.toml
 
 contains
 

@@ -11,7 +11,7 @@ contains
   !> Whether each of the points `x` (n, dim) lies in the shape. Points on its surface do:
   !> `tolerance` [m] keeps that from depending on rounding. Unset limits do not bound.
   pure function inside(shape, x, tolerance) result(is_inside)
-    type(shape_group), intent(in) :: shape
+    class(shape_group), intent(in) :: shape
     real(wp), intent(in) :: x(:, :)
     real(wp), intent(in) :: tolerance
     logical, allocatable :: is_inside(:)

@@ -9,7 +9,8 @@ module pd_set_up_course_warnings
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: given
-  use pd_scene_format_source, only: source_type, scan_source
+  use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: scene_type, is_set
   implicit none (type, external)
   private
@@ -104,7 +105,7 @@ contains
       & abs(scene%initial%temperature_change) > 0.0_wp)) return
     if (.not. allocated(scene%text)) return
     if (len(scene%text) == 0) return
-    call scan_source(scene%text, scene%file, source, ignored)
+    call scan_scene(scene, source, ignored)
     if (allocated(ignored)) return
     do m = 1, size(scene%materials)
       if (given('material', m, 'thermal_expansion', source)) cycle

@@ -14,8 +14,11 @@ module pd_output_checkpoint_restart
     & scene_of_results, unfinished
   use pd_output_results_files, only: file_exists, in_directory
   use pd_scene_content_compare, only: difference_type, scene_differences
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_groups, only: table_of
+  use pd_scene_content_types, only: group_table, scene_type, is_set
   use pd_scene_content_write, only: scene_text
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_groups_group, only: change_of_the_end, change_of_the_files, change_refused
   implicit none (type, external)
   private
   public :: restart_type, find_restart, put_back
@@ -30,9 +33,6 @@ module pd_output_checkpoint_restart
     character(:), allocatable :: note  !! what the user is told
     logical :: longer = .false.        !! the end of the run may have changed
   end type restart_type
-
-  ! What may change is named by what it does to the results.
-  integer, parameter :: refused = 0, harmless = 1, of_the_end = 2, of_the_files = 3
 
 contains
 
@@ -150,28 +150,43 @@ contains
     end associate
   end subroutine check_build
 
-  !> What a change of a key means to a run that goes on.
-  pure integer function meaning_of(difference) result(meaning)
+  !> What a change of a key means to a run that goes on: its group knows.
+  integer function meaning_of(difference, table) result(meaning)
     type(difference_type), intent(in) :: difference
+    type(group_table), intent(in) :: table
 
-    meaning = refused
-    select case (difference%group)
-    case ('scene')
-      if (difference%key == 'title') meaning = harmless
-    case ('time')
-      if (difference%key == 'steps' .or. difference%key == 'duration') meaning = of_the_end
-    case ('relaxation')
-      if (difference%key == 'maximum_iterations') meaning = harmless
-    case ('output')
-      meaning = harmless
-      if (any(difference%key == [character(9) :: 'fields', 'precision', 'format'])) &
-        & meaning = of_the_files
-    case ('probe')
-      meaning = of_the_files
-    case default
-      continue
-    end select
+    meaning = change_refused
+    associate (place => table%place_of(difference%group))
+      if (place > 0) meaning = table%entries(place)%fresh%change_of(difference%key)
+    end associate
   end function meaning_of
+
+  !> All that may change: `&time steps, duration; &output`.
+  function changeable(table) result(text)
+    type(group_table), intent(in) :: table
+    character(:), allocatable :: text, keys_of_group
+    type(keys_type) :: keys
+    integer :: g, k
+
+    text = ''
+    do g = 1, table%count
+      associate (entry => table%entries(g))
+        keys_of_group = ''
+        ! a group of which all may change is named alone
+        if (entry%fresh%change_of('') == change_refused) then
+          call table%describe(trim(entry%name), keys)
+          do k = 1, keys%count
+            if (entry%fresh%change_of(keys%known(k)%name) == change_refused) cycle
+            if (len(keys_of_group) > 0) keys_of_group = keys_of_group//','
+            keys_of_group = keys_of_group//' '//keys%known(k)%name
+          end do
+          if (len(keys_of_group) == 0) cycle
+        end if
+        if (len(text) > 0) text = text//'; '
+        text = text//'&'//trim(entry%name)//keys_of_group
+      end associate
+    end do
+  end function changeable
 
   !> Compare the scenes: say what has changed, or refuse.
   subroutine compare(directory, stem, scene, restart, error)
@@ -180,20 +195,22 @@ contains
     type(restart_type), intent(inout) :: restart
     type(error_type), allocatable, intent(out) :: error
     type(difference_type), allocatable :: differences(:)
+    type(group_table) :: table
     character(:), allocatable :: wrong, other_files
     integer :: i
 
+    call table_of(scene, table)
     differences = scene_differences(restart%about%kept%scene_text, scene_text(scene))
     wrong = ''
     other_files = ''
     do i = 1, size(differences)
-      select case (meaning_of(differences(i)))
-      case (refused)
+      select case (meaning_of(differences(i), table))
+      case (change_refused)
         wrong = wrong//newline//'  '//differences(i)%text
         cycle
-      case (of_the_end)
+      case (change_of_the_end)
         restart%longer = .true.
-      case (of_the_files)
+      case (change_of_the_files)
         other_files = other_files//newline//'  '//differences(i)%text
       case default
         continue
@@ -202,9 +219,8 @@ contains
     end do
     if (wrong /= '') then
       call fail(error, 'the scene has changed since the checkpoint was written:'//wrong//newline// &
-        & '  may change: &time steps, duration; &relaxation maximum_iterations; &output; '// &
-        & '&probe; title'//newline//'  --overwrite without --restart computes the new scene '// &
-        & 'from the beginning')
+        & '  may change: '//changeable(table)//newline//'  --overwrite without --restart '// &
+        & 'computes the new scene from the beginning')
     else if (other_files /= '' .and. existing_results(directory, stem) /= '') then
       call fail(error, 'the results that are there have another form than the scene asks for:'// &
         & other_files//newline//'  with this checkpoint named and --output, the run goes on '// &

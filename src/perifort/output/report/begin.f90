@@ -8,6 +8,7 @@ module pd_output_report_begin
   use pd_base_version, only: program_version
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_defaults, only: rows_by_cost
   use pd_scene_content_write, only: scene_text
   use pd_body_body, only: body_type, in_point_order
   use pd_set_up_conditions, only: region_mask
@@ -154,7 +155,8 @@ contains
     else
       affordable = row/(share*evaluations(plan%integrator))
       free = real(plan%steps, wp)*bonds/no_cost
-      every = max(1, plan%steps/2000, ceiling(min(affordable, free)))
+      every = max(1, plan%steps/2000)
+      if (rows_by_cost(scene)) every = max(every, ceiling(min(affordable, free)))
     end if
   end function history_interval
 

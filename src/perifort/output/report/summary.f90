@@ -31,6 +31,8 @@ contains
 
     text = ''
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
+    if (scene%header%defaults /= '') &
+      & text = text//line('defaults', 'those of version '//trim(scene%header%defaults))
     text = text//line('points', to_text(system%body%n_points)//' in '// &
       & to_text(scene%header%dimension)//'D')
     text = text//line('horizon', with_unit(system%family%rule%delta, 'm')//', '// &

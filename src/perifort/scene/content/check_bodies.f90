@@ -179,7 +179,7 @@ contains
 
   !> The shape keys of `&remove`, `&region` and `&no_fail`: those of its kind and no others.
   subroutine check_shape(shape, dimension, group, number, error, source)
-    type(shape_group), intent(in) :: shape
+    class(shape_group), intent(in) :: shape
     integer, intent(in) :: dimension
     character(*), intent(in) :: group
     integer, intent(in) :: number

@@ -6,7 +6,9 @@ module pd_scene_content_rules
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: join, nearest_name, newline, to_text
-  use pd_scene_format_source, only: source_type, scan_source, source_fault
+  use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_find, only: find_entry, find_section, given
+  use pd_scene_format_source, only: source_type, source_fault
   use pd_scene_content_types, only: scene_type, is_set, name_length
   implicit none (type, external)
   private
@@ -64,7 +66,7 @@ contains
 
     if (allocated(scene%text)) then
       if (len(scene%text) > 0) then
-        call scan_source(scene%text, scene%file, source, ignored)
+        call scan_scene(scene, source, ignored)
         if (.not. allocated(ignored)) then
           call rule_fault(error, group, number, key, message, note, source)
           return
@@ -94,49 +96,6 @@ contains
     placed%status = error%status
     call move_alloc(placed, error)
   end subroutine place_fault
-
-  !> Whether the file gives this key; false for a scene built in memory.
-  pure logical function given(group, number, key, source)
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
-    type(source_type), intent(in), optional :: source
-    integer :: section
-
-    given = .false.
-    if (.not. present(source)) return
-    section = find_section(source, group, number)
-    if (section > 0) given = find_entry(source, section, key) > 0
-  end function given
-
-  !> The place of the `number`-th group of a name, 0 if there is none.
-  pure integer function find_section(source, group, number) result(section)
-    type(source_type), intent(in) :: source
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    integer :: i, found
-
-    section = 0
-    found = 0
-    do i = 1, source%section_count
-      if (source%sections(i)%name /= group) cycle
-      found = found + 1
-      if (found == number) section = i
-    end do
-  end function find_section
-
-  !> The place of a key in a group, 0 if it is not given.
-  pure integer function find_entry(source, section, key) result(entry)
-    type(source_type), intent(in) :: source
-    integer, intent(in) :: section
-    character(*), intent(in) :: key
-    integer :: i
-
-    entry = 0
-    do i = source%sections(section)%last, source%sections(section)%first, -1
-      if (source%entries(i)%key == key) entry = i
-    end do
-  end function find_entry
 
   !> A name must be one of `names`; blank ones among these do not count.
   subroutine check_known(name, names, kind, group, number, key, error, source)

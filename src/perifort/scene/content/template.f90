@@ -8,6 +8,7 @@ module pd_scene_content_template
   use pd_base_text, only: join, nearest_name, newline
   use pd_scene_content_check, only: allocate_groups
   use pd_scene_content_types, only: scene_type
+  use pd_scene_groups_header, only: own_defaults
   use pd_scene_content_write, only: commented_text
   implicit none (type, external)
   private
@@ -58,6 +59,8 @@ contains
         & join(template_names, ', '), status_usage)
       return
     end select
+    ! a scene that says so has the same defaults in every version to come
+    scene%header%defaults = own_defaults
     text = '! '//trim(scene%header%title)//newline// &
       & "! Values are in SI units. Keys behind a '!' are at the default that is shown, or not "// &
       & 'needed.'//newline// &

@@ -6,7 +6,8 @@ module pd_scene_content_warnings
   use pd_base_text, only: to_text
   use pd_base_warnings, only: warnings_type
   use pd_scene_content_rules, only: given
-  use pd_scene_format_source, only: source_type, scan_source
+  use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: scene_type
   use pd_scene_content_units, only: warn_of_units
   implicit none (type, external)
@@ -35,7 +36,7 @@ contains
     call warn_of_units(scene, edges, warnings)
     if (.not. allocated(scene%text)) return
     if (len(scene%text) == 0) return
-    call scan_source(scene%text, scene%file, source, ignored)
+    call scan_scene(scene, source, ignored)
     if (allocated(ignored)) return
     associate (d => scene%header%dimension)
       call warn_of_keys('scene', [character(20) :: 'plane', 'thickness'], d /= 2, &

@@ -10,7 +10,7 @@ module pd_scene_format_source
   implicit none (type, external)
   private
   public :: source_type, section_type, entry_type, token_type, scan_source, source_fault, &
-    & check_text
+    & add_option, check_text
 
   !> One value as written: a word or the inside of a quoted text.
   type :: token_type
@@ -44,6 +44,7 @@ module pd_scene_format_source
     type(entry_type), allocatable :: entries(:)
     type(token_type), allocatable :: tokens(:)
     integer :: section_count = 0, entry_count = 0, token_count = 0
+    integer :: option_count = 0  !! lines at the end that are options of the command line
   end type source_type
 
   character(*), parameter :: tab = achar(9)
@@ -385,14 +386,33 @@ contains
     last = merge(len(text), column + last - 2, last == 0)
   end function word_end
 
-  !> Make an error with place, line and carets. `line` 0 names the file only.
+  !> Add a line that stands on the command line instead of the file; `line` is its number.
+  subroutine add_option(source, text, line)
+    type(source_type), intent(inout) :: source
+    character(*), intent(in) :: text      !! the option as it is typed, without the shell's quotes
+    integer, intent(out) :: line          !! its number, for places
+    type(line_type), allocatable :: longer(:)
+    integer :: i
+
+    line = size(source%lines) + 1
+    allocate (longer(line))
+    do i = 1, line - 1
+      call move_alloc(source%lines(i)%text, longer(i)%text)
+    end do
+    longer(line)%text = text
+    call move_alloc(longer, source%lines)
+    source%option_count = source%option_count + 1
+  end subroutine add_option
+
+  !> Make an error with place, line and carets. `line` 0 names the file only; lines of options name
+  !> the command line.
   subroutine source_fault(source, line, column, width, message, note, error)
     type(source_type), intent(in) :: source
     integer, intent(in) :: line, column, width
     character(*), intent(in) :: message
     character(*), intent(in) :: note
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: number, text, shown, pad
+    character(:), allocatable :: number, text, shown, pad, place
     integer :: first, last, i, carets
 
     if (line < 1 .or. line > size(source%lines)) then
@@ -402,6 +422,11 @@ contains
       return
     end if
     number = to_text(line)
+    place = source%file//':'//number
+    if (line > size(source%lines) - source%option_count) then
+      number = ''
+      place = 'the command line'
+    end if
     first = 1
     last = len_trim(source%lines(line)%text)
     if (last > longest_shown) then
@@ -423,7 +448,7 @@ contains
     do i = column, min(column + width - 1, last)
       if (.not. continues(source%lines(line)%text(i:i))) carets = carets + 1
     end do
-    text = message//newline//' --> '//source%file//':'//number//newline// &
+    text = message//newline//' --> '//place//newline// &
       & '  '//number//' | '//shown//newline// &
       & repeat(' ', len(number) + 2)//' | '//pad//repeat('^', max(1, carets))
     if (len(note) > 0) text = text//' '//note

@@ -11,9 +11,9 @@ module pd_study_trade_plan
   use pd_body_generate, only: generate_body, horizon_of
   use pd_set_up_memory, only: check_memory
   use pd_motion_explicit_time_step, only: horizon_volume
-  use pd_scene_content_change, only: change_key, find_target, full_name, target_type
+  use pd_scene_content_change, only: apply_changes, change_key, find_target, full_name, target_type
   use pd_scene_format_elements, only: find_elements, growing
-  use pd_scene_format_file, only: read_text_file
+  use pd_scene_format_file, only: line_type, read_text_file
   use pd_scene_content_read, only: read_scene_source
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_scene_format_source, only: scan_source, source_fault, source_type, token_type
@@ -64,24 +64,28 @@ module pd_study_trade_plan
 contains
 
   !> Plan the study in the scene file at `path`.
-  subroutine plan_study(path, plan, error)
+  subroutine plan_study(path, plan, error, changes)
     character(*), intent(in) :: path
     type(plan_type), intent(out) :: plan
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     character(:), allocatable :: text
 
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call plan_from_text(text, path, plan, error)
+    call plan_from_text(text, path, plan, error, changes)
   end subroutine plan_study
 
   !> The same from a text; `name` stands for the file in messages.
-  subroutine plan_from_text(text, name, plan, error)
+  subroutine plan_from_text(text, name, plan, error, changes)
     character(*), intent(in) :: text, name
     type(plan_type), intent(out) :: plan
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
 
     call scan_source(text, name, plan%source, error)
+    if (allocated(error)) return
+    if (present(changes)) call apply_changes(plan%source, changes, error)
     if (allocated(error)) return
     call read_scene_source(plan%source, plan%scene, error)
     if (allocated(error)) return
@@ -93,6 +97,8 @@ contains
     call read_settings(plan, error)
     if (allocated(error)) return
     call read_variables(plan, error)
+    if (allocated(error)) return
+    if (present(changes)) call refuse_both(plan, error)
     if (allocated(error)) return
     call make_trials(plan, error)
   end subroutine plan_from_text
@@ -181,6 +187,28 @@ contains
       end do
     end do
   end subroutine read_variables
+
+  !> A key cannot be set on the command line and varied: the study would take no notice of the
+  !> option.
+  subroutine refuse_both(plan, error)
+    type(plan_type), intent(in) :: plan
+    type(error_type), allocatable, intent(out) :: error
+    integer :: v, e, section
+
+    do v = 1, size(plan%variables)
+      associate (target => plan%variables(v)%target, source => plan%source)
+        section = find_section(source, target%group, target%number)
+        if (section == 0) cycle
+        e = find_entry(source, section, target%key)
+        if (e == 0) cycle
+        if (source%entries(e)%line <= size(source%lines) - source%option_count) cycle
+        call source_fault(source, source%entries(e)%line, source%entries(e)%column, &
+          & source%entries(e)%width, "'"//full_name(source, target)//"' is set here and varied "// &
+          & 'by a group &study', 'set study%values, or leave the option out', error)
+        return
+      end associate
+    end do
+  end subroutine refuse_both
 
   !> The column has the name that the user wrote, in full where that is a column's already.
   subroutine name_column(plan, i, error)

@@ -11,7 +11,7 @@ module pd_study_trade_study
   use pd_base_text, only: newline, to_text
   use pd_output_report_begin, only: output_directory, run_options_type
   use pd_output_results_files, only: file_exists, in_directory, make_directory
-  use pd_scene_format_file, only: resolve_path
+  use pd_scene_format_file, only: line_type, resolve_path
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_study_trade_analytic, only: find_form
   use pd_study_trade_closed_form, only: closed_form_type
@@ -45,13 +45,14 @@ module pd_study_trade_study
 contains
 
   !> The whole command. An interrupt keeps what is done.
-  subroutine run_study(path, options, error)
+  subroutine run_study(path, options, error, changes)
     character(*), intent(in) :: path
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session
 
-    call begin_study(path, options, session, error)
+    call begin_study(path, options, session, error, changes)
     if (.not. allocated(error)) call run_all(session, error)
     if (allocated(error)) return
     call say(session, '')
@@ -76,16 +77,17 @@ contains
   end function plot_command
 
   !> Plan everything, and check and set up every scene before the first run.
-  subroutine begin_study(path, options, session, error)
+  subroutine begin_study(path, options, session, error, changes)
     character(*), intent(in) :: path
     type(run_options_type), intent(in) :: options
     type(session_type), intent(out) :: session
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     integer :: t
 
     session%quiet = options%quiet
     session%terminal = output_is_terminal() .and. .not. options%quiet
-    call plan_study(path, session%plan, error)
+    call plan_study(path, session%plan, error, changes)
     if (allocated(error)) return
     associate (plan => session%plan)
       call resolve_measure(plan%measure, plan%region, plan%norm, plan%scene, plan%source, &
