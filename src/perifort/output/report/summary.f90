@@ -8,7 +8,8 @@ module pd_output_report_summary
   use pd_family_lattice, only: lattice_family_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_output_report_recorder, only: recorder_type, probe_type
+  use pd_output_report_probes, only: probe_type
+  use pd_output_report_recorder, only: recorder_type
   implicit none (type, external)
   private
   public :: summary_before, summary_after, checkpoint_line, memory_of
@@ -211,7 +212,7 @@ contains
     if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
     if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
       & 'load step')//' left to dynamic relaxation by the conjugate gradient')
-    associate (now => recorder%energies)
+    associate (now => recorder%balance%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))
       if (system%model%breaking) then

@@ -14,7 +14,7 @@ module pd_scene_content_groups
   public :: visit_scene_header, visit_body, visit_remove, visit_region, visit_material, &
     & visit_horizon, visit_crack, visit_no_fail, visit_initial, visit_boundary, visit_load, &
     & visit_time, visit_relaxation, visit_output, visit_probe, visit_study
-  public :: group_names, shape_names, field_names, sides, default_fields, default_probe_fields, &
+  public :: group_names, shape_names, sides, default_fields, default_probe_fields, &
     & closed_forms
   public :: group_repeatable, group_purpose, describe_group
 
@@ -22,9 +22,6 @@ module pd_scene_content_groups
     & 'region', 'material', 'horizon', 'crack', 'no_fail', 'initial', 'boundary', 'load', 'time', &
     & 'relaxation', 'output', 'probe', 'study']  !! in the order of the reference
 
-  !> Fields that can be written and probed.
-  character(14), parameter :: field_names(6) = [character(14) :: 'displacement', 'velocity', &
-    & 'damage', 'dilatation', 'force_density', 'energy_density']
   !> The fields written if none are named.
   character(14), parameter :: default_fields(3) = [character(14) :: 'displacement', 'velocity', &
     & 'damage']
@@ -435,7 +432,7 @@ contains
       & 'iterations.csv)', at_least=1, default='max(1, steps/2000), and so many that rows '// &
       & 'take at most 5 % of the time; relaxation: 1', &
       & hidden=group%history_every == 0)
-    call keys%list('fields', group%fields, 'fields to write', field_names, &
+    call keys%list('fields', group%fields, 'fields to write', keys%field_names(), &
       & default="'displacement', 'velocity', 'damage'")
     call keys%key('precision', group%precision, 'of the fields in the file', &
       & allowed=[character(6) :: 'single', 'double'])
@@ -456,7 +453,8 @@ contains
     call keys%key('name', group%name, 'start of its column names', required=.true., word=.true.)
     call keys%key('point', group%point, 'm', 'position; the nearest point is taken', &
       & required=.true.)
-    call keys%list('fields', group%fields, 'fields to note', field_names, default="'displacement'")
+    call keys%list('fields', group%fields, 'fields to note', keys%field_names(), &
+      & default="'displacement'")
   end subroutine visit_probe
 
   !> `&study`

@@ -16,10 +16,11 @@ contains
 
   !> Write the reference of one group, or of all with a heading if `group` is ''. The group may be
   !> given with or without `&`. An error if there is no such group.
-  subroutine write_reference(unit, group, error)
+  subroutine write_reference(unit, group, error, fields)
     integer, intent(in) :: unit
     character(*), intent(in) :: group
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: name, nearest, note
     integer :: g
 
@@ -29,10 +30,10 @@ contains
       call write_heading(unit)
       do g = 1, size(group_names)
         write (unit, '(a)') ''
-        call write_group(unit, trim(group_names(g)))
+        call write_group(unit, trim(group_names(g)), fields)
       end do
     else if (any(group_names == name)) then
-      call write_group(unit, name)
+      call write_group(unit, name, fields)
     else
       nearest = nearest_name(name, group_names)
       note = ''
@@ -58,12 +59,14 @@ contains
   end subroutine write_heading
 
   !> One group: purpose and a table of its keys.
-  subroutine write_group(unit, name)
+  subroutine write_group(unit, name, fields)
     integer, intent(in) :: unit
     character(*), intent(in) :: name
+    character(*), intent(in), optional :: fields(:)
     type(keys_type) :: keys
     integer :: widths(columns), c, k
 
+    call keys%describe_fields(fields)
     call describe_group(keys, name)
     write (unit, '(a)') '## &'//name, '', group_purpose(name)
     if (group_repeatable(name)) then

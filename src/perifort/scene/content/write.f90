@@ -28,16 +28,18 @@ contains
 
   !> The same with comments: meaning, unit and choice of every key; keys at their defaults stand
   !> behind a `!`.
-  function commented_text(scene) result(text)
+  function commented_text(scene, fields) result(text)
     type(scene_type), intent(in) :: scene
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
-    text = all_groups(scene, commented=.true.)
+    text = all_groups(scene, commented=.true., fields=fields)
   end function commented_text
 
   !> Every group in the order of the reference.
-  function all_groups(scene, commented) result(text)
+  function all_groups(scene, commented, fields) result(text)
     type(scene_type), intent(in) :: scene
     logical, intent(in) :: commented
+    character(*), intent(in), optional :: fields(:)
     character(:), allocatable :: text
     type(scene_type) :: copy
     type(keys_type) :: keys
@@ -46,6 +48,7 @@ contains
     ! The visitor may change what it visits, so it gets a copy.
     copy = scene
     text = ''
+    call keys%describe_fields(fields)
     do g = 1, size(group_names)
       do i = 1, number_of_groups(copy, trim(group_names(g)))
         call keys%start(mode_write)
