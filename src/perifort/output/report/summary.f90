@@ -2,10 +2,12 @@
 module pd_output_report_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
+  use pd_base_error, only: internal_fault
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_scene_content_types, only: scene_type
   use pd_family_lattice, only: lattice_family_type
+  use pd_family_list, only: list_family_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_report_probes, only: probe_type
@@ -155,8 +157,10 @@ contains
     select type (family => system%family)
     type is (lattice_family_type)
       if (family%mixed) text = 'mixed: bonds in single precision, state in double'
-    class default  ! others have double precision alone
+    type is (list_family_type)  ! in double precision alone
       continue
+    class default
+      call internal_fault('precision_of does not know a kind of family')
     end select
     if (text /= 'double' .or. scene%header%precision /= 'mixed') return
     text = text//': mixed precision is not available for '
