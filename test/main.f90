@@ -52,8 +52,9 @@ program main
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_explicit_time_step, only: collect_motion_explicit_time_step
   use test_orders, only: collect_orders
+  use test_output_fields_table, only: collect_output_fields_table
+  use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
-  use test_output_report_begin, only: collect_output_report_begin
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
   use test_output_report_contact, only: collect_output_report_contact
   use test_output_results_files, only: collect_output_results_files
@@ -133,10 +134,11 @@ program main
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_explicit_time_step', collect_motion_explicit_time_step)
   call register('orders', collect_orders)
+  call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
-  call register('output_report_begin', collect_output_report_begin)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
   call register('output_report_contact', collect_output_report_contact)
+  call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)
   call register('output_results_layout', collect_output_results_layout)
   call register('output_report_overview', collect_output_report_overview)

@@ -6,6 +6,7 @@ module test_command_line
   use pd_command_line, only: command_line_type, command_names, parse_command_line, &
     & restart_command
   use pd_scene_format_file, only: read_text_file
+  use pd_output_fields_table, only: all_fields, field_table_type
   use pd_scene_content_template, only: template_names, template_text
   use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
   implicit none (type, external)
@@ -253,9 +254,11 @@ contains
   subroutine test_printed(error)
     type(error_type), allocatable, intent(out) :: error
     type(pd_error), allocatable :: fault
+    type(field_table_type) :: fields
     character(:), allocatable :: text
     integer :: i
 
+    fields = all_fields()
     call read_text_file('doc/printed/help.txt', text, fault)
     if (allocated(fault)) then
       call skip_test(error, 'not run in the project''s folder')
@@ -266,7 +269,7 @@ contains
       call compare('help-'//trim(command_names(i))//'.txt', help_text(trim(command_names(i))))
     end do
     do i = 1, size(template_names)
-      call template_text(trim(template_names(i)), text, fault)
+      call template_text(trim(template_names(i)), text, fault, fields%names())
       call compare('template-'//trim(template_names(i))//'.nml', text)
       if (allocated(error)) return
       call check(error, index(help_text('template'), trim(template_names(i))) > 0, &

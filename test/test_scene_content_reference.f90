@@ -2,6 +2,7 @@
 module test_scene_content_reference
   use pd_base_error, only: scene_error => error_type, status_usage
   use pd_scene_format_file, only: read_text_file
+  use pd_output_fields_table, only: all_fields, field_table_type
   use pd_scene_content_groups, only: list_groups
   use pd_scene_content_types, only: group_table
   use pd_scene_format_keys, only: keys_type
@@ -31,9 +32,11 @@ contains
     type(scene_error), allocatable, intent(out) :: found
     integer :: unit, status
     character(1000) :: row
+    type(field_table_type) :: table
 
     open (newunit=unit, status='scratch', action='readwrite')
-    call write_reference(unit, group, found)
+    table = all_fields()
+    call write_reference(unit, group, found, table%names())
     rewind (unit)
     text = ''
     do

@@ -8,12 +8,13 @@ module pd_commands
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
   use pd_driver, only: check_scene, run_scene
+  use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_report_begin, only: run_options_type
   use pd_output_results_hdf5, only: hdf5_version
   use pd_scene_content_read, only: read_scene
   use pd_scene_content_reference, only: write_reference
   use pd_scene_content_template, only: write_template
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: name_length, scene_type
   use pd_study_bench_bench, only: run_bench
   use pd_study_trade_choose, only: run_choose
   use pd_study_limits_limits, only: run_limits
@@ -31,6 +32,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(run_options_type) :: options
     type(scene_type) :: scene
+    type(field_table_type) :: fields
+    character(name_length), allocatable :: names(:)
 
     if (line%help) then
       write (output_unit, '(a)', advance='no') help_text(line%command)
@@ -38,6 +41,8 @@ contains
     end if
 
     call omp_set_num_threads(default_threads())
+    fields = all_fields()
+    names = fields%names()
     select case (line%command)
     case ('run', 'check', 'limits', 'study', 'choose')
       options%output_directory = line%output_directory
@@ -69,9 +74,9 @@ contains
         call internal_fault('execute does not know a command that reads a scene')
       end select
     case ('template')
-      call write_template(output_unit, line%argument, error)
+      call write_template(output_unit, line%argument, error, names)
     case ('reference')
-      call write_reference(output_unit, line%argument, error)
+      call write_reference(output_unit, line%argument, error, names)
     case ('bench')
       call run_bench(line%bench, error)
     case ('version')

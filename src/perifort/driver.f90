@@ -14,18 +14,20 @@ module pd_driver
   use pd_motion_static_relaxation, only: run_relaxation, fill_memory
   use pd_motion_system, only: system_type, account
   use pd_output_report_begin, only: run_options_type, open_recorder, keep_checkpoints, &
-    & schedule_of, output_directory, stem_of, command_of, &
-    & text_of
+    & output_directory, stem_of, command_of, text_of, fields_of
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_bytes, new_about
   use pd_output_checkpoint_earlier, only: mark_complete, refuse_existing
   use pd_output_report_estimate, only: estimate
   use pd_output_report_overview, only: overview
-  use pd_output_report_recorder, only: recorder_type, probe_type, history_columns, &
-    & planned_outputs, planned_rows, schedule_type
+  use pd_output_report_columns, only: history_columns
+  use pd_output_report_probes, only: probe_type
+  use pd_output_report_recorder, only: recorder_type
+  use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of, schedule_type
   use pd_output_checkpoint_restart, only: find_restart, put_back, restart_type
   use pd_output_report_summary, only: checkpoint_line, summary_before, summary_after
   use pd_scene_content_rules, only: place_fault
   use pd_set_up_prepare, only: prepare, set_up_type
+  use pd_output_fields_check, only: check_names
   use pd_output_report_before, only: foresee_output
   implicit none (type, external)
   private
@@ -89,9 +91,10 @@ contains
       call refuse_existing(directory, stem, options%overwrite, error)
       if (allocated(error)) return
     end if
-    call prepare(scene, set_up, error, options%threads)
+    call check_names(scene, fields_of(options), error)
+    if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call foresee_output(scene, set_up, probes, error)
+    call foresee_output(scene, fields_of(options), set_up, probes, error)
     if (allocated(error)) return
     associate (system => set_up%system, plan => set_up%plan)
       start = checksum_of_start(system)
@@ -171,16 +174,17 @@ contains
     type(probe_type), allocatable :: probes(:)
     character(:), allocatable :: text
 
-    call prepare(scene, set_up, error, options%threads)
+    call check_names(scene, fields_of(options), error)
+    if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call foresee_output(scene, set_up, probes, error)
+    call foresee_output(scene, fields_of(options), set_up, probes, error)
     if (allocated(error)) return
     associate (system => set_up%system, plan => set_up%plan)
       call say(options, summary_before(scene, system, plan, probes, set_up%cut, &
         & set_up%warnings, set_up%notes, set_up%team%threads()))
       call say_lines(overview(scene, system, .not. plan%relaxes))
-      call estimate(scene, system, plan, schedule_of(scene, plan, system%family%n_bonds), &
-        & set_up%timer%total(), text)
+      call estimate(scene, fields_of(options), system, plan, &
+        & schedule_of(scene, plan, system%family%n_bonds), set_up%timer%total(), text)
       call say_lines(text)
       call say(options, checkpoint_line(scene, bytes_of_checkpoint(scene, set_up, probes)))
     end associate

@@ -1,7 +1,7 @@
 !> Going on with a run from a checkpoint: which one, whether it fits the scene, and putting the run
 !> back to where it was.
 module pd_output_checkpoint_restart
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type, fail, internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_version, only: compiler_flags, compiler_name, program_version
@@ -212,8 +212,10 @@ contains
         restart%longer = .true.
       case (change_of_the_files)
         other_files = other_files//newline//'  '//differences(i)%text
-      case default
+      case (change_harmless)
         continue
+      case default
+        call internal_fault('compare does not know what a change means')
       end select
       restart%note = restart%note//newline//'  changed         '//differences(i)%text
     end do

@@ -2,6 +2,7 @@
 !> for each material, how many points each group of the scene acts on, and how long the horizon is
 !> beside bodies and cracks.
 module pd_output_report_overview
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
   use pd_scene_content_types, only: scene_type
@@ -49,8 +50,10 @@ contains
       case (2)
         text = line('P wave', with_unit(longitudinal_speed(m), 'm/s', 4)//', plane '// &
           & trim(scene%header%plane))
-      case default
+      case (3)
         text = line('P wave', with_unit(longitudinal_speed(m), 'm/s', 4))
+      case default
+        call internal_fault('material_lines knows one to three dimensions')
       end select
       if (scene%header%dimension > 1) text = text// &
         & line('S wave', with_unit(shear_speed(m), 'm/s', 4))// &

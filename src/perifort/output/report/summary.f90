@@ -2,13 +2,16 @@
 module pd_output_report_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
+  use pd_base_error, only: internal_fault
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_scene_content_types, only: scene_type
   use pd_family_lattice, only: lattice_family_type
+  use pd_family_list, only: list_family_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_output_report_recorder, only: recorder_type, probe_type
+  use pd_output_report_probes, only: probe_type
+  use pd_output_report_recorder, only: recorder_type
   implicit none (type, external)
   private
   public :: summary_before, summary_after, checkpoint_line, memory_of
@@ -156,8 +159,10 @@ contains
     select type (family => system%family)
     type is (lattice_family_type)
       if (family%mixed) text = 'mixed: bonds in single precision, state in double'
-    class default  ! others have double precision alone
+    type is (list_family_type)  ! in double precision alone
       continue
+    class default
+      call internal_fault('precision_of does not know a kind of family')
     end select
     if (text /= 'double' .or. scene%header%precision /= 'mixed') return
     text = text//': mixed precision is not available for '
@@ -213,7 +218,7 @@ contains
     if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
     if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
       & 'load step')//' left to dynamic relaxation by the conjugate gradient')
-    associate (now => recorder%energies)
+    associate (now => recorder%balance%energies)
       text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
       text = text//line('strain energy', with_unit(now%strain, 'J'))
       if (system%model%breaking) then

@@ -12,7 +12,7 @@ module pd_output_results_datasets
     & h5pget_chunk_f, h5pset_chunk_f, h5pset_fill_time_f, h5sclose_f, h5screate_simple_f, &
     & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, &
     & hsize_t
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type, fail, internal_fault
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_output_results_hdf5, only: explain, hdf5_file
   implicit none (type, external)
@@ -67,8 +67,11 @@ contains
       storage_id = H5T_STD_I64LE
     case (storage_i4)
       storage_id = H5T_STD_I32LE
-    case default
+    case (storage_i1)
       storage_id = H5T_STD_I8LE
+    case default
+      storage_id = -1
+      call internal_fault('storage_id does not know a kind of number')
     end select
   end function storage_id
 

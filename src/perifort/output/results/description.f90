@@ -34,8 +34,8 @@ contains
       if (allocated(error)) return
       names(i) = fields(i)%name
       call check_name(names(i), names(:i - 1), error)
-      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3])) &
-        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1 nor 3 components')
+      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3, 6])) &
+        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1, 3 nor 6 components')
     end do
     do i = 1, size(columns)
       if (allocated(error)) return

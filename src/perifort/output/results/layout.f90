@@ -191,6 +191,9 @@ contains
         if (allocated(error)) return
         call put_attribute(file, path, 'units', trim(field%unit), error)
         if (allocated(error)) return
+        if (field%labels /= '') call put_attribute(file, path, 'components', trim(field%labels), &
+          & error)
+        if (allocated(error)) return
         call put_multiples(file, steps//'/PointDataOffsets/'//trim(field%name), s, self%points, &
           & chunk, error)
         if (allocated(error)) return
@@ -209,6 +212,9 @@ contains
       call write_rows(file, path, 0_i8, [0.0_wp], error)
       if (allocated(error)) return
       call put_attribute(file, path, 'units', trim(self%columns(i)%unit), error)
+      if (allocated(error)) return
+      if (self%columns(i)%origin /= '') call put_attribute(file, path, 'origin', &
+        & trim(self%columns(i)%origin), error)
     end do
   end subroutine make_time_series
 
@@ -262,7 +268,7 @@ contains
       & + self%row_capacity*8*size(self%columns)
   end function fixed_bytes
 
-  !> Write `values(n, 3)` as rows of three from row `at` on, turned block by block.
+  !> Write `values(n, components)` as rows of components from row `at` on, turned block by block.
   subroutine write_vectors(file, path, at, values, single, error)
     type(hdf5_file), intent(in) :: file
     character(*), intent(in) :: path
@@ -275,7 +281,7 @@ contains
     integer(i8) :: n, first, count, i
 
     n = size(values, 1, kind=i8)
-    allocate (turned(3, min(n, int(block_rows, i8))))
+    allocate (turned(size(values, 2), min(n, int(block_rows, i8))))
     do first = 0, n - 1, block_rows
       count = min(int(block_rows, i8), n - first)
       do i = 1, count

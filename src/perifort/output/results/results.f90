@@ -62,7 +62,7 @@ module pd_output_results_results
     procedure :: begin_output
     procedure, private :: put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     !> Write one field of the output under way, by its number or name: `values(n)`, or
-    !> `values(n, 3)` for vectors.
+    !> `values(n, components)`.
     generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     procedure :: end_output
     procedure :: add_row

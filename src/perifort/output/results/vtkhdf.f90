@@ -43,7 +43,7 @@ module pd_output_results_vtkhdf
     generic :: put_points => put_points_real, put_points_i4, put_points_i1
     procedure :: begin_output
     procedure, private :: put_scalar, put_vector
-    !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
+    !> Write one field of the output under way: `values(n)` or `values(n, components)`.
     generic :: put_field => put_scalar, put_vector
     procedure :: end_output
     procedure :: append_rows
@@ -304,7 +304,7 @@ contains
     end do
   end subroutine put_scalar
 
-  !> Write field `i` of the output under way: `values(n, 3)`.
+  !> Write field `i` of the output under way: `values(n, components)`.
   subroutine put_vector(self, i, values, error)
     class(vtkhdf_file), intent(inout) :: self
     integer, intent(in) :: i

@@ -35,7 +35,7 @@ module pd_output_results_vtu
     procedure :: sync
     procedure :: begin_output
     procedure, private :: put_scalar, put_vector
-    !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
+    !> Write one field of the output under way: `values(n)` or `values(n, components)`.
     generic :: put_field => put_scalar, put_vector
     procedure :: end_output
     procedure :: output_bytes
@@ -173,20 +173,43 @@ contains
   end subroutine put_cells
 
   !> Begin an array of `bytes` bytes; its encoded bytes start with their number.
-  subroutine begin_array(sink, array, kind_name, name, components, bytes, error)
+  subroutine begin_array(sink, array, kind_name, name, components, bytes, error, labels)
     type(sink_type), intent(inout) :: sink
     type(array_type), intent(inout) :: array
     character(*), intent(in) :: kind_name, name
     integer, intent(in) :: components
     integer(i8), intent(in) :: bytes
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
+    character(:), allocatable :: named
     character(8) :: number
 
+    named = ''
+    if (present(labels)) named = component_names(labels)
     write (number, '(i0)') components
     call sink%put('<DataArray type="'//kind_name//'" Name="'//trim(name) &
-      & //'" NumberOfComponents="'//trim(number)//'" format="binary">', error)
+      & //'" NumberOfComponents="'//trim(number)//'"'//named//' format="binary">', error)
     if (.not. allocated(error)) call put_bytes(sink, array, transfer(bytes, [0_i1]), error)
   end subroutine begin_array
+
+  !> Names of components as attributes. Readers know x, y and z by themselves.
+  pure function component_names(labels) result(text)
+    character(*), intent(in) :: labels            !! parted by blanks
+    character(:), allocatable :: text, rest
+    character(8) :: number
+    integer :: c, blank
+
+    text = ''
+    rest = trim(labels)
+    c = 0
+    do while (rest /= '' .and. labels /= 'x y z')
+      blank = index(rest//' ', ' ')
+      write (number, '(i0)') c
+      text = text//' ComponentName'//trim(number)//'="'//rest(:blank - 1)//'"'
+      rest = trim(adjustl(rest(blank:)))
+      c = c + 1
+    end do
+  end function component_names
 
   subroutine put_bytes(sink, array, bytes, error)
     type(sink_type), intent(inout) :: sink
@@ -214,13 +237,14 @@ contains
     call sink%line(array%text(:length)//'</DataArray>', error)
   end subroutine end_array
 
-  !> Write `values(n, 3)` as an array of vectors, block by block.
-  subroutine put_vectors(sink, name, values, single, error)
+  !> Write `values(n, components)` as an array of vectors, block by block.
+  subroutine put_vectors(sink, name, values, single, error, labels)
     type(sink_type), intent(inout) :: sink
     character(*), intent(in) :: name
     real(wp), intent(in) :: values(:, :)
     logical, intent(in) :: single
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
     type(array_type) :: array
     real(wp), allocatable :: turned(:)
     integer :: n, first, count, width, i
@@ -229,7 +253,7 @@ contains
     width = size(values, 2)
     allocate (turned(width*min(n, block_rows)))
     call begin_array(sink, array, merge('Float32', 'Float64', single), name, width, &
-      & merge(4_i8, 8_i8, single)*n*width, error)
+      & merge(4_i8, 8_i8, single)*n*width, error, labels)
     do first = 0, n - 1, block_rows
       if (allocated(error)) return
       count = min(block_rows, n - first)
@@ -284,7 +308,8 @@ contains
     integer, intent(in) :: i
     real(wp), intent(in) :: values(:, :)
     type(error_type), allocatable, intent(out) :: error
-    call put_vectors(self%sink, trim(self%fields(i)%name), values, self%single, error)
+    call put_vectors(self%sink, trim(self%fields(i)%name), values, self%single, error, &
+      & trim(self%fields(i)%labels))
   end subroutine put_vector
 
   !> Complete the file of the output at `time` [s] and list it.

@@ -10,14 +10,14 @@ module pd_scene_content_groups
     & study_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
-  use pd_scene_groups_output, only: default_fields, field_names
+  use pd_scene_groups_output, only: default_fields
   use pd_scene_groups_probe, only: default_probe_fields
   use pd_scene_groups_shape, only: shape_names
   use pd_scene_groups_study, only: closed_forms
   implicit none (type, external)
   private
   public :: list_groups, table_of
-  public :: shape_names, field_names, sides, default_fields, default_probe_fields, closed_forms
+  public :: shape_names, sides, default_fields, default_probe_fields, closed_forms
 
 contains
 

@@ -17,10 +17,11 @@ contains
 
   !> Write the reference of one group, or of all with a heading if `group` is ''. The group may be
   !> given with or without `&`. An error if there is no such group.
-  subroutine write_reference(unit, group, error, table)
+  subroutine write_reference(unit, group, error, fields, table)
     integer, intent(in) :: unit
     character(*), intent(in) :: group
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)   !! names of the fields of the output
     type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
     type(group_table) :: known
     character(:), allocatable :: name, nearest, note
@@ -37,10 +38,10 @@ contains
       call write_heading(unit)
       do g = 1, known%count
         write (unit, '(a)') ''
-        call write_group(unit, known, g)
+        call write_group(unit, known, g, fields)
       end do
     else if (known%place_of(name) > 0) then
-      call write_group(unit, known, known%place_of(name))
+      call write_group(unit, known, known%place_of(name), fields)
     else
       nearest = nearest_name(name, known%names())
       note = ''
@@ -66,13 +67,15 @@ contains
   end subroutine write_heading
 
   !> One group: purpose and a table of its keys.
-  subroutine write_group(unit, table, place)
+  subroutine write_group(unit, table, place, fields)
     integer, intent(in) :: unit
     type(group_table), intent(in) :: table
     integer, intent(in) :: place            !! of the group in the table
+    character(*), intent(in), optional :: fields(:)
     type(keys_type) :: keys
     integer :: widths(columns), c, k
 
+    call keys%describe_fields(fields)
     call table%describe(trim(table%entries(place)%name), keys)
     write (unit, '(a)') '## &'//trim(table%entries(place)%name), '', table%entries(place)%purpose
     if (table%entries(place)%repeatable) then

@@ -5,7 +5,7 @@
 module pd_scene_content_rules
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail
-  use pd_base_text, only: join, nearest_name, newline, to_text
+  use pd_base_text, only: join, lower_case, nearest_name, newline, to_text
   use pd_scene_content_change, only: scan_scene
   use pd_scene_format_find, only: find_entry, find_section, given
   use pd_scene_format_source, only: source_type, source_fault
@@ -18,15 +18,16 @@ module pd_scene_content_rules
 contains
 
   !> A broken rule, at the key of the `number`-th group of this name, or at the group itself if
-  !> the key is not given or ''.
-  subroutine rule_fault(error, group, number, key, message, note, source)
+  !> the key is not given or ''. With `value`, at that value of the key.
+  subroutine rule_fault(error, group, number, key, message, note, source, value)
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in) :: group
     integer, intent(in) :: number
     character(*), intent(in) :: key, message, note
     type(source_type), intent(in), optional :: source
+    character(*), intent(in), optional :: value
     character(:), allocatable :: text
-    integer :: section, entry
+    integer :: section, entry, token
 
     if (.not. present(source)) then
       text = message//newline//' --> group &'//group//' number '//to_text(number)
@@ -38,6 +39,14 @@ contains
     section = find_section(source, group, number)
     if (section == 0) then
       call source_fault(source, 0, 0, 0, message, note, error)
+      return
+    end if
+    token = 0
+    if (present(value)) token = find_value(source, section, key, value)
+    if (token > 0) then
+      associate (place => source%tokens(token))
+        call source_fault(source, place%line, place%column, place%width, message, note, error)
+      end associate
       return
     end if
     entry = find_entry(source, section, key)
@@ -55,12 +64,13 @@ contains
   !> A fault that only the points of a scene show, at the place of the key that is to blame: as
   !> `rule_fault`, for a scene that has been read before. Its text is scanned again, which costs
   !> nothing that matters once something is wrong.
-  subroutine scene_fault(error, scene, group, number, key, message, note)
+  subroutine scene_fault(error, scene, group, number, key, message, note, value)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type), intent(in) :: scene
     character(*), intent(in) :: group
     integer, intent(in) :: number
     character(*), intent(in) :: key, message, note
+    character(*), intent(in), optional :: value
     type(source_type) :: source
     type(error_type), allocatable :: ignored
 
@@ -68,7 +78,7 @@ contains
       if (len(scene%text) > 0) then
         call scan_scene(scene, source, ignored)
         if (.not. allocated(ignored)) then
-          call rule_fault(error, group, number, key, message, note, source)
+          call rule_fault(error, group, number, key, message, note, source, value)
           return
         end if
       end if
@@ -96,6 +106,22 @@ contains
     placed%status = error%status
     call move_alloc(placed, error)
   end subroutine place_fault
+
+  !> The token of a value of a key in a group, whatever its case; 0 if it is not given.
+  pure integer function find_value(source, section, key, value) result(token)
+    type(source_type), intent(in) :: source
+    integer, intent(in) :: section
+    character(*), intent(in) :: key, value
+    integer :: i
+
+    do i = source%sections(section)%first, source%sections(section)%last
+      if (source%entries(i)%key /= key) cycle
+      do token = source%entries(i)%first, source%entries(i)%last
+        if (lower_case(source%tokens(token)%text) == lower_case(value)) return
+      end do
+    end do
+    token = 0
+  end function find_value
 
   !> A name must be one of `names`; blank ones among these do not count.
   subroutine check_known(name, names, kind, group, number, key, error, source)

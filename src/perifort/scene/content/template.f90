@@ -20,22 +20,24 @@ module pd_scene_content_template
 contains
 
   !> Write the template `name`, the first one if it is ''. An error if there is no such template.
-  subroutine write_template(unit, name, error)
+  subroutine write_template(unit, name, error, fields)
     integer, intent(in) :: unit
     character(*), intent(in) :: name
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
 
-    call template_text(name, text, error)
+    call template_text(name, text, error, fields)
     if (allocated(error)) return
     write (unit, '(a)', advance='no') text
   end subroutine write_template
 
   !> The text of the template `name`, as `write_template` prints it.
-  subroutine template_text(name, text, error)
+  subroutine template_text(name, text, error, fields)
     character(*), intent(in) :: name
     character(:), allocatable, intent(out) :: text
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     type(scene_type) :: scene
     character(:), allocatable :: nearest, note
 
@@ -64,7 +66,7 @@ contains
     text = '! '//trim(scene%header%title)//newline// &
       & "! Values are in SI units. Keys behind a '!' are at the default that is shown, or not "// &
       & 'needed.'//newline// &
-      & '! Templates: '//join(template_names, ', ')//newline//newline//commented_text(scene)
+      & '! Templates: '//join(template_names, ', ')//newline//newline//commented_text(scene, fields)
   end subroutine template_text
 
   !> 1D: a stretched bar, fixed at one end, let go.

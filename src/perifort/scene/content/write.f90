@@ -24,16 +24,18 @@ contains
 
   !> The same with comments: meaning, unit and choice of every key; keys at their defaults stand
   !> behind a `!`.
-  function commented_text(scene) result(text)
+  function commented_text(scene, fields) result(text)
     type(scene_type), intent(in) :: scene
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
-    text = all_groups(scene, commented=.true.)
+    text = all_groups(scene, commented=.true., fields=fields)
   end function commented_text
 
   !> Every group in the order of the reference.
-  function all_groups(scene, commented) result(text)
+  function all_groups(scene, commented, fields) result(text)
     type(scene_type), intent(in) :: scene
     logical, intent(in) :: commented
+    character(*), intent(in), optional :: fields(:)
     character(:), allocatable :: text
     type(scene_type) :: copy
     type(group_table) :: table
@@ -44,6 +46,7 @@ contains
     copy = scene
     call table_of(scene, table)
     text = ''
+    call keys%describe_fields(fields)
     do g = 1, table%count
       do i = 1, table%number_in(copy, g)
         call keys%start(mode_write)

@@ -8,12 +8,12 @@
 module pd_scene_format_keys
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
-  use pd_base_text, only: join, nearest_name, to_text
+  use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_format_convert, only: to_real, to_integer, to_logical, to_string, to_word, &
     & real_range, integer_range, unit_note
   use pd_scene_format_elements, only: find_elements, growing
   use pd_scene_format_source, only: source_type, source_fault
-  use pd_scene_format_given, only: is_set
+  use pd_scene_format_given, only: is_set, name_length
   use pd_scene_format_values, only: exact_text, list_text, quoted_text, vector_text
   implicit none (type, external)
   private
@@ -44,7 +44,10 @@ module pd_scene_format_keys
     type(error_type), allocatable :: fault          !! reading: the first faulty value
     type(error_type), allocatable :: missing        !! reading: the first missing key
     logical, allocatable :: used(:)                 !! reading: entries that a key has taken
+    character(name_length), allocatable :: fields(:)  !! describing: those of the output
   contains
+    procedure :: describe_fields
+    procedure :: field_names
     procedure :: start
     procedure :: start_reading
     procedure :: finish_reading
@@ -71,6 +74,25 @@ contains
     if (allocated(keys%known)) deallocate (keys%known)
     allocate (keys%known(24))
   end subroutine start
+
+  !> Let descriptions list the fields of the output, which the scene does not know by itself.
+  pure subroutine describe_fields(keys, names)
+    class(keys_type), intent(inout) :: keys
+    character(*), intent(in), optional :: names(:)
+
+    if (.not. present(names)) return
+    allocate (keys%fields(size(names)))
+    keys%fields(:) = names
+  end subroutine describe_fields
+
+  !> Names of the fields of the output, none if they are not known.
+  pure function field_names(keys) result(names)
+    class(keys_type), intent(in) :: keys
+    character(name_length), allocatable :: names(:)
+
+    allocate (names(0))
+    if (allocated(keys%fields)) names = keys%fields
+  end function field_names
 
   !> Begin to read group number `section` of a scanned file.
   subroutine start_reading(keys, source, section)
@@ -349,22 +371,25 @@ contains
     end do
   end subroutine real_list
 
-  !> Texts, as many as are given, each one of `allowed`.
-  subroutine text_list(keys, name, value, meaning, allowed, default)
+  !> Names, as many as are given, kept in lower case. `known` is what descriptions list; whether a
+  !> name is known is checked where the whole list is.
+  subroutine text_list(keys, name, value, meaning, known, default)
     class(keys_type), intent(inout) :: keys
     character(*), intent(in) :: name
     ! allow(C072): a text is assigned only after its length has been checked.
     character(*), allocatable, intent(inout) :: value(:)
     character(*), intent(in) :: meaning
-    character(*), intent(in) :: allowed(:)
+    character(*), intent(in) :: known(:)
     character(*), intent(in), optional :: default
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown, message, note
+    character(:), allocatable :: shown, listed, message, note
     integer :: i
 
     shown = ''
     if (allocated(value)) shown = list_text(value)
-    call keys%note_key(name, 'text list', '', meaning, shown, list_text(allowed), default=default)
+    listed = ''
+    if (size(known) > 0) listed = list_text(known)
+    call keys%note_key(name, 'text list', '', meaning, shown, listed, default=default)
     if (keys%mode /= mode_read) return
     call keys%find(name, growing, slots)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
@@ -372,9 +397,10 @@ contains
     allocate (value(size(slots)))
     do i = 1, size(slots)
       value(i) = ''
-      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, allowed)
+      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, word=.true.)
       call keys%complain(slots(i), message, note)
       if (allocated(keys%fault)) return
+      value(i) = lower_case(value(i))
       if (any(value(:i - 1) == value(i))) then
         call keys%complain(slots(i), "'"//trim(value(i))//"' stands twice in '"//name//"'", &
           & 'once is enough')

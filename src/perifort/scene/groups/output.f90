@@ -6,11 +6,8 @@ module pd_scene_groups_output
   use pd_scene_groups_group, only: group_type, change_harmless, change_of_the_files
   implicit none (type, external)
   private
-  public :: output_group, field_names, default_fields
+  public :: output_group, default_fields
 
-  !> Fields that can be written and probed.
-  character(14), parameter :: field_names(6) = [character(14) :: 'displacement', 'velocity', &
-    & 'damage', 'dilatation', 'force_density', 'energy_density']
   !> The fields written if none are named.
   character(14), parameter :: default_fields(3) = [character(14) :: 'displacement', 'velocity', &
     & 'damage']
@@ -46,7 +43,7 @@ contains
       & 'iterations.csv)', at_least=1, default='max(1, steps/2000), and so many that rows '// &
       & 'take at most 5 % of the time; relaxation: 1', &
       & hidden=group%history_every == 0)
-    call keys%list('fields', group%fields, 'fields to write', field_names, &
+    call keys%list('fields', group%fields, 'fields to write', keys%field_names(), &
       & default="'displacement', 'velocity', 'damage'")
     call keys%key('precision', group%precision, 'of the fields in the file', &
       & allowed=[character(6) :: 'single', 'double'])

@@ -4,7 +4,6 @@ module pd_scene_groups_probe
   use pd_scene_format_given, only: name_length, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type, change_of_the_files
-  use pd_scene_groups_output, only: field_names
   implicit none (type, external)
   private
   public :: probe_group, default_probe_fields
@@ -32,7 +31,8 @@ contains
     call keys%key('name', group%name, 'start of its column names', required=.true., word=.true.)
     call keys%key('point', group%point, 'm', 'position; the nearest point is taken', &
       & required=.true.)
-    call keys%list('fields', group%fields, 'fields to note', field_names, default="'displacement'")
+    call keys%list('fields', group%fields, 'fields to note', keys%field_names(), &
+      & default="'displacement'")
   end subroutine visit
 
   !> Probes are columns of the history.

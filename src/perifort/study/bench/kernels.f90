@@ -314,7 +314,7 @@ contains
         if (both) bytes = bytes + points*16*(d + merge(1, 0, system%model%dilatation))
       end if
     class default
-      continue
+      call internal_fault('bytes_of_step does not know a kind of family')
     end select
   end function bytes_of_step
 

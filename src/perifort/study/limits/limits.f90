@@ -8,7 +8,8 @@ module pd_study_limits_limits
   use pd_base_clock, only: duration_text, wall_time
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text, with_unit
-  use pd_output_report_begin, only: run_options_type
+  use pd_output_fields_check, only: check_names
+  use pd_output_report_begin, only: fields_of, run_options_type
   use pd_set_up_prepare, only: prepare, set_up_type
   use pd_motion_watch_fault, only: place
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
@@ -68,7 +69,8 @@ contains
     explicit%time%limit = 'equation'
     explicit%time%method = 'explicit'
     if (scene%time%method == 'relaxation') explicit%time%steps = 1
-    call prepare(explicit, set_up, error)
+    call check_names(scene, fields_of(options), error)
+    if (.not. allocated(error)) call prepare(explicit, set_up, error)
     if (allocated(error)) return
     associate (system => set_up%system)
       call choose_threads(options, system)

@@ -3,7 +3,7 @@
 !> What the program measures of a body's motion, it measures on this.
 module pd_study_limits_vibration
   use pd_base_kinds, only: wp, i1
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_numbers, only: noise
   use pd_body_body, only: body_type, allocate_points, in_point_order
   use pd_body_material, only: material_type, never
@@ -66,10 +66,12 @@ contains
         & family%grids(1)%alignment > lanes, lattice, error)
       if (allocated(error)) return
       call move_alloc(lattice, twin%family)
-    class default  ! a list holds any points
+    type is (list_family_type)
       allocate (list)
       call new_list_family(twin%body, rule, list)
       call move_alloc(list, twin%family)
+    class default
+      call internal_fault('free_body does not know a kind of family')
     end select
     call new_model(twin%body, materials, system%model%projected, &
       & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), twin%model)
@@ -79,8 +81,10 @@ contains
     select type (family => twin%family)
     type is (lattice_family_type)
       call build_weights(family, twin%model)
-    class default  ! lists prepare themselves in their first pass
+    type is (list_family_type)  ! prepares itself in its first pass
       continue
+    class default
+      call internal_fault('free_body does not know a kind of family')
     end select
     if (cut) call copy_cuts(system, twin)
     call hold(system, twin)

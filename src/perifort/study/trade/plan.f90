@@ -89,6 +89,7 @@ contains
     if (allocated(error)) return
     call read_scene_source(plan%source, plan%scene, error)
     if (allocated(error)) return
+    plan%scene%text = text
     if (size(plan%scene%studies) == 0) then
       call source_fault(plan%source, 0, 0, 0, 'the scene has no group &study', &
         & "expected at least one, with 'vary', 'values', 'measure' and 'against'", error)

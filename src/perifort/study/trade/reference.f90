@@ -4,12 +4,13 @@ module pd_study_trade_reference
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: lower_case, to_text
   use pd_family_cells, only: cells_type
+  use pd_output_fields_field, only: rank_scalar
   use pd_output_results_datasets, only: get_shape, read_rows
   use pd_output_results_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, &
     & open_file, start_hdf5
   use pd_scene_format_table, only: column_of, read_table, table_type
   use pd_scene_content_types, only: name_length
-  use pd_study_trade_closed_form, only: closed_form_type, components_of, field_at
+  use pd_study_trade_closed_form, only: closed_form_type, field_at
   use pd_study_trade_interpolate, only: find_stencil, grid_of_places, rows_around, stencil_type
   use pd_study_trade_measure, only: difference, measure_type, of_column, of_field, record_type
   implicit none (type, external)
@@ -31,7 +32,7 @@ contains
     integer :: p, r
 
     allocate (reference, mold=record%values)
-    allocate (values(components_of(measure%field, form%dim)))
+    allocate (values(measure%field%components(form%dim)))
     allocate (of(size(record%x, 2), record%rows))
     reference = 0.0_wp
     do r = 1, record%rows
@@ -142,7 +143,6 @@ contains
     character(*), intent(in) :: probe
     integer, intent(in) :: dim
     character(name_length), allocatable :: names(:)
-    character(*), parameter :: directions = 'xyz'
     character(:), allocatable :: stem
     integer :: c
 
@@ -150,16 +150,18 @@ contains
       names = [character(name_length) :: measure%name]
       return
     end if
-    stem = measure%field
+    stem = trim(measure%field%name)
     if (len(probe) > 0) stem = probe//'_'//stem
-    if (measure%component > 0) then
-      names = [character(name_length) :: stem//'_'//directions(measure%component: &
-        & measure%component)]
-    else if (components_of(measure%field, 2) == 1) then
-      names = [character(name_length) :: stem]
-    else
-      names = [character(name_length) :: (stem//'_'//directions(c:c), c=1, dim)]
-    end if
+    associate (field => measure%field)
+      if (measure%component > 0) then
+        names = [character(name_length) :: stem//'_'//field%component_name(measure%component, dim)]
+      else if (field%rank == rank_scalar) then
+        names = [character(name_length) :: stem]
+      else
+        names = [character(name_length) :: (stem//'_'//field%component_name(c, dim), &
+          & c=1, field%components(dim))]
+      end if
+    end associate
   end function columns_of
 
   !> A table of text.
@@ -278,12 +280,14 @@ contains
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: x(:, :), values(:, :), line(:), times(:)
     integer(i8), allocatable :: layer(:)
-    integer(i8) :: outputs, n
+    character(:), allocatable :: path_of_field
+    integer(i8) :: outputs, n, rows
     integer, allocatable :: kept(:)
     integer :: components, i
 
-    if (.not. object_exists(file, '/VTKHDF/PointData/'//measure%field)) then
-      call fail(error, "the results in '"//path//"' have no field '"//measure%field//"'")
+    path_of_field = '/VTKHDF/PointData/'//trim(measure%field%name)
+    if (.not. object_exists(file, path_of_field)) then
+      call fail(error, "the results in '"//path//"' have no field '"//trim(measure%field%name)//"'")
       return
     end if
     call get_attribute(file, '/VTKHDF/Steps', 'NSteps', outputs, error)
@@ -294,13 +298,15 @@ contains
     if (.not. allocated(error)) call read_rows(file, '/points/layer', 0_i8, layer, error)
     if (.not. allocated(error)) call read_rows(file, '/VTKHDF/Steps/Values', 0_i8, times, error)
     if (allocated(error)) return
-    if (components_of(measure%field, 2) == 1) then
+    call get_shape(file, path_of_field, components, rows, error)
+    if (allocated(error)) return
+    if (components == 1) then
       allocate (line(n))
-      call read_rows(file, '/VTKHDF/PointData/'//measure%field, (outputs - 1)*n, line, error)
+      call read_rows(file, path_of_field, (outputs - 1)*n, line, error)
       values = reshape(line, [1, size(line)])
     else
-      allocate (values(3, n))
-      call read_rows(file, '/VTKHDF/PointData/'//measure%field, (outputs - 1)*n, values, error)
+      allocate (values(components, n))
+      call read_rows(file, path_of_field, (outputs - 1)*n, values, error)
     end if
     if (allocated(error)) return
     kept = pack([(i, i=1, int(n))], layer == 0)
@@ -308,7 +314,7 @@ contains
     record%time = [times(outputs)]
     record%x = x(:dim, kept)
     if (measure%component > 0) values = values(measure%component:measure%component, :)
-    components = min(size(values, 1), dim)
+    components = min(size(values, 1), measure%field%components(dim))
     record%values = reshape(values(:components, kept), [components, size(kept), 1])
     call guess_spacing(record)
   end subroutine read_field

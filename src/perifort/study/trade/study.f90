@@ -9,7 +9,9 @@ module pd_study_trade_study
   use pd_base_numbers, only: ascending
   use pd_base_shell, only: program_command, quoted
   use pd_base_text, only: newline, to_text
-  use pd_output_report_begin, only: output_directory, run_options_type
+  use pd_output_fields_check, only: check_names
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_report_begin, only: fields_of, output_directory, run_options_type
   use pd_output_results_files, only: file_exists, in_directory, make_directory
   use pd_scene_format_file, only: line_type, resolve_path
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
@@ -31,6 +33,7 @@ module pd_study_trade_study
   !> A study while it runs.
   type :: session_type
     type(plan_type) :: plan
+    type(field_table_type) :: fields            !! that the scenes may name
     type(measure_type) :: measure
     type(outcome_type), allocatable :: outcomes(:)
     type(record_type) :: truth                  !! finest run or file
@@ -89,9 +92,12 @@ contains
     session%terminal = output_is_terminal() .and. .not. options%quiet
     call plan_study(path, session%plan, error, changes)
     if (allocated(error)) return
+    session%fields = fields_of(options)
     associate (plan => session%plan)
-      call resolve_measure(plan%measure, plan%region, plan%norm, plan%scene, plan%source, &
-        & session%measure, error)
+      call check_names(plan%scene, session%fields, error)
+      if (allocated(error)) return
+      call resolve_measure(plan%measure, plan%region, plan%norm, plan%scene, session%fields, &
+        & plan%source, session%measure, error)
       if (allocated(error)) return
       call find_truth(session, error)
       if (allocated(error)) return
@@ -216,7 +222,7 @@ contains
           allocate (form)
           call find_form(plan%analytic, plan%trials(t)%scene, form, reason)
         end if
-        call check_trial(plan%trials(t)%scene, session%measure, form, error)
+        call check_trial(plan%trials(t)%scene, session%fields, session%measure, form, error)
         if (.not. allocated(error)) cycle
         error%message = settings_text(plan, t)//': '//error%message
         return
@@ -281,8 +287,8 @@ contains
       ! can be found in it: their points are at most half a cell's diagonal away
       around = 0.0_wp
       if (truth) around = session%around + 3*plan%trials(t)%spacing
-      call run_trial(plan%trials(t)%scene, session%measure, around, session%terminal, form, &
-        & outcome, record, error)
+      call run_trial(plan%trials(t)%scene, session%fields, session%measure, around, &
+        & session%terminal, form, outcome, record, error)
       if (allocated(error)) return
       outcome%truth = truth
       if (outcome%done) call judge(session, record, form, t, error)
