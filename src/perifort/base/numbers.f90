@@ -13,7 +13,8 @@ contains
 
   !> Sum of `a*b` in blocks of fixed length, added in order.
   function inner(a, b) result(sum_of_all)
-    real(wp), intent(in), contiguous :: a(:), b(:)
+    real(wp), intent(in), contiguous :: a(:)  !! (n), one factor of each term
+    real(wp), intent(in), contiguous :: b(:)  !! (n), the other factor
     real(wp) :: sum_of_all
     real(wp), allocatable :: part(:)
     integer :: block, blocks, first, last
@@ -30,10 +31,11 @@ contains
     sum_of_all = sum(part)
   end function inner
 
-  !> The next number in (-1, 1) of a sequence that is the same on every machine. `state` starts it,
-  !> from 1 to 2147483646, and is changed.
+  !> The next number in (-1, 1) of a sequence that is the same on every machine: the multiplicative
+  !> generator of Park and Miller (1988), 16807 modulo 2^31 - 1. `state` starts it, from 1 to
+  !> 2147483646, and is changed.
   real(wp) function noise(state)
-    integer, intent(inout) :: state
+    integer, intent(inout) :: state  !! of the sequence, 1 to 2147483646; the next one on return
     ! Schrage's way to keep 16807*state mod 2^31-1 within 32 bits
     state = 16807*mod(state, 127773) - 2836*(state/127773)
     if (state <= 0) state = state + 2147483647
@@ -42,7 +44,7 @@ contains
 
   !> The numbers of `values` in ascending order of value.
   pure function ascending(values) result(order)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)  !! (n), without NaN
     integer :: order(size(values))
     integer :: i, j, this
 
@@ -59,7 +61,7 @@ contains
 
   !> The middle value, of an even number the lower of the two.
   pure real(wp) function median(values)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)  !! (n), at least one, without NaN
     integer :: order(size(values))
     order = ascending(values)
     median = values(order((size(values) + 1)/2))

@@ -46,8 +46,9 @@ contains
 
   !> An empty body with room for `n` points, slots in point order.
   pure subroutine allocate_points(body, dim, n)
-    type(body_type), intent(out) :: body
-    integer, intent(in) :: dim, n
+    type(body_type), intent(out) :: body  !! positions, volumes and numbers are 0, grids none
+    integer, intent(in) :: dim            !! of the scene: 1, 2 or 3
+    integer, intent(in) :: n              !! number of points
     integer :: k
 
     body%dim = dim
@@ -63,8 +64,8 @@ contains
   !> Put the points of `more` behind those of `body`; both in point order, grids are those of
   !> `body`.
   pure subroutine append_points(body, more)
-    type(body_type), intent(inout) :: body
-    type(body_type), intent(in) :: more
+    type(body_type), intent(inout) :: body  !! in point order; with the points of both on return
+    type(body_type), intent(in) :: more     !! in point order, of the same dimension
     real(wp), allocatable :: x(:, :)
     integer :: n, k
 
@@ -87,8 +88,8 @@ contains
 
   !> Drop the points where `keep` is false; the body is in point order before and after.
   pure subroutine keep_points(body, keep)
-    type(body_type), intent(inout) :: body
-    logical, intent(in) :: keep(:)
+    type(body_type), intent(inout) :: body  !! in point order; without the dropped points on return
+    logical, intent(in) :: keep(:)          !! (n_points), whether the point stays
     integer(i4), allocatable :: kept(:)
     integer :: k
 
@@ -101,8 +102,10 @@ contains
 
   !> Move every point into its slot. `point(slot)` is 0 for dead slots.
   pure subroutine arrange(body, point)
-    type(body_type), intent(inout) :: body
-    integer(i4), intent(in) :: point(:)
+    type(body_type), intent(inout) :: body  !! in point order; with its slots and their order on
+                                            !! return
+    integer(i4), intent(in) :: point(:)     !! (n_slots), the point that each slot takes; 0: a dead
+                                            !! slot
     integer :: s
 
     call gather_all(body, point)
@@ -163,10 +166,11 @@ contains
     call move_alloc(gathered, values)
   end subroutine gather_small
 
+  !> Real numbers of slots in the order of points.
   pure subroutine reals_in_point_order(body, values, ordered)
-    type(body_type), intent(in) :: body
-    real(wp), intent(in) :: values(:)
-    real(wp), intent(inout) :: ordered(:)
+    type(body_type), intent(in) :: body    !! gives the slot of each point
+    real(wp), intent(in) :: values(:)      !! (n_slots), in the order of slots
+    real(wp), intent(inout) :: ordered(:)  !! (n_points), in the order of points on return
     integer :: i
 
     do i = 1, body%n_points
@@ -174,10 +178,11 @@ contains
     end do
   end subroutine reals_in_point_order
 
+  !> Short integers of slots in the order of points.
   pure subroutine integers_in_point_order(body, values, ordered)
-    type(body_type), intent(in) :: body
-    integer(i2), intent(in) :: values(:)
-    integer(i4), intent(inout) :: ordered(:)
+    type(body_type), intent(in) :: body       !! gives the slot of each point
+    integer(i2), intent(in) :: values(:)      !! (n_slots), in the order of slots
+    integer(i4), intent(inout) :: ordered(:)  !! (n_points), in the order of points on return
     integer :: i
 
     do i = 1, body%n_points
