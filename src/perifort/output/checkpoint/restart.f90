@@ -18,7 +18,8 @@ module pd_output_checkpoint_restart
   use pd_scene_content_types, only: group_table, scene_type, is_set
   use pd_scene_content_write, only: scene_text
   use pd_scene_format_keys, only: keys_type
-  use pd_scene_groups_group, only: change_of_the_end, change_of_the_files, change_refused
+  use pd_scene_groups_group, only: change_harmless, change_of_the_end, change_of_the_files, &
+    & change_refused
   implicit none (type, external)
   private
   public :: restart_type, find_restart, put_back
