@@ -48,6 +48,7 @@ contains
     end do
     if (allocated(system%heating%curves)) &
       & call keep_heating(archive, system%heating, system%model%expansion)
+    call system%terms%keep(archive)
     call keep_memory(archive, system%memory)
   end subroutine keep_system
 

@@ -56,6 +56,8 @@ contains
       instant%step = n
       instant%time = n*dt
       instant%last = n == steps
+      system%memory%step = n
+      system%time = instant%time
       if (n > seen) then
         call evaluate(system, instant%time, breaking=.true., &
           & pairing=pairing_of(integrator, n, dt, system%break_late))
@@ -64,7 +66,6 @@ contains
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
         call account(system, instant%time)
         call system%watch%supplied(system%external_work)
-        system%memory%step = n
         call observer%observe(system, instant, error)
         if (allocated(error)) return
       end if

@@ -12,7 +12,7 @@ module pd_motion_explicit_time_step
   implicit none (type, external)
   private
   public :: stiffness_bound, stable_step, printed_step, printed_stiffness, book_step, &
-    & chapter_stiffness, integrator_limit, evaluations
+    & chapter_stiffness, integrator_limit, damped_step, evaluations
   public :: constant_stiffness, horizon_volume
 
 contains
@@ -254,6 +254,31 @@ contains
     case default; call internal_fault('unknown integrator')
     end select
   end function integrator_limit
+
+  !> The stable step where something is slowed down as well: `step` is that without damping [s], and
+  !> `rate` the largest ratio of damping to density [1/s]. With forces from the velocities of half a
+  !> step before, 7.8 and 7.9 are stable while (step omega/2)^2 + step rate/2 <= 1; the others are
+  !> so while step omega and step rate lie in an ellipse about their limits on both axes, of which
+  !> this takes the chord.
+  pure real(wp) function damped_step(step, rate, integrator) result(damped)
+    real(wp), intent(in) :: step, rate
+    character(*), intent(in) :: integrator
+    real(wp) :: half
+
+    select case (integrator)
+    case ('forward_backward', 'velocity_verlet')
+      half = rate*step/4
+      damped = step/(half + sqrt(half**2 + 1))
+    case ('adams_bashforth')
+      damped = step/(1 + step*rate/(6.0_wp/11))
+    case ('adams_moulton')
+      damped = step/(1 + step*rate/2)
+    case ('runge_kutta')
+      damped = step/(1 + step*rate/2.78_wp)
+    case default
+      call internal_fault('unknown integrator')
+    end select
+  end function damped_step
 
   !> Force evaluations of one step of an integrator.
   pure integer function evaluations(integrator)

@@ -10,7 +10,8 @@ module pd_motion_static_balance
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_residual, only: relaxation_type
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
-  use pd_motion_system, only: system_type, add_loads
+  use pd_force_term, only: term_view_type
+  use pd_motion_system, only: system_type, add_loads, view_of
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
@@ -70,6 +71,7 @@ contains
     real(wp), intent(in) :: t                    !! time [s]
     type(balance_type), intent(out) :: balance   !! ready for `weigh`
     real(wp), allocatable :: none(:, :), force(:, :), energy(:)
+    real(wp) :: squared
     integer :: k, p
 
     allocate (balance%piece(rigid%pieces%number))
@@ -80,6 +82,14 @@ contains
     do k = 1, system%body%n_slots
       balance%acting = balance%acting + sum((force(k, :)*system%body%volume(k))**2)
     end do
+    if (system%terms%inside > 0) then
+      call forces_of_terms(system, t, force)
+      squared = 0.0_wp
+      do k = 1, system%body%n_slots
+        squared = squared + sum((force(k, :)*system%body%volume(k))**2)
+      end do
+      balance%acting = max(balance%acting, squared)
+    end if
     if (.not. system%model%thermal) return
     allocate (none, mold=force)
     allocate (energy(system%body%n_slots), source=0.0_wp)
@@ -95,6 +105,19 @@ contains
     balance%acting = max(balance%acting, sum(balance%thermal))
   end subroutine begin_balance
 
+  !> Force density of the terms that are not external, at the present displacements: what they bear
+  !> is support, as that of constrained components, and in balance with loads and reactions.
+  subroutine forces_of_terms(system, t, force)
+    type(system_type), intent(in), target :: system
+    real(wp), intent(in) :: t                     !! time [s]
+    real(wp), intent(out), contiguous :: force(:, :)  !! (n_slots, dim) [N/m3]
+    type(term_view_type) :: view
+
+    force = 0.0_wp
+    call view_of(system, t, view)
+    call system%terms%add_force(view, force)
+  end subroutine forces_of_terms
+
   !> Sum up the state of every piece at time `t`; the forces of the system must belong to its
   !> displacements.
   subroutine weigh(system, relaxation, rigid, t, balance)
@@ -103,7 +126,7 @@ contains
     type(rigid_type), intent(in) :: rigid             !! its pieces
     real(wp), intent(in) :: t                         !! time [s]
     type(balance_type), intent(inout) :: balance      !! gets the sums
-    real(wp), allocatable :: loads(:, :)
+    real(wp), allocatable :: loads(:, :), borne(:, :)
     real(wp) :: squared, floor
     integer :: k, c, p
 
@@ -136,14 +159,25 @@ contains
         end do
       end associate
     end do
-    call add_groups(system, rigid, loads, balance)
+    allocate (borne, mold=loads)
+    if (system%terms%inside > 0) then
+      call forces_of_terms(system, t, borne)
+      do k = 1, system%body%n_slots
+        p = rigid%pieces%of(k)
+        if (p > 0) balance%piece(p)%support = balance%piece(p)%support &
+          & + sum((borne(k, :)*system%body%volume(k))**2)
+      end do
+    end if
+    call add_groups(system, rigid, loads, borne, balance)
   end subroutine weigh
 
-  !> Net forces and moments of each boundary and each load on every piece, and their sums.
-  subroutine add_groups(system, rigid, loads, balance)
+  !> Net forces and moments of each boundary, of the terms of the force and of the loads on every
+  !> piece, and their sums.
+  subroutine add_groups(system, rigid, loads, borne, balance)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
     real(wp), intent(in) :: loads(:, :)
+    real(wp), intent(in) :: borne(:, :)   !! by the terms of the force that are not external, if any
     type(balance_type), intent(inout) :: balance
     real(wp), allocatable :: force(:, :), moment(:, :), applied(:)
     real(wp) :: one(3)
@@ -165,6 +199,17 @@ contains
       end associate
       call add_net()
     end do
+    if (system%terms%inside > 0) then
+      force = 0.0_wp
+      moment = 0.0_wp
+      do k = 1, system%body%n_slots
+        if (rigid%pieces%of(k) == 0) cycle
+        one = 0.0_wp
+        one(:dim) = borne(k, :)*system%body%volume(k)
+        call add_one(k, one)
+      end do
+      call add_net()
+    end if
     force = 0.0_wp
     moment = 0.0_wp
     allocate (applied(size(balance%piece)), source=0.0_wp)
@@ -211,16 +256,19 @@ contains
     end subroutine add_net
   end subroutine add_groups
 
-  !> Twice the strain energy of every piece, or that of its heat alone if that is larger.
+  !> Twice the stored energy of every piece, or that of its heat alone if that is larger.
   subroutine weigh_energies(system, rigid, balance)
-    type(system_type), intent(inout) :: system
+    type(system_type), intent(inout), target :: system
     type(rigid_type), intent(in) :: rigid
     type(balance_type), intent(inout) :: balance
+    type(term_view_type) :: view
     real(wp), allocatable :: energy(:)
     integer :: k, p
 
     allocate (energy(system%body%n_slots), source=0.0_wp)
     call energy_pass(system%family, system%model, system%state%u, energy)
+    call view_of(system, system%time, view)
+    call system%terms%add_energy(view, energy)
     balance%piece%energy = 0.0_wp
     do k = 1, system%body%n_slots
       p = rigid%pieces%of(k)

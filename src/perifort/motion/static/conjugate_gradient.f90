@@ -398,7 +398,7 @@ contains
     type(krylov_type), intent(inout) :: krylov
     type(sums_type), intent(out) :: sums
 
-    call renew_forces(system)
+    call renew_forces(system, t)
     call take_residual(system, t, krylov, sums)
   end subroutine look
 

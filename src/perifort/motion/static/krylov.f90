@@ -5,8 +5,10 @@ module pd_motion_static_krylov
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: block_length
   use pd_force_model, only: force_options_type, options_of
+  use pd_motion_conditions, only: number_of_loads
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
-  use pd_motion_system, only: system_type, add_loads
+  use pd_force_term, only: term_view_type
+  use pd_motion_system, only: system_type, add_loads, view_of
   use pd_motion_tangent, only: at_rest, forces_at, one_sided, tangent_product, tangent_type
   implicit none (type, external)
   private
@@ -198,10 +200,12 @@ contains
   !> costs one evaluation of the forces, the undeformed stiffness (with the bonds that are intact
   !> now) by the fast formulas. The tangent is a one-sided difference, some seven digits: more than
   !> what isn't linear leaves to a solve.
+  !> Terms of the force resist with the tangents that they give.
   subroutine apply_stiffness(system, krylov)
-    type(system_type), intent(inout) :: system
-    type(krylov_type), intent(inout) :: krylov
+    type(system_type), intent(inout), target :: system
+    type(krylov_type), intent(inout), target :: krylov
     type(tangent_type) :: tangent
+    type(term_view_type) :: view
 
     tangent%options = forces_of(system, krylov%deformed)
     if (krylov%deformed) then
@@ -215,6 +219,9 @@ contains
       call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
         & krylov%moved)
     end if
+    if (system%terms%number() == number_of_loads(system%terms)) return
+    call view_of(system, system%time, view, krylov%origin)
+    call system%terms%add_tangent(view, krylov%direction, krylov%product)
   end subroutine apply_stiffness
 
   !> Go `length` along the direction: displacements, the forces that follow linearly, the residual.

@@ -70,6 +70,8 @@ contains
     logical :: amid, dynamic, unfinished
 
     instant%dt = 1.0_wp
+    call check_terms(system, error)
+    if (allocated(error)) return
     call find_free_motions(system, rigid)
     do i = max(1, system%memory%load_step), relaxation%load_steps
       call check_balance(system, rigid, real(i, wp)/relaxation%load_steps, merge(status_input, &
@@ -177,6 +179,18 @@ contains
       if (unfinished) call move_alloc(first, error)
     end if
   end subroutine finish_by_conjugate_gradient
+
+  !> An error if the force of some term depends on displacements in a way that it does not tell.
+  subroutine check_terms(system, error)
+    type(system_type), intent(in) :: system
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: name
+
+    name = system%terms%without_tangent()
+    if (name /= '') call fail(error, 'no static equilibrium can be computed: the force term '// &
+      & name//' has no tangent, which a solver needs. Give it one, or integrate in time with '// &
+      & 'damping until the body rests', status_input)
+  end subroutine check_terms
 
   !> Take back what pieces that are free have moved as a whole, unless that takes them out of
   !> balance: loads that keep their direction hold a piece as it is turned, and the projected

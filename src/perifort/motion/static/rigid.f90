@@ -5,7 +5,9 @@ module pd_motion_static_rigid
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
-  use pd_motion_system, only: system_type, add_loads
+  use pd_force_term, only: term_view_type
+  use pd_motion_conditions, only: load_of, load_type, number_of_loads
+  use pd_motion_system, only: system_type, add_loads, view_of
   implicit none (type, external)
   private
   public :: rigid_type, piece_type, find_free_motions, check_balance, remove_free_motions
@@ -34,37 +36,47 @@ module pd_motion_static_rigid
 
 contains
 
-  !> The pieces that intact bonds join now, and which rigid motions of each no constraint resists.
+  !> The pieces that intact bonds join now, and which rigid motions of each neither a constraint
+  !> nor a term of the force resists. (Terms that join pieces are taken to move with each of them.)
   subroutine find_free_motions(system, rigid)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in), target :: system
     type(rigid_type), intent(out) :: rigid
+    type(load_type), pointer :: load
+    real(wp), allocatable :: resistance(:, :, :)
     integer :: p, l, i
 
     call find_pieces(system%body, system%family, rigid%pieces)
     allocate (rigid%piece(rigid%pieces%number))
     do p = 1, rigid%pieces%number
       associate (pieces => rigid%pieces)
-        call describe_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
+        call place_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
           & rigid%piece(p))
       end associate
     end do
-    do l = 1, size(system%loads)
-      associate (load => system%loads(l))
-        do i = 1, size(load%slots)
-          if (any(abs(load%density(i, :)) > 0.0_wp)) &
-            & rigid%piece(rigid%pieces%of(load%slots(i)))%loaded = .true.
-        end do
+    call find_resistance(system, rigid, resistance)
+    do p = 1, rigid%pieces%number
+      associate (pieces => rigid%pieces)
+        call describe_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
+          & resistance(:, :, p), rigid%piece(p))
       end associate
+    end do
+    ! other external terms may act anywhere
+    if (system%terms%outside > number_of_loads(system%terms)) rigid%piece%loaded = .true.
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      do i = 1, size(load%slots)
+        if (any(abs(load%density(i, :)) > 0.0_wp)) &
+          & rigid%piece(rigid%pieces%of(load%slots(i)))%loaded = .true.
+      end do
     end do
   end subroutine find_free_motions
 
-  !> Place, extent and free motions of the piece that consists of `slots`.
-  subroutine describe_piece(system, slots, piece)
+  !> Place and extent of the piece that consists of `slots`.
+  subroutine place_piece(system, slots, piece)
     type(system_type), intent(in) :: system
     integer, intent(in) :: slots(:)
     type(piece_type), intent(out) :: piece
-    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6)
-    integer :: n, k, c, i, j, dim
+    integer :: c, dim
 
     dim = system%body%dim
     piece%size = maxval(system%body%spacing(slots))
@@ -75,7 +87,62 @@ contains
         & - minval(system%body%x(slots, c)))
     end do
     piece%held = any(system%held(slots, :) == 1_i1)
-    resistance = 0.0_wp
+  end subroutine place_piece
+
+  !> What the terms of the force resist to the six unit motions of each piece, over the largest
+  !> stiffness of a point, so that a point counts about as one that is held.
+  subroutine find_resistance(system, rigid, resistance)
+    type(system_type), intent(in), target :: system
+    type(rigid_type), intent(in) :: rigid              !! pieces in their places
+    real(wp), allocatable, intent(out) :: resistance(:, :, :)  !! (6, 6, pieces) [-]
+    real(wp), allocatable :: w(:, :), kw(:, :), rows(:)
+    type(term_view_type) :: view
+    real(wp) :: mode(6), largest
+    integer :: i, k, c, p
+
+    allocate (resistance(6, 6, rigid%pieces%number), source=0.0_wp)
+    if (system%terms%number() == number_of_loads(system%terms)) return
+    call view_of(system, system%time, view)
+    allocate (rows(system%body%n_slots), source=0.0_wp)
+    call system%terms%add_stiffness_bound(view, rows)
+    largest = maxval(rows*system%body%volume)
+    if (.not. largest > 0.0_wp) return
+    allocate (w, kw, mold=system%state%u)
+    do i = 1, 6
+      w = 0.0_wp
+      do c = 1, system%body%dim
+        do k = 1, system%body%n_slots
+          p = rigid%pieces%of(k)
+          if (p == 0) cycle
+          mode = motion_at(rigid%piece(p)%centre, rigid%piece(p)%size, system%body%x(k, :), c)
+          w(k, c) = mode(i)
+        end do
+      end do
+      kw = 0.0_wp
+      call system%terms%add_tangent(view, w, kw)
+      do c = 1, system%body%dim
+        do k = 1, system%body%n_slots
+          p = rigid%pieces%of(k)
+          if (p == 0) cycle
+          mode = motion_at(rigid%piece(p)%centre, rigid%piece(p)%size, system%body%x(k, :), c)
+          resistance(:, i, p) = resistance(:, i, p) &
+            & + mode*(kw(k, c)*system%body%volume(k)/largest)
+        end do
+      end do
+    end do
+  end subroutine find_resistance
+
+  !> Free motions of the piece that consists of `slots`.
+  subroutine describe_piece(system, slots, of_terms, piece)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: slots(:)
+    real(wp), intent(in) :: of_terms(6, 6)      !! resistance of the terms of the force [-]
+    type(piece_type), intent(inout) :: piece    !! in its place
+    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6)
+    integer :: n, k, c, i, j, dim
+
+    dim = system%body%dim
+    resistance = of_terms
     mass = 0.0_wp
     do n = 1, size(slots)
       k = slots(n)
@@ -142,7 +209,7 @@ contains
     real(wp) :: work(6), applied, mode(6), share(6)
     integer :: p, i, k, c
 
-    if (size(system%loads) == 0 .or. all(rigid%piece%number == 0)) return
+    if (system%terms%outside == 0 .or. all(rigid%piece%number == 0)) return
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
     do p = 1, rigid%pieces%number

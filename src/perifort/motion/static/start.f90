@@ -3,7 +3,7 @@
 module pd_motion_static_start
   use pd_base_kinds, only: wp, i1
   use pd_base_text, only: to_text
-  use pd_motion_conditions, only: impose
+  use pd_motion_conditions, only: impose, number_of_loads
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
   use pd_motion_system, only: system_type, add_loads
@@ -104,7 +104,7 @@ contains
     end subroutine put_to_rest
   end subroutine move_along
 
-  !> On which pieces a load or heat acts at time `t`.
+  !> On which pieces a load, heat or another term of the force acts at time `t`.
   subroutine find_acted(system, rigid, t, acted)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
@@ -114,6 +114,8 @@ contains
     integer :: k
 
     allocate (acted(rigid%pieces%number), source=.false.)
+    ! where terms of the force let a piece rest is theirs to say
+    if (system%terms%number() > number_of_loads(system%terms)) acted = .true.
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
     do k = 1, system%body%n_slots

@@ -10,6 +10,7 @@ module pd_output_report_overview
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_set_up_conditions, only: no_fail_mask, region_mask
+  use pd_motion_conditions, only: load_of, load_type, number_of_loads
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -101,7 +102,7 @@ contains
   !> Points of each region, boundary, load and no-fail zone.
   function counts(scene, system) result(text)
     type(scene_type), intent(in) :: scene
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in), target :: system
     character(:), allocatable :: text
     integer :: i
 
@@ -116,9 +117,9 @@ contains
           & system%motions(i)%slots), 'point')//', '//place(group%side, group%region))
       end associate
     end do
-    do i = 1, size(system%loads)
+    do i = 1, number_of_loads(system%terms)
       associate (group => scene%loads(i))
-        text = text//line('load '//to_text(i), counted(size(system%loads(i)%slots), &
+        text = text//line('load '//to_text(i), counted(points_of_load(i), &
           & 'point')//', '//place(group%side, group%region))
       end associate
     end do
@@ -126,6 +127,16 @@ contains
       text = text//line('no-fail zone '//to_text(i), &
         & counted(count(no_fail_mask(scene, system%body, i)), 'point'))
     end do
+
+  contains
+
+    !> On how many points the `l`-th load acts.
+    integer function points_of_load(l) result(points)
+      integer, intent(in) :: l
+      type(load_type), pointer :: load
+      load => load_of(system%terms, l)
+      points = size(load%slots)
+    end function points_of_load
   end function counts
 
   !> A name before what is told of it.

@@ -48,7 +48,7 @@ contains
       & text = text//line('cracks', to_text(size(scene%cracks))//', which cut the bonds of '// &
       & to_text(cut)//' pairs')
     text = text//line('memory', with_unit(real(memory_of(system), wp), 'B', 3))
-    text = text//forces(scene, system)
+    text = text//forces(scene, system)//terms_of(system)
     text = text//line('threads', to_text(threads))
     if (plan%relaxes) then
       text = text//statics(scene, plan)
@@ -148,6 +148,21 @@ contains
       text = text//line('precision', precision_of(scene, system))
     end associate
   end function forces
+
+  !> A line for each term of the force that tells of itself.
+  function terms_of(system) result(text)
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text, lines
+    integer :: end_of_line
+
+    text = ''
+    lines = system%terms%describe()
+    do while (len(lines) > 0)
+      end_of_line = index(lines, newline)
+      text = text//line('force term', lines(:end_of_line - 1))
+      lines = lines(end_of_line + 1:)
+    end do
+  end function terms_of
 
   !> The precision of the bonds, and why it is not the one that was asked for.
   function precision_of(scene, system) result(text)
