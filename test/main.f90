@@ -68,6 +68,8 @@ program main
   use test_scene_hostile, only: collect_scene_hostile
   use test_motion_energy_watch, only: collect_motion_energy_watch
   use test_scene_content_compare, only: collect_scene_content_compare
+  use test_scene_content_defaults, only: collect_scene_content_defaults
+  use test_scene_content_groups, only: collect_scene_content_groups
   use test_scene_format_elements, only: collect_scene_format_elements
   use test_scene_format_file, only: collect_scene_format_file
   use test_scene_content_read, only: collect_scene_content_read
@@ -151,6 +153,8 @@ program main
   call register('scene_hostile', collect_scene_hostile)
   call register('motion_energy_watch', collect_motion_energy_watch)
   call register('scene_content_compare', collect_scene_content_compare)
+  call register('scene_content_defaults', collect_scene_content_defaults)
+  call register('scene_content_groups', collect_scene_content_groups)
   call register('scene_format_elements', collect_scene_format_elements)
   call register('scene_format_file', collect_scene_format_file)
   call register('scene_content_read', collect_scene_content_read)

@@ -2,6 +2,7 @@
 module test_study_trade_plan
   use pd_base_error, only: scene_error => error_type
   use pd_base_kinds, only: wp
+  use pd_scene_format_file, only: line_type
   use pd_study_trade_front, only: mark_front, observed_orders, on_front, order_type
   use pd_study_trade_plan, only: plan_from_text, plan_type
   use pd_study_trade_trial, only: outcome_type
@@ -31,6 +32,7 @@ contains
       & new_unittest('vectors take several values', test_vectors), &
       & new_unittest('columns', test_columns), &
       & new_unittest('what cannot be planned', test_refused), &
+      & new_unittest('keys set on the command line', test_set), &
       & new_unittest('the Pareto front', test_front), &
       & new_unittest('observed orders', test_orders)]
   end subroutine collect_study_trade_plan
@@ -86,6 +88,34 @@ contains
     call expect_true(error, plan%trials(3)%scene%materials(1)%break_in_compression .and. &
       & .not. plan%trials(4)%scene%materials(1)%break_in_compression, 'the product with the third')
   end subroutine test_together
+
+  !> Every run has them; a key that is varied cannot be set.
+  subroutine test_set(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: text = head//"&study vary = 'horizon%ratio' values = 2.0, 3.0"//rest
+    type(plan_type) :: plan
+    type(scene_error), allocatable :: found
+    integer :: t
+
+    call plan_from_text(text, 'a.nml', plan, found, [line_type('time%safety=0.3'), &
+      & line_type('study%values=2.5, 3.5, 4.5')])
+    if (allocated(found)) then
+      call test_failed(error, found%message)
+      return
+    end if
+    call expect_true(error, size(plan%trials) == 3, 'three runs')
+    if (allocated(error)) return
+    do t = 1, 3
+      call expect(error, plan%trials(t)%scene%horizon%ratio, t + 1.5_wp, 0.0_wp, 'ratio')
+      call expect(error, plan%trials(t)%scene%time%safety, 0.3_wp, 0.0_wp, 'safety')
+    end do
+    call plan_from_text(text, 'a.nml', plan, found, [line_type('ratio=4')])
+    call expect_parts(error, found, "'horizon%ratio' is set here and varied|--> the "// &
+      & 'command line|--set ratio=4')
+    if (allocated(error)) return
+    call plan_from_text(text, 'a.nml', plan, found, [line_type('study%values=0.5')])
+    call expect_parts(error, found, "'ratio' is out of range|--> the command line|^^^")
+  end subroutine test_set
 
   !> 20 x 10 and 10 x 10 points: both bodies follow, unless the body is named by its number.
   subroutine test_points(error)

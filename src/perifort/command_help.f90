@@ -19,7 +19,8 @@ contains
     character(*), parameter :: set = &
       & '  --set KEY=VALUE change a key of the scene, as in horizon%ratio=4; may be repeated'
     character(w), parameter :: tables(5) = [character(w) :: &
-      & '  --output DIR    folder of the tables (default: out/ and the file''s name)', set, threads, &
+      & '  --output DIR    folder of the tables (default: out/ and the file''s name)', set, &
+      & threads, &
       & '  --overwrite     replace an existing study', '  --quiet         print errors only']
 
     select case (command)

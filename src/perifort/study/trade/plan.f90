@@ -55,6 +55,7 @@ module pd_study_trade_plan
 
   type :: plan_type
     type(source_type) :: source
+    type(line_type), allocatable :: changes(:)        !! what `--set` changes in it
     type(scene_type) :: scene                         !! as it stands in the file
     type(variable_type), allocatable :: variables(:)
     type(trial_type), allocatable :: trials(:)        !! the first axis slowest
@@ -85,7 +86,9 @@ contains
 
     call scan_source(text, name, plan%source, error)
     if (allocated(error)) return
-    if (present(changes)) call apply_changes(plan%source, changes, error)
+    allocate (plan%changes(0))
+    if (present(changes)) plan%changes = changes
+    call apply_changes(plan%source, plan%changes, error)
     if (allocated(error)) return
     call read_scene_source(plan%source, plan%scene, error)
     if (allocated(error)) return
@@ -99,7 +102,7 @@ contains
     if (allocated(error)) return
     call read_variables(plan, error)
     if (allocated(error)) return
-    if (present(changes)) call refuse_both(plan, error)
+    call refuse_both(plan, error)
     if (allocated(error)) return
     call make_trials(plan, error)
   end subroutine plan_from_text

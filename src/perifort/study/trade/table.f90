@@ -101,7 +101,14 @@ contains
     type(order_type), allocatable :: orders(:)
     integer :: t, i
 
-    text = head_text(plan, measure)//newline
+    text = ''
+    if (allocated(plan%changes)) then
+      do i = 1, size(plan%changes)
+        text = text//'  set         '//plan%changes(i)%text//newline
+      end do
+      if (size(plan%changes) > 0) text = text//newline
+    end if
+    text = text//head_text(plan, measure)//newline
     do t = 1, size(outcomes)
       if (known(outcomes(t))) text = text//row_text(plan, t, outcomes(t))//newline
     end do
