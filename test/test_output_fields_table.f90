@@ -61,7 +61,9 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(field_table_type) :: table
     type(output_field_type) :: field
+    type(fault_type), allocatable :: fault
     character(name_length), allocatable :: names(:)
+    character(:), allocatable :: guide
     integer :: i
 
     table = all_fields()
@@ -72,6 +74,13 @@ contains
       call expect_true(error, table%number_of(names(i)) == i .and. field%name == names(i) .and. &
         & field%unit /= '' .and. field%meaning /= '' .and. associated(field%fill), &
         & 'the entry of '//trim(names(i)))
+    end do
+    call read_text_file('doc/user-guide.md', guide, fault)
+    do i = 1, merge(0, size(names), allocated(fault))  ! not run in the project's folder
+      field = table%field(names(i))
+      call expect_true(error, index(guide, line//'| `'//trim(field%name)//'` | '// &
+        & trim(field%unit)//' | '//trim(field%meaning)//' |'//line) > 0, &
+        & 'the user guide has no row for the field '//trim(names(i)))
     end do
   end subroutine test_described
 
@@ -256,30 +265,35 @@ contains
   !> What is measured of the fields, at all points and at a probe.
   subroutine test_study(error)
     type(error_type), allocatable, intent(out) :: error
-    character(*), parameter :: measures(4) = [character(18) :: 'motion_energy', &
-      & 'momentum_flux_xy', 'p', 'p_momentum_flux_yy']
-    character(*), parameter :: units(4) = [character(4) :: 'J/m3', 'Pa', 'J/m3', 'Pa']
-    ! of a field the root of the mean square, of a probe its value
-    real(wp), parameter :: answers(4) = [energy, -flux(3), energy, flux(2)]
+    character(*), parameter :: measures(5) = [character(18) :: 'motion_energy', &
+      & 'momentum_flux_xy', 'p', 'p_momentum_flux_yy', 'momentum_flux']
+    character(*), parameter :: units(5) = [character(4) :: 'J/m3', 'Pa', 'J/m3', 'Pa', 'Pa']
+    character(*), parameter :: against(5) = [character(20) :: 'finest', 'finest', 'finest', &
+      & 'finest', 'whole/whole.vtkhdf']
+    ! of a field the root of the mean square over points and components, of a probe its value
+    real(wp), parameter :: answers(5) = [energy, -flux(3), energy, flux(2), norm2(flux)]
+    type(field_table_type) :: table
     type(session_type) :: session
     type(run_options_type) :: options
     type(fault_type), allocatable :: fault
     integer :: i, threads
 
     threads = omp_get_max_threads()
+    table = all_fields()
+    call table%add(motion_energy_field())
+    call table%add(momentum_flux_field())
     call make_directory(here, fault)
+    call compute(flight//"&output fields = 'momentum_flux' /", 'whole', table, fault)
     do i = 1, size(measures)
       options%output_directory = here//'/study'//to_text(i)
       options%quiet = .true.
       options%overwrite = .true.
       options%threads = 1
-      options%fields = all_fields()
-      call options%fields%add(motion_energy_field())
-      call options%fields%add(momentum_flux_field())
+      options%fields = table
       if (.not. allocated(fault)) call put_file(here, 'study.nml', flight// &
         & "&probe name = 'p' point = 0, 0 fields = 'motion_energy' /"//line// &
         & "&study vary = 'time%step' values = 1.0e-6, 0.5e-6 measure = '"// &
-        & trim(measures(i))//"' against = 'finest' norm = 'rms' /"//line, fault)
+        & trim(measures(i))//"' against = '"//trim(against(i))//"' norm = 'rms' /"//line, fault)
       if (.not. allocated(fault)) call begin_study(here//'/study.nml', options, session, fault)
       if (.not. allocated(fault)) call run_all(session, fault)
       call accept(error, fault)

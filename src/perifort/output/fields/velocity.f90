@@ -14,7 +14,7 @@ contains
   type(output_field_type) function velocity_field() result(field)
     field%name = 'velocity'
     field%unit = 'm/s'
-    field%meaning = 'velocity'
+    field%meaning = 'velocity at the time of the output'
     field%rank = rank_vector
     field%fill => fill
     field%at_slot => at_slot

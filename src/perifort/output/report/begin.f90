@@ -13,7 +13,7 @@ module pd_output_report_begin
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about
   use pd_output_fields_table, only: all_fields, field_table_type
-  use pd_output_report_columns, only: history_columns
+  use pd_output_report_columns, only: history_columns, history_table
   use pd_output_report_recorder, only: recorder_type
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of
   use pd_output_checkpoint_restart, only: restart_type
@@ -58,6 +58,7 @@ contains
     if (restart%found) kept = restart%about%kept
     associate (body => system%body, schedule => recorder%schedule)
       schedule = schedule_of(scene, plan, system%family%n_bonds)
+      recorder%columns = history_table(plan%relaxes)
       table = fields_of(options)
       allocate (recorder%fields(size(scene%output%fields)))
       do f = 1, size(recorder%fields)

@@ -10,7 +10,8 @@ module pd_output_report_columns
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
-  public :: history_columns, history_row, columns_of_scene, row_source_type
+  public :: history_table_type, history_table, history_columns, history_row, columns_of_scene, &
+    & row_source_type
 
   character(*), parameter :: xyz(3) = ['x', 'y', 'z']
 
@@ -26,6 +27,13 @@ module pd_output_report_columns
     procedure(value_interface), pointer, nopass :: value => null()
   end type entry_type
 
+  !> The columns that do not depend on names of the scene. A run makes its table once, since rows
+  !> may be many.
+  type :: history_table_type
+    private
+    type(entry_type), allocatable :: entries(:)
+  end type history_table_type
+
   abstract interface
     !> The value of a column.
     pure real(wp) function value_interface(now)
@@ -37,13 +45,11 @@ module pd_output_report_columns
 
 contains
 
-  !> The columns that do not depend on names of the scene. A column joins with a line here, and a
-  !> function that gives its value.
-  pure function entries(relaxation) result(table)
+  !> The table of columns. A column joins with a line here, and a function that gives its value.
+  pure type(history_table_type) function history_table(relaxation) result(table)
     logical, intent(in) :: relaxation
-    type(entry_type), allocatable :: table(:)
 
-    allocate (table(0))
+    allocate (table%entries(0))
     call put(table, 'step', '1', step)
     call put(table, 'time', 's', time)
     call put(table, 'kinetic_energy', 'J', kinetic_energy)
@@ -56,18 +62,18 @@ contains
     if (.not. relaxation) return
     call put(table, 'residual', '1', residual)
     call put(table, 'load_step', '1', load_step)
-  end function entries
+  end function history_table
 
   !> Add a column at the end.
   pure subroutine put(table, name, unit, value)
-    type(entry_type), allocatable, intent(inout) :: table(:)
+    type(history_table_type), intent(inout) :: table
     character(*), intent(in) :: name, unit
     procedure(value_interface) :: value
     type(entry_type) :: entry
 
     entry%column = column_type(name, unit, 'run')
     entry%value => value
-    table = [table, entry]
+    table%entries = [table%entries, entry]
   end subroutine put
 
   !> The columns of the history, in the order of `history_row`.
@@ -76,11 +82,11 @@ contains
     type(probe_type), intent(in) :: probes(:)
     logical, intent(in) :: relaxation
     type(column_type), allocatable :: columns(:)
-    type(entry_type), allocatable :: table(:)
+    type(history_table_type) :: table
     integer :: i
 
-    table = entries(relaxation)
-    columns = table%column
+    table = history_table(relaxation)
+    columns = table%entries%column
     do i = 1, size(system%motions)
       columns = [columns, reactions_of(system%motions(i)%name, system%body%dim)]
     end do
@@ -93,11 +99,11 @@ contains
   pure function columns_of_scene(scene) result(columns)
     type(scene_type), intent(in) :: scene
     type(column_type), allocatable :: columns(:)
-    type(entry_type), allocatable :: table(:)
+    type(history_table_type) :: table
     integer :: i
 
-    table = entries(scene%time%method == 'relaxation')
-    columns = table%column
+    table = history_table(scene%time%method == 'relaxation')
+    columns = table%entries%column
     do i = 1, size(scene%boundaries)
       columns = [columns, reactions_of(trim(scene%boundaries(i)%name), scene%header%dimension)]
     end do
@@ -117,16 +123,14 @@ contains
   end function reactions_of
 
   !> The values of `history_columns`.
-  function history_row(now, probes, relaxation) result(row)
+  function history_row(table, now, probes) result(row)
+    type(history_table_type), intent(in) :: table  !! of the run
     type(row_source_type), intent(in) :: now
     type(probe_type), intent(in) :: probes(:)
-    logical, intent(in) :: relaxation
     real(wp), allocatable :: row(:)
-    type(entry_type), allocatable :: table(:)
     integer :: i
 
-    table = entries(relaxation)
-    row = [(table(i)%value(now), i=1, size(table))]
+    row = [(table%entries(i)%value(now), i=1, size(table%entries))]
     associate (system => now%system)
       do i = 1, size(system%motions)
         if (system%motions(i)%name /= '') row = [row, system%motions(i)%reaction(:system%body%dim)]

@@ -15,7 +15,7 @@ module pd_output_report_recorder
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
   use pd_output_report_balance, only: balance_type
-  use pd_output_report_columns, only: history_row, row_source_type
+  use pd_output_report_columns, only: history_row, history_table_type, row_source_type
   use pd_output_report_lines, only: iteration_line, place_of, relaxation_note
   use pd_output_report_probes, only: probe_type
   use pd_output_report_run_warnings, only: contact_warning, rotation_warning, strain_warning
@@ -33,6 +33,7 @@ module pd_output_report_recorder
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(team_type) :: team                  !! threads, whose number may change at any instant
+    type(history_table_type) :: columns      !! of the history
     type(balance_type) :: balance            !! of energy, over the rows
     integer :: rows = 0
     integer :: outputs = 0
@@ -262,8 +263,8 @@ contains
       now%energies = balance%energies
     end associate
     recorder%rows = recorder%rows + 1
-    call recorder%results%add_row(history_row(now, recorder%probes, &
-      & recorder%schedule%relaxation), error)
+    call recorder%results%add_row(history_row(recorder%columns, now, recorder%probes), &
+      & error)
     if (.not. recorder%turned) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0

@@ -11,7 +11,8 @@ module pd_study_trade_trial
   use pd_set_up_conditions, only: region_mask
   use pd_output_fields_check, only: check_available
   use pd_output_fields_table, only: field_table_type
-  use pd_output_report_columns, only: history_columns, history_row, row_source_type
+  use pd_output_report_columns, only: history_columns, history_row, history_table, &
+    & history_table_type, row_source_type
   use pd_output_report_probes, only: find_probes, probe_type
   use pd_output_report_schedule, only: history_interval
   use pd_motion_observer, only: instant_type, observer_type
@@ -54,7 +55,8 @@ module pd_study_trade_trial
     type(record_type) :: record
     type(probe_type), allocatable :: probes(:)
     integer, allocatable :: slots(:)           !! of the places
-    integer :: column = 0                      !! of the history
+    type(history_table_type) :: columns        !! of the history
+    integer :: column = 0                      !! among them
     integer :: every = 1
     logical :: relaxation = .false.
     integer :: steps = 0
@@ -147,6 +149,7 @@ contains
     watcher%measure = measure
     watcher%quick = around < 0.0_wp
     watcher%relaxation = set_up%plan%relaxes
+    watcher%columns = history_table(watcher%relaxation)
     watcher%every = history_interval(scene, set_up%plan, set_up%system%family%n_bonds)
     call find_probes(scene, table, set_up%system%body, watcher%probes, error)
     if (allocated(error) .or. watcher%quick) return
@@ -353,7 +356,7 @@ contains
       if (measure%kind == of_column) then
         now%instant = instant
         now%energies = energies
-        row = history_row(now, watcher%probes, watcher%relaxation)
+        row = history_row(watcher%columns, now, watcher%probes)
         record%values(1, 1, record%rows) = row(watcher%column)
         return
       end if
