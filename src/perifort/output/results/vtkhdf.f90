@@ -7,8 +7,8 @@
 !> the length of a history column. A file that needs more room is copied into a bigger one, which
 !> then takes its name in one step.
 !>
-!> An error is set where the file cannot be written or read; it is then as it was at its last complete
-!> output.
+!> An error is set where the file cannot be written or read; it is then as it was at its last
+!> complete output.
 module pd_output_results_vtkhdf
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, sp, i1, i4, i8
