@@ -38,16 +38,21 @@ module pd_output_checkpoint_restart
 contains
 
   !> Find the checkpoint of a run in its folder, or take the one that is named, and compare its
-  !> scene with the present one. `command` starts the run again with `--restart`.
+  !> scene with the present one.
   !>
   !> Where there is no checkpoint, the run starts from the beginning (`found` is false), unless its
   !> results are complete.
+  !>
+  !> An error if the checkpoint cannot be read or is damaged, if the scene has changed in what may
+  !> not change, or if there are results of another scene.
   subroutine find_restart(directory, stem, named, scene, command, restart, error)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory       !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem            !! name of the results' files without their endings
     character(*), intent(in) :: named  !! path of a checkpoint, '' = the run's newest
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: command
-    type(restart_type), intent(out) :: restart
+    type(scene_type), intent(in) :: scene       !! the present one
+    character(*), intent(in) :: command  !! starts the run again with `--restart`, for messages
+    type(restart_type), intent(out) :: restart  !! where to go on, with its file open at the system
+                                                !! if one is found
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: path, newest
 
@@ -233,12 +238,16 @@ contains
   end subroutine compare
 
   !> Put a system that was made from the scene back to where the checkpoint stands, and let the plan
-  !> go on with its time step.
+  !> go on with its time step. An error if the points or the initial state are others, if the
+  !> checkpoint is beyond the end of the run, or if it does not hold what the system needs.
   subroutine put_back(restart, scene, system, plan, error)
-    type(restart_type), intent(inout) :: restart
-    type(scene_type), intent(in) :: scene
-    type(system_type), intent(inout) :: system
-    type(plan_type), intent(inout) :: plan
+    type(restart_type), intent(inout) :: restart  !! with the checkpoint's file open; closed on
+                                                  !! return
+    type(scene_type), intent(in) :: scene         !! the present one, for its duration
+    type(system_type), intent(inout) :: system    !! as it was made from the scene; as in the
+                                                  !! checkpoint on return
+    type(plan_type), intent(inout) :: plan        !! gets time step and number of steps, unless it
+                                                  !! is a relaxation
     type(error_type), allocatable, intent(out) :: error
 
     if (checksum_of_start(system) /= restart%about%start) then

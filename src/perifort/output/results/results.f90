@@ -78,26 +78,33 @@ contains
 
   !> Begin the results `directory/stem.*` and `directory/history.csv`.
   !>
-  !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
-  !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
-  !> `precision` ('double', 'single') is that of the fields; `format` is 'vtkhdf', 'vtu' or 'both'.
-  !> `scene_text`, `command` and the program's `version` are kept in the file. With `kept`, the
-  !> files that are there go on after the outputs and rows in it; where there are none, new ones
-  !> begin with its rows.
+  !> Everything per point comes in point order. `planned_outputs` and `planned_rows` may be too few
+  !> or 0 (unknown): the file then grows by copying itself. With `kept`, the files that are there go
+  !> on after the outputs and rows in it; where there are none, new ones begin with its rows.
+  !>
+  !> An error if the description is unusable, if older results are in the way, if the files do not
+  !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
     & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept)
-    class(results_type), intent(out) :: self
-    character(*), intent(in) :: directory, stem
-    real(wp), intent(in) :: positions(:, :)
-    type(field_type), intent(in) :: fields(:)
-    integer, intent(in) :: planned_outputs
-    type(column_type), intent(in) :: columns(:)
-    integer, intent(in) :: planned_rows
-    character(*), intent(in) :: precision, format
-    character(*), intent(in) :: scene_text, command, version
-    logical, intent(in) :: overwrite
+    class(results_type), intent(out) :: self       !! open on return, unless an error is set
+    character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
+                                                   !! the current one
+    character(*), intent(in) :: stem               !! name of the files without their endings
+    real(wp), intent(in) :: positions(:, :)        !! (n_points, 3) in point order [m]
+    type(field_type), intent(in) :: fields(:)      !! (any number) that every output has
+    integer, intent(in) :: planned_outputs         !! their number; 0: unknown
+    type(column_type), intent(in) :: columns(:)    !! (any number) of the history; none: no history
+                                                   !! file
+    integer, intent(in) :: planned_rows            !! their number; 0: unknown
+    character(*), intent(in) :: precision          !! of the fields: 'double' or 'single'
+    character(*), intent(in) :: format             !! 'vtkhdf', 'vtu' or 'both'
+    character(*), intent(in) :: scene_text         !! the resolved scene, kept in the file
+    character(*), intent(in) :: command            !! the command line of the run, kept in the file
+    character(*), intent(in) :: version            !! of the program, kept in the file
+    logical, intent(in) :: overwrite               !! older results may go; else they are an error
     type(error_type), allocatable, intent(out) :: error
-    type(kept_type), intent(in), optional :: kept
+    type(kept_type), intent(in), optional :: kept  !! rows, times and scene of a checkpoint to go on
+                                                   !! from; absent: a new run
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
@@ -155,37 +162,43 @@ contains
     self%started = .not. allocated(error)
   end subroutine resume_others
 
+  !> An array of reals over the points. An error if its length is wrong or an output has begun.
   subroutine put_points_real(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self     !! the results
+    character(*), intent(in) :: name               !! of the array, below `/points`
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_real
 
+  !> An array of 32-bit integers over the points. An error if its length is wrong or an output has
+  !> begun.
   subroutine put_points_i4(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i4), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self        !! the results
+    character(*), intent(in) :: name                  !! of the array, below `/points`
+    integer(i4), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i4
 
+  !> An array of 8-bit integers over the points. An error if its length is wrong or an output has
+  !> begun.
   subroutine put_points_i1(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i1), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self        !! the results
+    character(*), intent(in) :: name                  !! of the array, below `/points`
+    integer(i1), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i1
 
-  !> Begin the output of the state at `time` [s].
+  !> Begin the output of the state at `time` [s]. An error if the results are not open, if another
+  !> output is under way, or if the files cannot be written.
   subroutine begin_output(self, time, error)
-    class(results_type), intent(inout) :: self
-    real(wp), intent(in) :: time
+    class(results_type), intent(inout) :: self  !! open; an output is under way on return
+    real(wp), intent(in) :: time                !! of the state [s]; in a relaxation its load factor
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. self%open .or. self%in_output) then
@@ -200,10 +213,12 @@ contains
     self%in_output = .not. allocated(error)
   end subroutine begin_output
 
+  !> A field of one component, by its number. An error outside an output, for a field given twice or
+  !> of another shape, or if it cannot be written.
   subroutine put_scalar_at(self, field, values, error)
-    class(results_type), intent(inout) :: self
-    integer, intent(in) :: field
-    real(wp), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self     !! with an output under way
+    integer, intent(in) :: field                   !! its number, from 1
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
 
     call check_field(self, field, size(values), 1, error)
@@ -214,10 +229,13 @@ contains
     self%given(field) = .not. allocated(error)
   end subroutine put_scalar_at
 
+  !> A field of three components, by its number. An error outside an output, for a field given twice
+  !> or of another shape, or if it cannot be written.
   subroutine put_vector_at(self, field, values, error)
-    class(results_type), intent(inout) :: self
-    integer, intent(in) :: field
-    real(wp), intent(in) :: values(:, :)
+    class(results_type), intent(inout) :: self  !! with an output under way
+    integer, intent(in) :: field                !! its number, from 1
+    real(wp), intent(in) :: values(:, :)        !! (n_points, 3) in point order, in the field's
+                                                !! unit; unused components 0
     type(error_type), allocatable, intent(out) :: error
 
     call check_field(self, field, size(values, 1), size(values, 2), error)
@@ -228,10 +246,11 @@ contains
     self%given(field) = .not. allocated(error)
   end subroutine put_vector_at
 
+  !> A field of one component, by its name. An error as by its number, and for an unknown name.
   subroutine put_scalar_named(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self     !! with an output under way
+    character(*), intent(in) :: name               !! of the field
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
     integer :: field
 
@@ -239,10 +258,12 @@ contains
     if (.not. allocated(error)) call self%put_field(field, values, error)
   end subroutine put_scalar_named
 
+  !> A field of three components, by its name. An error as by its number, and for an unknown name.
   subroutine put_vector_named(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), intent(in) :: values(:, :)
+    class(results_type), intent(inout) :: self  !! with an output under way
+    character(*), intent(in) :: name            !! of the field
+    real(wp), intent(in) :: values(:, :)        !! (n_points, 3) in point order, in the field's
+                                                !! unit; unused components 0
     type(error_type), allocatable, intent(out) :: error
     integer :: field
 
@@ -286,9 +307,11 @@ contains
     end if
   end subroutine check_field
 
-  !> Complete the output under way; all fields must have been given. History rows so far go with it.
+  !> Complete the output under way. History rows so far go with it. An error if a field has not been
+  !> given, if a file has been removed, or if the files cannot be written.
   subroutine end_output(self, error)
-    class(results_type), intent(inout) :: self
+    class(results_type), intent(inout) :: self  !! with an output under way, which is complete on
+                                                !! return
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: table(:, :)
     integer :: i
@@ -364,10 +387,11 @@ contains
   end subroutine start_files
 
   !> Add a row of the history: a value for each column. Rows reach the files with each output, at
-  !> least about once a second, and with `close`.
+  !> least about once a second, and with `close`. An error if the results are not open, if values
+  !> are missing, or if the files cannot be written.
   subroutine add_row(self, values, error)
-    class(results_type), intent(inout) :: self
-    real(wp), intent(in) :: values(:)
+    class(results_type), intent(inout) :: self  !! open; has one row more on return
+    real(wp), intent(in) :: values(:)           !! (columns), in their units
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. self%open) then
@@ -382,9 +406,9 @@ contains
   !> Add a line about an iteration of a relaxation to `iterations.csv`. Of a run that goes on, lines
   !> up to step `last` stay.
   subroutine add_iteration(self, line, last, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: line
-    integer, intent(in) :: last
+    class(results_type), intent(inout) :: self  !! after the first output; earlier lines are dropped
+    character(*), intent(in) :: line  !! values in the order of the file's head, parted by commas
+    integer, intent(in) :: last                 !! step of the last line that stays
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. self%started .or. self%failed) return
@@ -398,8 +422,8 @@ contains
   !> `warnings.txt`, and in the HDF5 file when the results are complete. What goes wrong with them
   !> is no reason to end a run.
   subroutine put_warnings(self, text)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: text
+    class(results_type), intent(inout) :: self  !! after the first output; earlier calls do nothing
+    character(*), intent(in) :: text            !! a line for each warning; '' for none
     type(sink_type) :: sink
     type(error_type), allocatable :: ignored
 
@@ -457,9 +481,10 @@ contains
       & //' outputs)'
   end subroutine explain_need
 
-  !> Wait until all that was written is on the disk, with the rows that wait.
+  !> Wait until all that was written is on the disk, with the rows that wait. An error if the system
+  !> reports a failure.
   subroutine sync(self, error)
-    class(results_type), intent(inout) :: self
+    class(results_type), intent(inout) :: self  !! open; before the first output this does nothing
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. (self%open .and. self%started)) return
@@ -472,8 +497,9 @@ contains
 
   !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
   pure function rows_and_times(self, but_rows, but_outputs) result(kept)
-    class(results_type), intent(in) :: self
-    integer, intent(in) :: but_rows, but_outputs
+    class(results_type), intent(in) :: self  !! the results
+    integer, intent(in) :: but_rows          !! how many of the last rows to leave out
+    integer, intent(in) :: but_outputs       !! how many of the last outputs to leave out
     type(kept_type) :: kept
 
     kept%rows = self%history%first_rows(but_rows)
@@ -483,17 +509,19 @@ contains
   !> Whether these are the files of a run that goes on, with all that was written before the first
   !> output.
   pure logical function goes_on(self)
-    class(results_type), intent(in) :: self
+    class(results_type), intent(in) :: self  !! the results
     goes_on = self%resumed
   end function goes_on
 
   !> Complete the files. Those of a run that was `stopped` stay as they are, to go on another time;
   !> with `keep_mark` they stay marked as unfinished. After an error in writing they stay as they
-  !> were at the last complete output; if nothing was written, nothing is left behind.
+  !> were at the last complete output; if nothing was written, nothing is left behind. An error if
+  !> what waits cannot be written, or if a file has been removed.
   subroutine close_results(self, error, stopped, keep_mark)
-    class(results_type), intent(inout) :: self
+    class(results_type), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error
-    logical, intent(in), optional :: stopped, keep_mark
+    logical, intent(in), optional :: stopped    !! leave the files to a run that goes on; absent: no
+    logical, intent(in), optional :: keep_mark  !! keep the mark of unfinished results; absent: no
     type(error_type), allocatable :: ignored
     logical :: leave, complete
 

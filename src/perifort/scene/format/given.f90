@@ -13,7 +13,7 @@ contains
 
   !> Whether the user has given this value.
   elemental logical function is_set(value)
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value  !! of a real key
     is_set = value > unset
   end function is_set
 

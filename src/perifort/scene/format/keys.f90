@@ -66,8 +66,9 @@ contains
 
   !> Begin a group in a mode that needs no file.
   subroutine start(keys, mode)
-    class(keys_type), intent(inout) :: keys
-    integer, intent(in) :: mode
+    class(keys_type), intent(inout) :: keys  !! the visitor, without a key on return
+    integer, intent(in) :: mode              !! `mode_describe` or `mode_write`; `mode_read` needs
+                                             !! `start_reading`
 
     keys%mode = mode
     keys%count = 0
@@ -96,9 +97,10 @@ contains
 
   !> Begin to read group number `section` of a scanned file.
   subroutine start_reading(keys, source, section)
-    class(keys_type), intent(inout) :: keys
-    type(source_type), intent(in), target :: source
-    integer, intent(in) :: section
+    class(keys_type), intent(inout) :: keys  !! the visitor, without a key or an error on return
+    type(source_type), intent(in), target :: source  !! the scanned file; it must stay in its place
+                                                     !! until the group is read
+    integer, intent(in) :: section                   !! number of the group in it
 
     call keys%start(mode_read)
     keys%source => source
@@ -109,9 +111,10 @@ contains
     allocate (keys%used(source%entry_count), source=.false.)
   end subroutine start_reading
 
-  !> After the last key: an unknown key first, then a faulty value, then a missing key.
+  !> After the last key: the error of an unknown key first, then of a faulty value, then of a
+  !> missing key.
   subroutine finish_reading(keys, error)
-    class(keys_type), intent(inout) :: keys
+    class(keys_type), intent(inout) :: keys  !! the visitor after the last key; keeps no error
     type(error_type), allocatable, intent(out) :: error
     character(64), allocatable :: names(:)
     character(:), allocatable :: nearest, note
@@ -143,15 +146,20 @@ contains
   !> A text. `allowed`: the only values, matched in any case; `word`: a name that may stand in
   !> column headers, so letters, digits, `_` and `-` only; `hidden`: not to be written.
   subroutine text_key(keys, name, value, meaning, required, allowed, default, word, hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
+    class(keys_type), intent(inout) :: keys           !! the visitor; notes the key, and in reading
+                                                      !! what is wrong with it
+    character(*), intent(in) :: name                  !! of the key, in lower case
     ! allow(C072): a text is assigned only after its length has been checked.
-    character(*), intent(inout) :: value
-    character(*), intent(in) :: meaning
-    logical, intent(in), optional :: required
-    character(*), intent(in), optional :: allowed(:)
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: word, hidden
+    character(*), intent(inout) :: value              !! component of the group; set in reading
+                                                      !! where the file gives it
+    character(*), intent(in) :: meaning               !! what the reference says of the key
+    logical, intent(in), optional :: required         !! the file must give it; absent: no
+    character(*), intent(in), optional :: allowed(:)  !! (any number), the only values, matched in
+                                                      !! any case; absent: any text
+    character(*), intent(in), optional :: default     !! how the reference calls the default;
+                                                      !! absent: by the value
+    logical, intent(in), optional :: word             !! letters, digits, _ and - only; absent: no
+    logical, intent(in), optional :: hidden           !! the value is not written; absent: it is
     character(:), allocatable :: choice, shown, message, note
     integer, allocatable :: slots(:)
 
@@ -174,14 +182,19 @@ contains
   !> A whole number within `at_least` and `at_most`.
   subroutine integer_key(keys, name, value, unit, meaning, required, at_least, at_most, default, &
       & hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    integer, intent(in), optional :: at_least, at_most
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: hidden
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    integer, intent(inout) :: value                !! component of the group; set in reading where
+                                                   !! the file gives it
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    integer, intent(in), optional :: at_least      !! smallest value; absent: no such bound
+    integer, intent(in), optional :: at_most       !! largest value; absent: no such bound
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
 
@@ -202,14 +215,21 @@ contains
   !> A real within the open bounds `above`, `below` and the closed ones `at_least`, `at_most`.
   subroutine real_key(keys, name, value, unit, meaning, required, above, below, at_least, at_most, &
       & default, hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    real(wp), intent(in), optional :: above, below, at_least, at_most
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: hidden
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    real(wp), intent(inout) :: value               !! component of the group; set in reading where
+                                                   !! the file gives it
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    real(wp), intent(in), optional :: above  !! the value must be larger; absent: no such bound
+    real(wp), intent(in), optional :: below  !! the value must be smaller; absent: no such bound
+    real(wp), intent(in), optional :: at_least     !! smallest value; absent: no such bound
+    real(wp), intent(in), optional :: at_most      !! largest value; absent: no such bound
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
 
@@ -231,10 +251,12 @@ contains
 
   !> True or false.
   subroutine logical_key(keys, name, value, meaning)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    logical, intent(inout) :: value
-    character(*), intent(in) :: meaning
+    class(keys_type), intent(inout) :: keys  !! the visitor; notes the key, and in reading what is
+                                             !! wrong with it
+    character(*), intent(in) :: name         !! of the key, in lower case
+    logical, intent(inout) :: value          !! component of the group; set in reading where the
+                                             !! file gives it
+    character(*), intent(in) :: meaning      !! what the reference says of the key
     integer, allocatable :: slots(:)
     character(:), allocatable :: message, note
 
@@ -248,13 +270,17 @@ contains
 
   !> Whole numbers along the directions.
   subroutine integers_key(keys, name, value, unit, meaning, required, at_least, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value(:)
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    integer, intent(in), optional :: at_least
-    character(*), intent(in), optional :: default
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    integer, intent(inout) :: value(:)             !! (directions); elements are set in reading
+                                                   !! where the file gives them
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    integer, intent(in), optional :: at_least      !! smallest value of each; absent: no such bound
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i
@@ -274,13 +300,17 @@ contains
 
   !> Reals along the directions; elements that are not given keep their defaults.
   subroutine reals_key(keys, name, value, unit, meaning, required, default, hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value(:)
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: hidden
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    real(wp), intent(inout) :: value(:)            !! (directions); elements are set in reading
+                                                   !! where the file gives them
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     integer :: i
     character(:), allocatable :: shown, message, note
@@ -303,10 +333,13 @@ contains
 
   !> A matrix, its elements in column order if no subscripts are given.
   subroutine matrix_key(keys, name, value, unit, meaning)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value(:, :)
-    character(*), intent(in) :: unit, meaning
+    class(keys_type), intent(inout) :: keys  !! the visitor; notes the key, and in reading what is
+                                             !! wrong with it
+    character(*), intent(in) :: name         !! of the key, in lower case
+    real(wp), intent(inout) :: value(:, :)   !! (rows, columns); elements are set in reading where
+                                             !! the file gives them
+    character(*), intent(in) :: unit         !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning      !! what the reference says of the key
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i, j, k
@@ -329,11 +362,14 @@ contains
 
   !> Three keys `<name>_x`, `<name>_y`, `<name>_z` for the components of one vector.
   subroutine triple(keys, name, value, unit, meaning, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value(3)
-    character(*), intent(in) :: unit, meaning
-    character(*), intent(in), optional :: default
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! what the three names begin with
+    real(wp), intent(inout) :: value(3)  !! (3), x, y, z; set in reading where the file gives them
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning  !! what the reference says of them, before `along x`
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
     character(*), parameter :: directions = 'xyz'
     integer :: i
 
@@ -345,11 +381,15 @@ contains
 
   !> Reals, as many as are given.
   subroutine real_list(keys, name, value, unit, meaning, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), allocatable, intent(inout) :: value(:)
-    character(*), intent(in) :: unit, meaning
-    character(*), intent(in), optional :: default
+    class(keys_type), intent(inout) :: keys           !! the visitor; notes the key, and in reading
+                                                      !! what is wrong with it
+    character(*), intent(in) :: name                  !! of the key, in lower case
+    real(wp), allocatable, intent(inout) :: value(:)  !! (any number); in reading made anew if the
+                                                      !! file gives the key
+    character(*), intent(in) :: unit                  !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning               !! what the reference says of the key
+    character(*), intent(in), optional :: default     !! how the reference calls the default;
+                                                      !! absent: by the value
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i
@@ -411,12 +451,14 @@ contains
 
   !> Values of any kind, as many as are given, kept as they are written: texts with their quotes.
   subroutine words(keys, name, value, meaning, required)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
+    class(keys_type), intent(inout) :: keys    !! the visitor; notes the key, and in reading what is
+                                               !! wrong with it
+    character(*), intent(in) :: name           !! of the key, in lower case
     ! allow(C072): a text is assigned only after its length has been checked.
-    character(*), allocatable, intent(inout) :: value(:)
-    character(*), intent(in) :: meaning
-    logical, intent(in), optional :: required
+    character(*), allocatable, intent(inout) :: value(:)  !! (any number); in reading made anew if
+                                                          !! the file gives the key
+    character(*), intent(in) :: meaning        !! what the reference says of the key
+    logical, intent(in), optional :: required  !! the file must give it; absent: no
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i

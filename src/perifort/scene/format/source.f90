@@ -60,11 +60,13 @@ module pd_scene_format_source
 
 contains
 
-  !> Scan `text`; `file` is the name used in messages.
+  !> Find groups, keys and values in `text`; `file` is the name used in messages. An error, with its
+  !> place, if text stands outside of groups, if a group or quote is not closed, if a key or value
+  !> is missing, or for a control character.
   subroutine scan_source(text, file, source, error)
-    character(*), intent(in) :: text
-    character(*), intent(in) :: file
-    type(source_type), intent(out) :: source
+    character(*), intent(in) :: text          !! of the scene file
+    character(*), intent(in) :: file          !! name of the file, for messages
+    type(source_type), intent(out) :: source  !! its groups, keys and values with their places
     type(error_type), allocatable, intent(out) :: error
     integer :: line, column, state
     logical :: inside
@@ -100,7 +102,7 @@ contains
   !> An error if the lines hold a control character other than a tab: no text file does, and shown
   !> on a terminal or put into a name it does harm.
   subroutine check_text(source, error)
-    type(source_type), intent(in) :: source
+    type(source_type), intent(in) :: source  !! with its lines and the file's name
     type(error_type), allocatable, intent(out) :: error
     integer :: line, column
 
@@ -407,10 +409,12 @@ contains
   !> Make an error with place, line and carets. `line` 0 names the file only; lines of options name
   !> the command line.
   subroutine source_fault(source, line, column, width, message, note, error)
-    type(source_type), intent(in) :: source
-    integer, intent(in) :: line, column, width
-    character(*), intent(in) :: message
-    character(*), intent(in) :: note
+    type(source_type), intent(in) :: source  !! with its lines and the file's name
+    integer, intent(in) :: line              !! number of the line, from 1; 0: of none
+    integer, intent(in) :: column            !! of the first character at fault, from 1
+    integer, intent(in) :: width             !! number of characters at fault
+    character(*), intent(in) :: message      !! what was wrong
+    character(*), intent(in) :: note         !! what was expected; '' for nothing
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: number, text, shown, pad, place
     integer :: first, last, i, carets

@@ -28,9 +28,9 @@ contains
 
   !> A finite real; `note` says what was expected if the word is not one, else it is ''.
   subroutine parse_real(word, value, note, tiny_is_zero)
-    character(*), intent(in) :: word
-    real(wp), intent(out) :: value
-    character(:), allocatable, intent(out) :: note
+    character(*), intent(in) :: word                !! without blanks
+    real(wp), intent(out) :: value                  !! to be used only if `note` is ''
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the word is good
     logical, intent(in), optional :: tiny_is_zero  !! read sizes below 1/largest_real as 0, as
                                                    !! computed tables have them, instead of
                                                    !! refusing them (default)
@@ -96,9 +96,9 @@ contains
 
   !> A whole number; `note` says what was expected if the word is not one, else it is ''.
   subroutine parse_integer(word, value, note)
-    character(*), intent(in) :: word
-    integer, intent(out) :: value
-    character(:), allocatable, intent(out) :: note
+    character(*), intent(in) :: word                !! without blanks
+    integer, intent(out) :: value                   !! to be used only if `note` is ''
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the word is good
     integer :: first, status
 
     value = 0
@@ -117,9 +117,9 @@ contains
 
   !> True or false; `note` says what was expected if the word is neither, else it is ''.
   subroutine parse_logical(word, value, note)
-    character(*), intent(in) :: word
-    logical, intent(out) :: value
-    character(:), allocatable, intent(out) :: note
+    character(*), intent(in) :: word                !! without blanks
+    logical, intent(out) :: value                   !! to be used only if `note` is ''
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the word is good
 
     note = ''
     value = .false.
@@ -135,7 +135,7 @@ contains
 
   !> The shortest decimal that reads back to the very same bits.
   function exact_text(value) result(text)
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value  !! finite
     character(:), allocatable :: text
     integer :: n, status
     real(wp) :: back
@@ -150,7 +150,7 @@ contains
 
   !> A text in single quotes, quotes inside it doubled.
   pure function quoted_text(text) result(quoted)
-    character(*), intent(in) :: text
+    character(*), intent(in) :: text  !! any characters
     character(:), allocatable :: quoted
     integer :: i
 
@@ -164,7 +164,7 @@ contains
 
   !> Reals parted by commas.
   function reals_text(values) result(text)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)  !! (any number), finite
     character(:), allocatable :: text
     integer :: i
 
@@ -177,7 +177,7 @@ contains
 
   !> Whole numbers parted by commas.
   pure function integers_text(values) result(text)
-    integer, intent(in) :: values(:)
+    integer, intent(in) :: values(:)  !! (any number)
     character(:), allocatable :: text
     integer :: i
 
@@ -191,9 +191,9 @@ contains
   !> The given elements of a vector as they stand behind its key and a `=`. Where there is a gap the
   !> elements are spelled one by one, the first without the key's own name.
   function vector_text(name, values, given) result(text)
-    character(*), intent(in) :: name
-    real(wp), intent(in) :: values(:)
-    logical, intent(in) :: given(:)
+    character(*), intent(in) :: name   !! of the key
+    real(wp), intent(in) :: values(:)  !! (n), finite where given
+    logical, intent(in) :: given(:)    !! (n), whether the element is to be written
     character(:), allocatable :: text
     integer :: i
 
@@ -212,7 +212,7 @@ contains
 
   !> Quoted texts parted by commas.
   pure function texts_text(values) result(text)
-    character(*), intent(in) :: values(:)
+    character(*), intent(in) :: values(:)  !! (any number); blanks at their ends are cut
     character(:), allocatable :: text
     integer :: i
 

@@ -68,11 +68,12 @@ module pd_study_bench_kernels
 contains
 
   !> Build and time one kernel. Each repeat takes at least `seconds`; there are five, and on a
-  !> restless machine (least and most differ by over a tenth) up to twenty if they are short.
+  !> machine with other work (least and most differ by over a tenth) up to twenty if they are short.
+  !> An error if the scene cannot be set up or its run fails.
   subroutine measure_kernel(kernel, seconds, timing, error)
-    type(kernel_type), intent(in) :: kernel
-    real(wp), intent(in) :: seconds
-    type(timing_type), intent(out) :: timing
+    type(kernel_type), intent(in) :: kernel   !! what is measured
+    real(wp), intent(in) :: seconds           !! least wall time of a repeat [s]
+    type(timing_type), intent(out) :: timing  !! what came out; without meaning after an error
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
     type(scene_type) :: scene
@@ -102,8 +103,9 @@ contains
 
   !> A steel cube, plate or bar of a kernel's kind, horizon 3.015 spacings.
   pure subroutine standard_scene(kernel, scene)
-    type(kernel_type), intent(in) :: kernel
-    type(scene_type), intent(out) :: scene
+    type(kernel_type), intent(in) :: kernel  !! gives dimension, points and what is measured of them
+    type(scene_type), intent(out) :: scene   !! of one body without loads and boundaries, for one
+                                             !! step
     real(wp), parameter :: spacing = 1.0e-3_wp                   ! [m]
     real(wp), parameter :: far_away = 0.1_wp                     ! stretch that is never reached [-]
     ! in 2D (plane stress) and 3D bond-based bodies have no other; in 1D any will do
@@ -225,11 +227,12 @@ contains
     timing%forces = median(samples)
   end subroutine time_forces
 
-  !> The clocks at every `stride`-th step.
+  !> The clocks at every `stride`-th step. No error is set.
   subroutine look_at_clock(observer, system, instant, error)
-    class(stopwatch_type), intent(inout) :: observer
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
+    class(stopwatch_type), intent(inout) :: observer  !! reads the clocks once more on return if
+                                                      !! that is due
+    type(system_type), intent(inout) :: system        !! not looked at
+    type(instant_type), intent(in) :: instant         !! gives the step
     type(error_type), allocatable, intent(out) :: error
 
     if (mod(instant%step, observer%stride) /= 0) return
@@ -254,7 +257,8 @@ contains
   !> stored weights save 6 and are not counted.
   !> Unprojected, the sum of the dilatation is 2 less, and what it adds to the force 3.
   pure real(wp) function flops_of_bond(family, kind) result(flops)
-    class(family_type), intent(in) :: family
+    class(family_type), intent(in) :: family  !! of lists or of one lattice; any other kind is an
+                                              !! internal fault
     integer, intent(in) :: kind  !! of the dilatation, see `dilatation_of`
     integer :: d, geometry
     logical :: dilatation
@@ -289,7 +293,7 @@ contains
   !> pass: number and bits of every cluster's members, and what a point has in one place, read and
   !> written with the displacements in it, and read again by the loop.
   pure real(wp) function bytes_of_step(system) result(bytes)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! gives dimension, points, bonds and model
     integer :: d, passes
     real(wp) :: points
     logical :: both
@@ -321,7 +325,8 @@ contains
   !> Memory that a kernel will need while it is built [bytes], on the safe side: what a machine does
   !> not have is better not begun.
   pure real(wp) function bytes_needed(kernel) result(bytes)
-    type(kernel_type), intent(in) :: kernel
+    type(kernel_type), intent(in) :: kernel  !! gives dimension, points, family and surface
+                                             !! correction
     ! bonds of an inner point at 3.015 spacings: 6, 28, 122
     real(wp), parameter :: bonds(3) = [6.0_wp, 28.0_wp, 122.0_wp]
     real(wp) :: points

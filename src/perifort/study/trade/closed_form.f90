@@ -220,8 +220,13 @@ contains
   !> on one side; `fraction` are their volume corrections.
   pure real(wp) function chain_frequency(k, spacing, delta, modulus, density, fraction) &
       & result(frequency)
-    real(wp), intent(in) :: k, spacing, delta, modulus, density
-    real(wp), intent(in) :: fraction(:)
+    real(wp), intent(in) :: k            !! wave number [1/m]
+    real(wp), intent(in) :: spacing      !! h, of the points [m]
+    real(wp), intent(in) :: delta        !! horizon [m]
+    real(wp), intent(in) :: modulus      !! E, surface correction included [Pa]
+    real(wp), intent(in) :: density      !! rho [kg/m3]
+    real(wp), intent(in) :: fraction(:)  !! (neighbours on one side), volume corrections of the
+                                         !! nearest first [-]
     real(wp) :: total
     integer :: j
 

@@ -130,10 +130,11 @@ contains
   !> The norm of the differences of a record from its reference, of the same shape. `of` (place,
   !> row) says what is compared.
   pure real(wp) function difference(norm, record, reference, of) result(error)
-    character(*), intent(in) :: norm
-    type(record_type), intent(in) :: record
-    real(wp), intent(in) :: reference(:, :, :)
-    logical, intent(in) :: of(:, :)
+    character(*), intent(in) :: norm            !! 'rms', 'maximum' or 'relative'
+    type(record_type), intent(in) :: record     !! what the run showed
+    real(wp), intent(in) :: reference(:, :, :)  !! (component, place, row), in the unit of the
+                                                !! record
+    logical, intent(in) :: of(:, :)             !! (place, row), whether it is compared
     real(wp) :: squares, answer, weights, square, largest
     integer :: p, r
 
@@ -167,7 +168,7 @@ contains
   !> places the root of the mean square, weighted as in the norm. Of a single place its value with
   !> its sign. 0 without rows.
   pure real(wp) function value_of(record) result(value)
-    type(record_type), intent(in) :: record
+    type(record_type), intent(in) :: record  !! what the run showed
     integer :: p
 
     value = 0.0_wp
@@ -186,7 +187,7 @@ contains
 
   !> The unit of an error, '' if it has none.
   pure function measure_unit(measure) result(unit)
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure  !! with its norm
     character(:), allocatable :: unit
 
     unit = ''
@@ -195,7 +196,7 @@ contains
 
   !> The unit of what is measured, '' if it has none.
   pure function quantity_unit(measure) result(unit)
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure  !! with its kind and field
     character(:), allocatable :: unit
 
     unit = trim(measure%unit)

@@ -336,10 +336,11 @@ contains
     end do
   end function describe
 
-  !> The scene of a run from its words.
+  !> The scene of a run from its words. An error, at the place of the value in `&study`, if the
+  !> scene is refused.
   subroutine scene_of(plan, trial, error)
-    type(plan_type), intent(in) :: plan
-    type(trial_type), intent(inout) :: trial
+    type(plan_type), intent(in) :: plan       !! of the study
+    type(trial_type), intent(inout) :: trial  !! with its words; its scene is set on return
     type(error_type), allocatable, intent(out) :: error
     type(source_type) :: source
     type(token_type) :: place
@@ -426,7 +427,7 @@ contains
 
   !> The greatest common divisor; that of 0 and a number is the number.
   pure integer function common_divisor(first, second) result(divisor)
-    integer, intent(in) :: first, second
+    integer, intent(in) :: first, second  !! 0 or positive
     integer :: rest, next
 
     divisor = first
@@ -441,7 +442,8 @@ contains
   !> Points, spacing and an estimate of the work of a run; an error if it does not fit into the
   !> memory.
   subroutine size_up(trial, error)
-    type(trial_type), intent(inout) :: trial
+    type(trial_type), intent(inout) :: trial  !! with its scene; points, spacing, bonds and work are
+                                              !! set
     type(error_type), allocatable, intent(out) :: error
     type(body_type) :: body
     real(wp) :: delta, steps, speed, extent
@@ -497,7 +499,7 @@ contains
 
   !> A value without its quotes, and parted by blanks if it is a vector.
   pure function shown_word(word) result(text)
-    character(*), intent(in) :: word
+    character(*), intent(in) :: word  !! as it stands in the scene file
     character(:), allocatable :: text
     integer :: comma
 

@@ -86,8 +86,9 @@ contains
     real(wp), intent(in) :: around
     logical, intent(in) :: terminal            !! show the progress of the steps
     type(closed_form_type), allocatable, intent(inout) :: form
-    type(outcome_type), intent(out) :: outcome
-    type(record_type), intent(out) :: record
+      !! what is compared with, completed on return; not allocated: none
+    type(outcome_type), intent(out) :: outcome  !! what the run came to
+    type(record_type), intent(out) :: record    !! what was measured, as far as the run went
     type(error_type), allocatable, intent(out) :: error
     type(watcher_type) :: watcher
     type(error_type), allocatable :: fault
@@ -119,6 +120,7 @@ contains
     type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
     type(measure_type), intent(in) :: measure
     type(closed_form_type), allocatable, intent(inout) :: form
+      !! what is compared with, completed on return; not allocated: none
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: checked
     type(set_up_type) :: set_up
@@ -285,11 +287,12 @@ contains
     end associate
   end subroutine choose_places
 
-  !> The progress, and on rows what is measured and the balance.
+  !> The progress, and on rows what is measured and the balance. An error, of an interrupted run, if
+  !> the user has asked to stop.
   subroutine observe(observer, system, instant, error)
-    class(watcher_type), intent(inout) :: observer
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
+    class(watcher_type), intent(inout) :: observer  !! keeps what is measured, and the balance
+    type(system_type), intent(inout) :: system      !! at this instant
+    type(instant_type), intent(in) :: instant       !! step and time of the run
     type(error_type), allocatable, intent(out) :: error
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :)
