@@ -36,12 +36,14 @@ module pd_study_trade_choose
 
 contains
 
-  !> The whole command. `target`: the error to be met; `limit`: the longest a run may take [s], 0
-  !> for any. An error with the status of bad input if the target is missed.
+  !> The whole command: the runs of the study, then the settings that are predicted to be the
+  !> fastest, run and compared with their prediction. An error if the study cannot be planned or
+  !> run, if no settings can be chosen, or, with the status of bad input, if the target is missed.
   subroutine run_choose(path, options, target, limit, error)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
-    real(wp), intent(in) :: target, limit
+    character(*), intent(in) :: path               !! of the scene file
+    type(run_options_type), intent(in) :: options  !! of the command line
+    real(wp), intent(in) :: target  !! error to be met, in the norm and unit of the study
+    real(wp), intent(in) :: limit                  !! longest time of a run; 0: any [s]
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session
     type(choice_type) :: choice

@@ -44,8 +44,8 @@ contains
 
   !> Components of a field in `dim` directions.
   pure integer function components_of(field, dim) result(number)
-    character(*), intent(in) :: field
-    integer, intent(in) :: dim
+    character(*), intent(in) :: field  !! its name, such as `displacement`
+    integer, intent(in) :: dim         !! of the scene: 1, 2 or 3
     select case (field)
     case ('displacement', 'velocity', 'force_density'); number = dim
     case default; number = 1  ! all others are scalars
@@ -55,12 +55,12 @@ contains
   !> The field at `x` (dim) [m] and time `t` [s]; `known` is false where the form says nothing of
   !> it.
   pure subroutine field_at(form, field, x, t, values, known)
-    type(closed_form_type), intent(in) :: form
-    character(*), intent(in) :: field
-    real(wp), intent(in) :: x(:)
-    real(wp), intent(in) :: t
-    real(wp), intent(out) :: values(:)
-    logical, intent(out) :: known
+    type(closed_form_type), intent(in) :: form  !! complete
+    character(*), intent(in) :: field           !! its name, such as `displacement`
+    real(wp), intent(in) :: x(:)                !! position (dim) [m]
+    real(wp), intent(in) :: t                   !! time [s]
+    real(wp), intent(out) :: values(:)  !! (components of the field) in its unit; 0 if not known
+    logical, intent(out) :: known  !! whether the form has the field at this place and time
 
     values = 0.0_wp
     known = all(x >= form%lower) .and. all(x <= form%upper)
@@ -253,8 +253,13 @@ contains
   !> on one side; `fraction` are their volume corrections.
   pure real(wp) function chain_frequency(k, spacing, delta, modulus, density, fraction) &
       & result(frequency)
-    real(wp), intent(in) :: k, spacing, delta, modulus, density
-    real(wp), intent(in) :: fraction(:)
+    real(wp), intent(in) :: k            !! wave number [1/m]
+    real(wp), intent(in) :: spacing      !! h, of the points [m]
+    real(wp), intent(in) :: delta        !! horizon [m]
+    real(wp), intent(in) :: modulus      !! E, surface correction included [Pa]
+    real(wp), intent(in) :: density      !! rho [kg/m3]
+    real(wp), intent(in) :: fraction(:)  !! (neighbours on one side), volume corrections of the
+                                         !! nearest first [-]
     real(wp) :: total
     integer :: j
 

@@ -45,12 +45,17 @@ module pd_study_trade_measure
 
 contains
 
-  !> What the name `name` means in a scene; `source` gives an error its place.
+  !> What the name `name` means in a scene. An error, at its place in `source`, if nothing has that
+  !> name, or if a region is given for anything but a field.
   subroutine resolve_measure(name, region, norm, scene, source, measure, error)
-    character(*), intent(in) :: name, region, norm
-    type(scene_type), intent(in) :: scene
-    type(source_type), intent(in) :: source
-    type(measure_type), intent(out) :: measure
+    character(*), intent(in) :: name            !! as the user wrote it: of a probe, a column of the
+                                                !! history or a field
+    character(*), intent(in) :: region          !! of a field; '' for all points of bodies
+    character(*), intent(in) :: norm            !! 'rms', 'maximum' or 'relative'
+    type(scene_type), intent(in) :: scene       !! gives the probes and boundaries
+    type(source_type), intent(in) :: source     !! the scanned file of the scene, for the place of
+                                                !! an error
+    type(measure_type), intent(out) :: measure  !! what the name means
     type(error_type), allocatable, intent(out) :: error
     character(name_length), allocatable :: columns(:)
     character(:), allocatable :: probe, rest
@@ -149,10 +154,11 @@ contains
   !> The norm of the differences of a record from its reference, of the same shape. `of` (place,
   !> row) says what is compared.
   pure real(wp) function difference(norm, record, reference, of) result(error)
-    character(*), intent(in) :: norm
-    type(record_type), intent(in) :: record
-    real(wp), intent(in) :: reference(:, :, :)
-    logical, intent(in) :: of(:, :)
+    character(*), intent(in) :: norm            !! 'rms', 'maximum' or 'relative'
+    type(record_type), intent(in) :: record     !! what the run showed
+    real(wp), intent(in) :: reference(:, :, :)  !! (component, place, row), in the unit of the
+                                                !! record
+    logical, intent(in) :: of(:, :)             !! (place, row), whether it is compared
     real(wp) :: squares, answer, weights, square, largest
     integer :: p, r
 
@@ -186,7 +192,7 @@ contains
   !> places the root of the mean square, weighted as in the norm. Of a single place its value with
   !> its sign. 0 without rows.
   pure real(wp) function value_of(record) result(value)
-    type(record_type), intent(in) :: record
+    type(record_type), intent(in) :: record  !! what the run showed
     integer :: p
 
     value = 0.0_wp
@@ -205,7 +211,7 @@ contains
 
   !> The unit of an error, '' if it has none or is not known.
   pure function measure_unit(measure) result(unit)
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure  !! with its norm
     character(:), allocatable :: unit
 
     unit = ''
@@ -214,7 +220,7 @@ contains
 
   !> The unit of what is measured, '' if it has none or is not known.
   pure function quantity_unit(measure) result(unit)
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure  !! with its kind and field
     character(:), allocatable :: unit
 
     unit = ''

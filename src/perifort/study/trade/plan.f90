@@ -63,10 +63,12 @@ module pd_study_trade_plan
 
 contains
 
-  !> Plan the study in the scene file at `path`.
+  !> Plan the study in the scene file at `path`. An error if the file cannot be read or has no
+  !> study, if a key or value of a group `&study` is wrong, if the scene of a run is refused or does
+  !> not fit into the memory, or if there are too many runs.
   subroutine plan_study(path, plan, error)
-    character(*), intent(in) :: path
-    type(plan_type), intent(out) :: plan
+    character(*), intent(in) :: path      !! of the scene file
+    type(plan_type), intent(out) :: plan  !! variables and runs, with the scene of each
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: text
 
@@ -75,10 +77,11 @@ contains
     call plan_from_text(text, path, plan, error)
   end subroutine plan_study
 
-  !> The same from a text; `name` stands for the file in messages.
+  !> The same from a text, with the same errors; `name` stands for the file in messages.
   subroutine plan_from_text(text, name, plan, error)
-    character(*), intent(in) :: text, name
-    type(plan_type), intent(out) :: plan
+    character(*), intent(in) :: text      !! of the scene file
+    character(*), intent(in) :: name      !! of the file, for messages
+    type(plan_type), intent(out) :: plan  !! variables and runs, with the scene of each
     type(error_type), allocatable, intent(out) :: error
 
     call scan_source(text, name, plan%source, error)
@@ -304,10 +307,11 @@ contains
     end do
   end function describe
 
-  !> The scene of a run from its words.
+  !> The scene of a run from its words. An error, at the place of the value in `&study`, if the
+  !> scene is refused.
   subroutine scene_of(plan, trial, error)
-    type(plan_type), intent(in) :: plan
-    type(trial_type), intent(inout) :: trial
+    type(plan_type), intent(in) :: plan       !! of the study
+    type(trial_type), intent(inout) :: trial  !! with its words; its scene is set on return
     type(error_type), allocatable, intent(out) :: error
     type(source_type) :: source
     type(token_type) :: place
@@ -394,7 +398,7 @@ contains
 
   !> The greatest common divisor; that of 0 and a number is the number.
   pure integer function common_divisor(first, second) result(divisor)
-    integer, intent(in) :: first, second
+    integer, intent(in) :: first, second  !! 0 or positive
     integer :: rest, next
 
     divisor = first
@@ -409,7 +413,8 @@ contains
   !> Points, spacing and an estimate of the work of a run; an error if it does not fit into the
   !> memory.
   subroutine size_up(trial, error)
-    type(trial_type), intent(inout) :: trial
+    type(trial_type), intent(inout) :: trial  !! with its scene; points, spacing, bonds and work are
+                                              !! set
     type(error_type), allocatable, intent(out) :: error
     type(body_type) :: body
     real(wp) :: delta, steps, speed, extent
@@ -465,7 +470,7 @@ contains
 
   !> A value without its quotes, and parted by blanks if it is a vector.
   pure function shown_word(word) result(text)
-    character(*), intent(in) :: word
+    character(*), intent(in) :: word  !! as it stands in the scene file
     character(:), allocatable :: text
     integer :: comma
 

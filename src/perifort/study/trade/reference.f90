@@ -21,11 +21,11 @@ contains
   !> The error of a record by a closed form. `fault` is '' unless the form says nothing of what is
   !> measured.
   subroutine judge_by_form(form, measure, record, error_norm, fault)
-    type(closed_form_type), intent(in) :: form
-    type(measure_type), intent(in) :: measure
-    type(record_type), intent(in) :: record
-    real(wp), intent(out) :: error_norm
-    character(:), allocatable, intent(out) :: fault
+    type(closed_form_type), intent(in) :: form       !! complete
+    type(measure_type), intent(in) :: measure        !! a probe or a field
+    type(record_type), intent(in) :: record          !! what the run showed
+    real(wp), intent(out) :: error_norm  !! the error, in the norm of the measure; 0 with a fault
+    character(:), allocatable, intent(out) :: fault  !! why there is no error; '' if there is one
     real(wp), allocatable :: reference(:, :, :), values(:)
     logical, allocatable :: of(:, :)
     integer :: p, r
@@ -56,13 +56,14 @@ contains
   end subroutine judge_by_form
 
   !> The error of a record by another one, that of the finest run or of a file: interpolated to the
-  !> places and instants of `record`, as far as it reaches.
+  !> places and instants of `record`, as far as it reaches. `fault` is '' unless final states are of
+  !> different times, or no place and instant of the run lies within those compared with.
   subroutine judge_by_record(truth, measure, record, error_norm, fault)
-    type(record_type), intent(in) :: truth
-    type(measure_type), intent(in) :: measure
-    type(record_type), intent(in) :: record
-    real(wp), intent(out) :: error_norm
-    character(:), allocatable, intent(out) :: fault
+    type(record_type), intent(in) :: truth           !! what is compared with
+    type(measure_type), intent(in) :: measure        !! what was measured, with its norm
+    type(record_type), intent(in) :: record          !! what the run showed
+    real(wp), intent(out) :: error_norm  !! the error, in the norm of the measure; 0 with a fault
+    character(:), allocatable, intent(out) :: fault  !! why there is no error; '' if there is one
     type(cells_type) :: cells
     type(stencil_type) :: around, rows
     real(wp), allocatable :: reference(:, :, :)
@@ -113,14 +114,14 @@ contains
   end subroutine judge_by_record
 
   !> What a file says of the measure: `.vtkhdf` results, or a table whose first line names its
-  !> columns. Histories need `time` and the column itself or the probe's columns; fields need
-  !> `x` .. and the field's columns.
+  !> columns. Histories need `time` and the column itself or the probe's columns; fields need `x` ..
+  !> and the field's columns. An error if the file cannot be read or lacks one of these.
   subroutine read_reference(path, measure, probe, dim, record, error)
-    character(*), intent(in) :: path
-    type(measure_type), intent(in) :: measure
+    character(*), intent(in) :: path             !! of the file
+    type(measure_type), intent(in) :: measure    !! what is measured
     character(*), intent(in) :: probe            !! name of the probe, '' without
-    integer, intent(in) :: dim
-    type(record_type), intent(out) :: record
+    integer, intent(in) :: dim                   !! of the scene: 1, 2 or 3
+    type(record_type), intent(out) :: record     !! what the file shows of it
     type(error_type), allocatable, intent(out) :: error
 
     if (ending(path) == '.vtkhdf') then

@@ -44,10 +44,11 @@ module pd_study_trade_study
 
 contains
 
-  !> The whole command. An interrupt keeps what is done.
+  !> The whole command. An interrupt keeps what is done. An error if the study cannot be planned or
+  !> run, or if no run has an answer.
   subroutine run_study(path, options, error)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
+    character(*), intent(in) :: path               !! of the scene file
+    type(run_options_type), intent(in) :: options  !! of the command line
     type(error_type), allocatable, intent(out) :: error
     type(session_type) :: session
 
@@ -75,11 +76,12 @@ contains
     text = text//' plot '//quoted(directory)
   end function plot_command
 
-  !> Plan everything, and check and set up every scene before the first run.
+  !> Plan everything, and check and set up every scene before the first run. An error if anything of
+  !> that is not possible, or if there are tables already that must not be overwritten.
   subroutine begin_study(path, options, session, error)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
-    type(session_type), intent(out) :: session
+    character(*), intent(in) :: path               !! of the scene file
+    type(run_options_type), intent(in) :: options  !! of the command line
+    type(session_type), intent(out) :: session     !! ready for its first run on return
     type(error_type), allocatable, intent(out) :: error
     integer :: t
 
@@ -233,9 +235,10 @@ contains
     end if
   end subroutine choose_threads
 
-  !> All runs, coarse to fine; with 'finest' that run comes first, since its answer is needed.
+  !> All runs, coarse to fine; with 'finest' that run comes first, since its answer is needed. An
+  !> error as of `run_one`; what was done before it is in the tables.
   subroutine run_all(session, error)
-    type(session_type), intent(inout) :: session
+    type(session_type), intent(inout) :: session  !! begun; with the outcome of every run on return
     type(error_type), allocatable, intent(out) :: error
     integer, allocatable :: order(:)
     real(wp), allocatable :: work(:)
@@ -254,11 +257,14 @@ contains
       & ' of '//to_text(size(order))//' runs are in '//in_directory(session%directory, 'study.csv')
   end subroutine run_all
 
-  !> Make run `t`, judge it and write the table anew. `remaining`: estimated work of the later runs.
+  !> Make run `t`, compare it and write the tables anew. An error if its scene cannot be set up, if
+  !> the user interrupts, if the finest run has no answer, if nothing of it can be compared, or if
+  !> the tables cannot be written.
   subroutine run_one(session, t, remaining, error, silent)
-    type(session_type), intent(inout) :: session
-    integer, intent(in) :: t
-    real(wp), intent(in) :: remaining
+    type(session_type), intent(inout) :: session  !! begun; with the outcome of this run on return
+    integer, intent(in) :: t                      !! number of the run
+    real(wp), intent(in) :: remaining             !! estimated work of the later runs; 0: their time
+                                                  !! is not shown
     type(error_type), allocatable, intent(out) :: error
     logical, intent(in), optional :: silent      !! the row is not shown
     type(closed_form_type), allocatable :: form
@@ -326,9 +332,9 @@ contains
     end associate
   end subroutine judge
 
-  !> Write study.csv and study.txt with the runs made so far.
+  !> Write study.csv and study.txt with the runs made so far. An error if they cannot be written.
   subroutine keep_tables(session, error)
-    type(session_type), intent(inout) :: session
+    type(session_type), intent(inout) :: session  !! its outcomes get front and true errors
     type(error_type), allocatable, intent(out) :: error
 
     call mark_front(session%outcomes)
@@ -341,8 +347,9 @@ contains
 
   !> One more run at the end of the plan.
   subroutine add_trial(session, trial)
-    type(session_type), intent(inout) :: session
-    type(trial_type), intent(in) :: trial
+    type(session_type), intent(inout) :: session  !! with one run more on return, which is not made
+                                                  !! yet
+    type(trial_type), intent(in) :: trial         !! the run, with words and scene
     type(trial_type), allocatable :: trials(:)
     type(outcome_type), allocatable :: outcomes(:)
     integer :: n
@@ -356,9 +363,10 @@ contains
     call move_alloc(outcomes, session%outcomes)
   end subroutine add_trial
 
+  !> Print to standard output, unless the study is quiet.
   subroutine say(session, text)
-    type(session_type), intent(in) :: session
-    character(*), intent(in) :: text
+    type(session_type), intent(in) :: session  !! tells whether the study is quiet
+    character(*), intent(in) :: text           !! a line or several
     if (session%quiet) return
     write (output_unit, '(a)') text
     flush (output_unit)

@@ -77,13 +77,15 @@ contains
   !> `form` gets what only the points tell of it. An error that ends a run without an answer is kept
   !> in `outcome`; others, and interrupts, in `error`.
   subroutine run_trial(scene, measure, around, terminal, form, outcome, record, error)
-    type(scene_type), intent(in) :: scene
-    type(measure_type), intent(in) :: measure
-    real(wp), intent(in) :: around
+    type(scene_type), intent(in) :: scene       !! to be run
+    type(measure_type), intent(in) :: measure   !! what is measured
+    real(wp), intent(in) :: around              !! of a probe all points so near are kept [m]; 0:
+                                                !! the nearest alone
     logical, intent(in) :: terminal            !! show the progress of the steps
     type(closed_form_type), allocatable, intent(inout) :: form
-    type(outcome_type), intent(out) :: outcome
-    type(record_type), intent(out) :: record
+      !! what is compared with, completed on return; not allocated: none
+    type(outcome_type), intent(out) :: outcome  !! what the run came to
+    type(record_type), intent(out) :: record    !! what was measured, as far as the run went
     type(error_type), allocatable, intent(out) :: error
     type(watcher_type) :: watcher
     type(error_type), allocatable :: fault
@@ -111,9 +113,10 @@ contains
   !> what is measured is not there, or if the closed form does not hold for the points. The largest
   !> frequency of `limit = 'spectral'` is not measured.
   subroutine check_trial(scene, measure, form, error)
-    type(scene_type), intent(in) :: scene
-    type(measure_type), intent(in) :: measure
+    type(scene_type), intent(in) :: scene      !! to be checked
+    type(measure_type), intent(in) :: measure  !! what is measured
     type(closed_form_type), allocatable, intent(inout) :: form
+      !! what is compared with, completed on return; not allocated: none
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: checked
     type(set_up_type) :: set_up
@@ -269,11 +272,12 @@ contains
     end associate
   end subroutine choose_places
 
-  !> The progress, and on rows what is measured and the balance.
+  !> The progress, and on rows what is measured and the balance. An error, of an interrupted run, if
+  !> the user has asked to stop.
   subroutine observe(observer, system, instant, error)
-    class(watcher_type), intent(inout) :: observer
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
+    class(watcher_type), intent(inout) :: observer  !! keeps what is measured, and the balance
+    type(system_type), intent(inout) :: system      !! at this instant
+    type(instant_type), intent(in) :: instant       !! step and time of the run
     type(error_type), allocatable, intent(out) :: error
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :)
