@@ -19,6 +19,7 @@ contains
   !>
   !> `extents` is the key's shape, of size 0 for a scalar; `slots` runs in the order of the
   !> elements in memory and ends with the last element given. `used` marks the entries taken.
+  !> An error, with its place, for a wrong subscript, an element given twice or too many values.
   subroutine find_elements(source, section, key, extents, slots, used, error)
     type(source_type), intent(in) :: source        !! the scanned file
     integer, intent(in) :: section                 !! number of the group in it
