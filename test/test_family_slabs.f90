@@ -2,8 +2,9 @@
 module test_family_slabs
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_lanes, only: lanes
   use pd_set_up_prepare, only: set_up_type
-  use pd_family_lattice, only: grid_at, lanes, lattice_family_type
+  use pd_family_lattice, only: grid_at, lattice_family_type
   use pd_force_forces, only: internal_force
   use pd_force_model, only: options_of
   use pd_force_reference, only: reference_force

@@ -5,7 +5,7 @@ module test_scene_content_defaults
   use pd_base_kinds, only: i8, wp
   use pd_base_version, only: program_version
   use pd_motion_explicit_time_step, only: evaluations
-  use pd_output_report_begin, only: history_interval
+  use pd_output_report_schedule, only: history_interval
   use pd_scene_content_check, only: check_scene
   use pd_scene_content_types, only: is_set, scene_type
   use pd_scene_content_write, only: scene_text

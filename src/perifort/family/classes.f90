@@ -2,8 +2,9 @@
 !> once for each class of them.
 module pd_family_classes
   use pd_base_kinds, only: i1, i2, i4, i8
+  use pd_base_lanes, only: word_bits
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_offsets, only: offsets_type, word_bits
+  use pd_family_offsets, only: offsets_type
   implicit none (type, external)
   private
   public :: find_classes

@@ -3,8 +3,8 @@
 !> family members. Loops then work on eight bonds at a time, all with the same other end.
 module pd_family_clusters
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_family_cells, only: cells_type, sort_into_cells
-  use pd_family_offsets, only: lanes
   implicit none (type, external)
   private
   public :: rows_type, order_in_rows, collect_members, pair_members, lane_bit

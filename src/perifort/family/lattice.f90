@@ -12,6 +12,7 @@
 module pd_family_lattice
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes, word_bits
   use pd_base_error, only: error_type, fail
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
@@ -20,13 +21,13 @@ module pd_family_lattice
   use pd_family_classes, only: find_classes
   use pd_family_family, only: family_type, bonds_type
   use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, first_cell, &
-    & whole_blocks, both_ends, lanes, word_bits
+    & whole_blocks, both_ends
   use pd_family_slabs, only: slabs_type, find_slabs
   use pd_family_volume, only: volume_rule_type, reach
   implicit none (type, external)
   private
   public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, &
-    & use_double, grid_at, both_ends, lanes, word_bits
+    & use_double, grid_at, both_ends
 
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers

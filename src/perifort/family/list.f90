@@ -7,11 +7,11 @@
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type, arrange
   use pd_family_clusters, only: rows_type, order_in_rows, collect_members, pair_members, lane_bit
   use pd_family_family, only: family_type, bonds_type
-  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact, &
     & volume_none
   implicit none (type, external)

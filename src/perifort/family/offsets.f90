@@ -2,14 +2,11 @@
 !> offsets.
 module pd_family_offsets
   use pd_base_kinds, only: wp, i8
+  use pd_base_lanes, only: lanes, word_bits
   use pd_family_volume, only: volume_rule_type, volume_correction, reach
   implicit none (type, external)
   private
-  public :: offsets_type, make_offsets, order_offsets, first_cell, whole_blocks, both_ends, &
-    & lanes, word_bits
-
-  integer, parameter :: lanes = 8        !! a 512-bit register of reals: a block or half of it
-  integer, parameter :: word_bits = 64   !! bonds in one word of bits
+  public :: offsets_type, make_offsets, order_offsets, first_cell, whole_blocks, both_ends
 
   !> One grid: its box of slots and its table of offsets.
   type :: offsets_type

@@ -2,7 +2,8 @@
 !> from the bonds one by one, `lanes` slots at a time.
 module pd_force_bound
   use pd_base_kinds, only: wp, i8
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, lanes
+  use pd_base_lanes, only: lanes
+  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at
   use pd_force_model, only: model_type
   use pd_force_weights, only: allocate_weights, block_weights, half_of
   implicit none (type, external)

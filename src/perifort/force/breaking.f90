@@ -2,9 +2,9 @@
 !> decided here, by one formula that gives both ends of a bond the same bits.
 module pd_force_breaking
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
-  use pd_family_offsets, only: lanes
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
     & energy_product, point_damage

@@ -5,7 +5,7 @@
 module pd_force_fast
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i8
-  use pd_family_lattice, only: lanes
+  use pd_base_lanes, only: lanes
   use pd_force_general, only: crushed
   use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &

@@ -2,8 +2,9 @@
 !> temperature, unprojected dilatation, and the marks of strained slots.
 module pd_force_general
   use pd_base_kinds, only: wp, i1, i8
-  use pd_family_lattice, only: weights_type, lanes
-  use pd_force_model, only: force_options_type, model_type
+  use pd_base_lanes, only: lanes
+  use pd_family_lattice, only: weights_type
+  use pd_force_model, only: early, force_options_type, model_type
   implicit none (type, external)
   private
   public :: general_dilatation, general_force, general_energy, crushed, mark_slot
@@ -40,7 +41,7 @@ contains
       theta(first:first + lanes - 1) = theta(first:first + lanes - 1) + share
       j = first + weights%shift(m)
       if (both) theta(j:j + lanes - 1) = theta(j:j + lanes - 1) + share
-      if (model%breaking) call mark(model, both, first, j, s, weight(:, m), strained)
+      if (model%breaking) call mark_block(model, both, first, j, s, weight(:, m), strained)
     end do
   end subroutine general_dilatation
 
@@ -75,7 +76,7 @@ contains
         force(first:first + lanes - 1, c) = force(first:first + lanes - 1, c) + along(:, c)
         if (both) force(j:j + lanes - 1, c) = force(j:j + lanes - 1, c) - along(:, c)
       end do
-      if (model%breaking) call mark(model, both, first, j, s, stretch(:, m), strained)
+      if (model%breaking) call mark_block(model, both, first, j, s, stretch(:, m), strained)
     end do
   end subroutine general_force
 
@@ -146,10 +147,9 @@ contains
     end if
   end subroutine deform
 
-  !> Mark the slots of the bonds between the lanes at `first` and those at `j` that are at their
-  !> limit, a hair's breadth early: what breaks is decided elsewhere. Slots in no-fail zones lose no
-  !> bond.
-  pure subroutine mark(model, both, first, j, s, weight, strained)
+  !> Mark the slots of the bonds between the lanes at `first` and those at `j` that are near their
+  !> critical stretch (`early`). Slots in no-fail zones lose no bond.
+  pure subroutine mark_block(model, both, first, j, s, weight, strained)
     type(model_type), intent(in) :: model
     logical, intent(in) :: both
     integer(i8), intent(in) :: first, j
@@ -158,14 +158,14 @@ contains
     real(wp) :: limit
     integer :: l
 
-    limit = model%least_critical*(1 - 1.0e-9_wp)
+    limit = model%least_critical*early
     if (all(abs(s) <= limit)) return
     do l = 1, lanes
       if (weight(l) <= 0.0_wp .or. abs(s(l)) <= limit) cycle
       call mark_slot(model, first + l - 1, s(l), strained)
       if (both) call mark_slot(model, j + l - 1, s(l), strained)
     end do
-  end subroutine mark
+  end subroutine mark_block
 
   !> Mark slot `k`, one of whose bonds has the stretch `s` beyond the limit.
   pure subroutine mark_slot(model, k, s, strained)

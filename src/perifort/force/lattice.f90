@@ -14,8 +14,8 @@
 !> precision; what they leave is computed in double, one half of a block after the other.
 module pd_force_lattice
   use pd_base_kinds, only: wp, sp, i1, i8
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends, lanes, &
-    & word_bits
+  use pd_base_lanes, only: lanes, word_bits
+  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends
   use pd_force_fast, only: fast_dilatation, fast_force, fast_energy
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_mixed, only: mixed_dilatation, mixed_force

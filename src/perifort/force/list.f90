@@ -3,14 +3,14 @@
 !> loop serves (strains beyond 5 % or near breaking, temperature) is done by general formulas.
 module pd_force_list
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_lanes, only: lanes
   use pd_family_list, only: list_family_type, at_moved, at_p
-  use pd_family_offsets, only: lanes
   use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: choose_loop, for_energy, for_force, for_theta, pass_loop, task_type
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
     & general_energy, store_weights, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
-  use pd_force_model, only: force_options_type, model_type, options_of
+  use pd_force_model, only: early, force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
   private
@@ -84,7 +84,7 @@ contains
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
         call general_theta(family, model, options, work, sums(:, 1))
-        if (model%breaking) call mark(model, work, strained)
+        if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do l = 1, lanes
         k = work%first + l - 1
@@ -127,7 +127,7 @@ contains
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
         call general_force(family, model, options, work, sums)
-        if (model%breaking) call mark(model, work, strained)
+        if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do d = 1, model%dim
         force(work%first:work%first + lanes - 1, d) = sums(:, d)
@@ -281,9 +281,8 @@ contains
 
   ! ---------------------------------------------------------------- breaking
 
-  !> Mark the lanes with an intact bond within a relative 1e-9 of the smallest limit of all. The
-  !> margin covers rounding; `pd_force_breaking` evaluates the exact criterion for these slots only.
-  pure subroutine mark(model, work, strained)
+  !> Mark the lanes with an intact bond near the smallest critical stretch of all (`early`).
+  pure subroutine mark_cluster(model, work, strained)
     type(model_type), intent(in) :: model
     type(work_type), intent(in) :: work
     integer(i1), intent(inout), contiguous :: strained(:)
@@ -291,12 +290,12 @@ contains
     integer(i8) :: k
     integer :: l
 
-    limit = model%least_critical*(1 - 1.0e-9_wp)
+    limit = model%least_critical*early
     do l = 1, lanes
       k = work%first + l - 1
       if (work%tension(l) > limit) call mark_slot(model, k, work%tension(l), strained)
       if (work%compression(l) > limit) call mark_slot(model, k, -work%compression(l), strained)
     end do
-  end subroutine mark
+  end subroutine mark_cluster
 
 end module pd_force_list

@@ -3,7 +3,7 @@
 !> be constants where the loops are compiled. In 1D they work with a second component that is zero.
 module pd_force_list_fast
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_family_offsets, only: lanes
+  use pd_base_lanes, only: lanes
   use pd_force_general, only: crushed
   use pd_force_polynomial, only: g0, g1, g2, g3, g4, g5, g6, g7, &
     & h0_narrow => h0, h1_narrow => h1, h2_narrow => h2, h3_narrow => h3, h4_narrow => h4, &

@@ -3,9 +3,9 @@
 !> filled first, and always three components, those that a body does not have being zero.
 module pd_force_list_general
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type, at_volume, at_moved, at_p
-  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S

@@ -3,9 +3,9 @@
 module pd_force_list_points
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
-  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_linear, volume_linear_extended, volume_exact
   use pd_force_list_fast, only: task_type, no_correction, one_spacing, own_spacing, &
     & stored_fraction

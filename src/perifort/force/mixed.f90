@@ -8,7 +8,8 @@
 module pd_force_mixed
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, sp, i8
-  use pd_family_lattice, only: lattice_family_type, weights_type, lanes
+  use pd_base_lanes, only: lanes
+  use pd_family_lattice, only: lattice_family_type, weights_type
   use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &
     & w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, k0, k1, k2, k3, k4, k5, &

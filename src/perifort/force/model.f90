@@ -6,10 +6,13 @@ module pd_force_model
   use pd_body_material, only: material_type, never
   implicit none (type, external)
   private
-  public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit
+  public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early
   public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
+  !> Loops mark slots with a bond at this part of its critical stretch: the margin covers their
+  !> rounding, and `pd_force_breaking` evaluates the exact criterion for marked slots only.
+  real(wp), parameter :: early = 1 - 1.0e-9_wp
 
   !> Kinds of dilatation that loops are compiled for: the force has none; it has the factor Lambda
   !> as printed; Lambda = 1.

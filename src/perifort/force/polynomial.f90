@@ -10,7 +10,7 @@
 !> solved with 60 digits.
 module pd_force_polynomial
   use pd_base_kinds, only: wp, sp
-  use pd_force_model, only: force_options_type, model_type
+  use pd_force_model, only: early, force_options_type, model_type
   implicit none (type, external)
   private
   public :: fast_limit, fast_terms, fast_ranges, narrow, wide, single
@@ -81,7 +81,7 @@ contains
     ! with the limit s, |e| reaches (1 + s)^2 - 1 in tension and 1 - (1 - s)^2, which is less, in
     ! compression; from s = 1 on no bond breaks in compression
     s = min(model%least_critical, 1.0_wp)
-    limit = min(limit, s*(2 - s)*(1 - 1.0e-9_wp))
+    limit = min(limit, s*(2 - s)*early)
     if (range == single) limit = max(0.0_wp, limit - roundings)
   end function fast_limit
 

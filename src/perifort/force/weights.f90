@@ -3,9 +3,9 @@
 !> correction costs nothing in a step and next to no memory.
 module pd_force_weights
   use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes, word_bits
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, &
-    & both_ends, lanes, word_bits
+  use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, both_ends
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, single

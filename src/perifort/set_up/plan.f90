@@ -15,7 +15,7 @@ module pd_set_up_plan
     & chapter_stiffness, constant_stiffness, integrator_limit, damped_step
   implicit none (type, external)
   private
-  public :: plan_type, make_plan, depth_of
+  public :: plan_type, make_plan, steps_of, depth_of
 
   !> Of the square of the largest frequency; the step is at most half of it less than the largest.
   real(wp), parameter :: accuracy = 0.01_wp
@@ -89,9 +89,17 @@ contains
         & ' steps of '//to_text(plan%step)//' s', 'there may be '//to_text(huge(1)))
       return
     end if
-    plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
+    plan%steps = steps_of(scene%time%duration, plan%step)
     plan%step = scene%time%duration/plan%steps
   end subroutine make_plan
+
+  !> The fewest steps of at most `step` that make up `duration`; a quotient that only rounding has
+  !> lifted above a whole number is that number.
+  pure integer function steps_of(duration, step) result(steps)
+    real(wp), intent(in) :: duration  !! of the run [s]
+    real(wp), intent(in) :: step      !! the longest step allowed [s]
+    steps = max(1, ceiling(duration/step*(1 - 1.0e-12_wp)))
+  end function steps_of
 
   !> The limit of the step from the largest frequency at the start: of the body as it is, or, where
   !> bonds can break, one that no breaking can lower, so that it needs no second look.

@@ -6,7 +6,7 @@ module pd_output_checkpoint_restart
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_motion_keep, only: checksum_of_start, keep_system
-  use pd_set_up_plan, only: plan_type
+  use pd_set_up_plan, only: plan_type, steps_of
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_path, keep_about, older_path
   use pd_output_checkpoint_file, only: reader_type
@@ -256,7 +256,7 @@ contains
     else if (.not. plan%relaxes) then
       plan%step = restart%about%dt
       if (is_set(scene%time%duration)) &
-        & plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
+        & plan%steps = steps_of(scene%time%duration, plan%step)
       if (plan%steps < restart%about%step) call fail(error, 'the checkpoint is of step '// &
         & to_text(restart%about%step)//', beyond the '//to_text(plan%steps)//' of the scene')
       restart%complete = plan%steps == restart%about%step .and. restart%about%finished

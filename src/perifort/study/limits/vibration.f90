@@ -3,12 +3,13 @@
 !> What the program measures of a body's motion, it measures on this.
 module pd_study_limits_vibration
   use pd_base_kinds, only: wp, i1
+  use pd_base_lanes, only: lanes
   use pd_base_error, only: error_type, internal_fault
   use pd_base_numbers, only: noise
   use pd_body_body, only: body_type, allocate_points, in_point_order
   use pd_body_material, only: material_type, never
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_family_lattice, only: lanes, lattice_family_type, new_lattice_family
+  use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
