@@ -527,7 +527,8 @@ contains
     end do
   end subroutine test_frequency
 
-  !> A cos(omega t) is met to the order of each integrator: halving the step divides the error.
+  !> A cos(omega t) is met to the order of each integrator: halving the step divides the error, the
+  !> largest of all steps.
   subroutine test_orders(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: orders(*) = [2.0_wp, 2.0_wp, 3.0_wp, 2.0_wp, 4.0_wp]
@@ -550,12 +551,11 @@ contains
         call push(set_up%system, amplitude)
         diary = diary_type()
         diary%slot = at_point(set_up%system%body, [2*spacing, spacing])
-        diary%every = steps
         call run(set_up%system, trim(integrators(i)), dt/2**(r - 1), steps, diary, error)
         if (allocated(error)) return
-        off(r) = abs(diary%u(1, diary%n)/amplitude - cos(40*0.2_wp))
+        off(r) = max_abs(diary%u(1, :)/amplitude - cos(omega*diary%time))
       end do
-      call expect(error, log(off(1)/off(2))/log(2.0_wp), orders(i), 0.15_wp, 'order of '// &
+      call expect(error, log(off(1)/off(2))/log(2.0_wp), orders(i), 0.2_wp, 'order of '// &
         & trim(integrators(i)))
     end do
   end subroutine test_orders
@@ -563,7 +563,8 @@ contains
   !> With forces from the velocities of half a step before, u_n obeys
   !> u_{n+1} - (2 - r - k) u_n + (1 - r) u_{n-1} = 0, r = c dt/rho, k = (omega dt)^2, from
   !> u_1 = (1 - k/2) u_0. Energy: what is lost is what dashpots took, to k/4 of the whole, by which
-  !> the kinetic energy at t_n differs from the one that leapfrog keeps.
+  !> rho v_{n+1/2}^2/2 + s u_n u_{n+1}/2, what leapfrog keeps without dashpots, differs at the start;
+  !> that loses what they take to the last digit.
   subroutine test_damping(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: amplitude = 0.01_wp*spacing, r = 0.05_wp, k = 0.04_wp
@@ -595,11 +596,13 @@ contains
     whole = density_of_steel*k/dt**2*amplitude**2*volume/2
     call expect_close(error, (diary%kinetic + diary%strain + diary%dissipated)/whole, 1.0_wp, &
       & k/4*1.1_wp, 'energy balance')
-    call expect(error, diary%dissipated(diary%n)/whole, 1.0_wp, 0.01_wp, 'dissipated in the end')
+    call expect(error, diary%dissipated(diary%n)/whole, 1 - k/4, 6.0e-4_wp, &
+      & 'dissipated in the end')
   end subroutine test_damping
 
-  !> A body that flies against friction and comes to rest has lost its kinetic energy but for what
-  !> the springs store: yield times the way that they slipped, and (yield)^2/(2 s) at most.
+  !> A body that flies against friction until that holds it has lost yield times the way that the
+  !> springs slipped: rho v^2/2 less yield^2/(2 s), a sixteenth of it here, which they store. Where
+  !> they begin to slip the trapezoidal rule errs by s (v dt)^2/8 at most, 1e-4 of the whole.
   subroutine test_friction(error)
     type(error_type), allocatable, intent(out) :: error
     type(friction_type) :: friction
@@ -614,7 +617,7 @@ contains
     speed = 1.0_wp
     friction%name = 'friction'
     friction%conservative = .false.
-    friction%s = density_of_steel*(0.1_wp/dt)**2
+    friction%s = density_of_steel*(0.02_wp/dt)**2
     ! it stops after some 200 steps
     friction%yield = density_of_steel*speed/(200*dt)
     call terms%add(friction)
@@ -634,9 +637,8 @@ contains
       call test_failed(error, 'the term has become another one')
       return
     end select
-    ! rho v^2/(2 yield), less what the springs take
-    call expect(error, slipped/(density_of_steel*speed**2/(2*friction%yield)), 1.0_wp, 0.02_wp, &
-      & 'slip')
+    call expect(error, slipped/(density_of_steel*speed**2/(2*friction%yield)), 15.0_wp/16, &
+      & 1.0e-3_wp, 'slip')
     call expect(error, diary%dissipated(diary%n)/begin, friction%yield*slipped*volume/begin, &
       & 2.0e-4_wp, 'dissipated')
     call expect_close(error, (diary%kinetic + diary%strain + diary%dissipated)/begin, 1.0_wp, &
@@ -815,13 +817,12 @@ contains
     deallocate (scene%boundaries)
     allocate (scene%boundaries(1))
     scene%boundaries(1)%side = 'x_min'
-    scene%boundaries(1)%velocity(1) = 3.0_wp
+    scene%boundaries(1)%velocity(:2) = [3.0_wp, 0.0_wp]
     wind%name = 'wind'
     wind%external = .true.
     wind%tangent = no_stiffness
     wind%b = [1.0e12_wp, -2.0e11_wp, 0.0_wp]
     do i = 1, size(integrators)
-      wind%ramp = 1.0_wp
       terms = term_list_type()
       call ready_with(scene, none, loaded, error)
       if (allocated(error)) return
