@@ -118,6 +118,7 @@ contains
       & new_unittest('a link keeps momentum and energy', test_link), &
       & new_unittest('an external term is a load', test_external), &
       & new_unittest('a restart has the same bits', test_restart), &
+      & new_unittest('a restart amid a relaxation has the same bits', test_static_restart), &
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('static equilibrium on springs, by both solvers', test_static), &
       & new_unittest('static equilibrium of two bodies with a link', test_static_link), &
@@ -563,7 +564,7 @@ contains
   !> With forces from the velocities of half a step before, u_n obeys
   !> u_{n+1} - (2 - r - k) u_n + (1 - r) u_{n-1} = 0, r = c dt/rho, k = (omega dt)^2, from
   !> u_1 = (1 - k/2) u_0. Energy: what is lost is what dashpots took, to k/4 of the whole, by which
-  !> rho v_{n+1/2}^2/2 + s u_n u_{n+1}/2, what leapfrog keeps without dashpots, differs at the start;
+  !> rho v_{n+1/2}^2/2 + s u_n u_{n+1}/2 differs at the start, what leapfrog keeps without dashpots:
   !> that loses what they take to the last digit.
   subroutine test_damping(error)
     type(error_type), allocatable, intent(out) :: error
@@ -921,6 +922,63 @@ contains
         & abs(diary%work(diary%n)) > 0.0_wp, 'nothing was accounted')
     end do
   end subroutine test_restart
+
+  !> The same of both solvers, in the second of two load steps.
+  subroutine test_static_restart(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(term_list_type) :: terms
+    type(set_up_type) :: whole, again
+    type(diary_type) :: diary
+    type(keeper_type) :: keeper
+    real(wp), parameter :: far = 1.0e-3_wp*spacing
+    real(wp) :: s
+    integer :: dynamic
+
+    s = 1.0e-3_wp*youngs_modulus/spacing**2
+    call terms%add(ground(s, s/far**2, 40*far))
+    call box_scene([5, 4], spacing, 0.2_wp, scene)
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%side = 'x_max'
+    scene%loads(1)%pressure = -1.0e-3_wp*youngs_modulus
+    scene%time%method = 'relaxation'
+    scene%relaxation%tolerance = 1.0e-8_wp
+    scene%relaxation%load_steps = 2
+    scene%relaxation%maximum_iterations = 20000
+    do dynamic = 0, 1
+      scene%relaxation%solver = 'conjugate_gradient'
+      if (dynamic == 1) scene%relaxation%solver = 'dynamic_relaxation'
+      call ready_with(scene, terms, whole, error)
+      call ready_with(scene, terms, again, error)
+      if (allocated(error)) return
+      diary = diary_type()
+      call rest(whole, diary, error)
+      if (allocated(error)) return
+      ! the diary has a row for the start, one for each iteration and one for each settled step
+      keeper = keeper_type()
+      keeper%step = (3*(diary%n - 3))/4
+      call rest(again, keeper, error)
+      call ready_with(scene, terms, again, error)
+      if (allocated(error)) return
+      call keeper%shelf%rewind(reading=.true.)
+      call keep_system(keeper%shelf, again%system)
+      call expect_true(error, .not. allocated(keeper%shelf%error), 'the state is not put back')
+      associate (memory => again%system%memory)
+        call expect_true(error, memory%load_step == 2 .and. &
+          & (memory%iteration > 0 .or. allocated(memory%newton)), trim(scene%relaxation%solver)// &
+          & ' is not kept amid a load step')
+      end associate
+      call rest(again, diary, error)
+      if (allocated(error)) return
+      call expect_close(error, again%system%state%u, whole%system%state%u, 0.0_wp, &
+        & trim(scene%relaxation%solver)//': displacements')
+      call expect_close(error, again%system%state%force, whole%system%state%force, 0.0_wp, &
+        & trim(scene%relaxation%solver)//': forces')
+      call expect(error, again%system%external_work, whole%system%external_work, 0.0_wp, &
+        & trim(scene%relaxation%solver)//': work')
+    end do
+  end subroutine test_static_restart
 
   subroutine keep_at_step(observer, system, instant, error)
     class(keeper_type), intent(inout) :: observer

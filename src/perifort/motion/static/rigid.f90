@@ -89,8 +89,8 @@ contains
     piece%held = any(system%held(slots, :) == 1_i1)
   end subroutine place_piece
 
-  !> What the terms of the force resist to the six unit motions of each piece alone, over the largest
-  !> stiffness of a point, so that a point counts about as one that is held.
+  !> What the terms of the force resist to the six unit motions of each piece alone, over the
+  !> largest stiffness of a point, so that a point counts about as one that is held.
   subroutine find_resistance(system, rigid, resistance)
     type(system_type), intent(in), target :: system
     type(rigid_type), intent(in) :: rigid              !! pieces in their places
