@@ -118,6 +118,7 @@ contains
       & new_unittest('a link keeps momentum and energy', test_link), &
       & new_unittest('an external term is a load', test_external), &
       & new_unittest('a restart has the same bits', test_restart), &
+      & new_unittest('a restart amid a relaxation has the same bits', test_static_restart), &
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('static equilibrium on springs, by both solvers', test_static), &
       & new_unittest('static equilibrium of two bodies with a link', test_static_link), &
@@ -527,7 +528,8 @@ contains
     end do
   end subroutine test_frequency
 
-  !> A cos(omega t) is met to the order of each integrator: halving the step divides the error.
+  !> A cos(omega t) is met to the order of each integrator: halving the step divides the error, the
+  !> largest of all steps.
   subroutine test_orders(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: orders(*) = [2.0_wp, 2.0_wp, 3.0_wp, 2.0_wp, 4.0_wp]
@@ -550,12 +552,11 @@ contains
         call push(set_up%system, amplitude)
         diary = diary_type()
         diary%slot = at_point(set_up%system%body, [2*spacing, spacing])
-        diary%every = steps
         call run(set_up%system, trim(integrators(i)), dt/2**(r - 1), steps, diary, error)
         if (allocated(error)) return
-        off(r) = abs(diary%u(1, diary%n)/amplitude - cos(40*0.2_wp))
+        off(r) = max_abs(diary%u(1, :)/amplitude - cos(omega*diary%time))
       end do
-      call expect(error, log(off(1)/off(2))/log(2.0_wp), orders(i), 0.15_wp, 'order of '// &
+      call expect(error, log(off(1)/off(2))/log(2.0_wp), orders(i), 0.2_wp, 'order of '// &
         & trim(integrators(i)))
     end do
   end subroutine test_orders
@@ -563,7 +564,8 @@ contains
   !> With forces from the velocities of half a step before, u_n obeys
   !> u_{n+1} - (2 - r - k) u_n + (1 - r) u_{n-1} = 0, r = c dt/rho, k = (omega dt)^2, from
   !> u_1 = (1 - k/2) u_0. Energy: what is lost is what dashpots took, to k/4 of the whole, by which
-  !> the kinetic energy at t_n differs from the one that leapfrog keeps.
+  !> rho v_{n+1/2}^2/2 + s u_n u_{n+1}/2 differs at the start, what leapfrog keeps without dashpots:
+  !> that loses what they take to the last digit.
   subroutine test_damping(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: amplitude = 0.01_wp*spacing, r = 0.05_wp, k = 0.04_wp
@@ -595,11 +597,13 @@ contains
     whole = density_of_steel*k/dt**2*amplitude**2*volume/2
     call expect_close(error, (diary%kinetic + diary%strain + diary%dissipated)/whole, 1.0_wp, &
       & k/4*1.1_wp, 'energy balance')
-    call expect(error, diary%dissipated(diary%n)/whole, 1.0_wp, 0.01_wp, 'dissipated in the end')
+    call expect(error, diary%dissipated(diary%n)/whole, 1 - k/4, 6.0e-4_wp, &
+      & 'dissipated in the end')
   end subroutine test_damping
 
-  !> A body that flies against friction and comes to rest has lost its kinetic energy but for what
-  !> the springs store: yield times the way that they slipped, and (yield)^2/(2 s) at most.
+  !> A body that flies against friction until that holds it has lost yield times the way that the
+  !> springs slipped: rho v^2/2 less yield^2/(2 s), a sixteenth of it here, which they store. Where
+  !> they begin to slip the trapezoidal rule errs by s (v dt)^2/8 at most, 1e-4 of the whole.
   subroutine test_friction(error)
     type(error_type), allocatable, intent(out) :: error
     type(friction_type) :: friction
@@ -614,7 +618,7 @@ contains
     speed = 1.0_wp
     friction%name = 'friction'
     friction%conservative = .false.
-    friction%s = density_of_steel*(0.1_wp/dt)**2
+    friction%s = density_of_steel*(0.02_wp/dt)**2
     ! it stops after some 200 steps
     friction%yield = density_of_steel*speed/(200*dt)
     call terms%add(friction)
@@ -634,9 +638,8 @@ contains
       call test_failed(error, 'the term has become another one')
       return
     end select
-    ! rho v^2/(2 yield), less what the springs take
-    call expect(error, slipped/(density_of_steel*speed**2/(2*friction%yield)), 1.0_wp, 0.02_wp, &
-      & 'slip')
+    call expect(error, slipped/(density_of_steel*speed**2/(2*friction%yield)), 15.0_wp/16, &
+      & 1.0e-3_wp, 'slip')
     call expect(error, diary%dissipated(diary%n)/begin, friction%yield*slipped*volume/begin, &
       & 2.0e-4_wp, 'dissipated')
     call expect_close(error, (diary%kinetic + diary%strain + diary%dissipated)/begin, 1.0_wp, &
@@ -815,13 +818,12 @@ contains
     deallocate (scene%boundaries)
     allocate (scene%boundaries(1))
     scene%boundaries(1)%side = 'x_min'
-    scene%boundaries(1)%velocity(1) = 3.0_wp
+    scene%boundaries(1)%velocity(:2) = [3.0_wp, 0.0_wp]
     wind%name = 'wind'
     wind%external = .true.
     wind%tangent = no_stiffness
     wind%b = [1.0e12_wp, -2.0e11_wp, 0.0_wp]
     do i = 1, size(integrators)
-      wind%ramp = 1.0_wp
       terms = term_list_type()
       call ready_with(scene, none, loaded, error)
       if (allocated(error)) return
@@ -920,6 +922,63 @@ contains
         & abs(diary%work(diary%n)) > 0.0_wp, 'nothing was accounted')
     end do
   end subroutine test_restart
+
+  !> The same of both solvers, in the second of two load steps.
+  subroutine test_static_restart(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(term_list_type) :: terms
+    type(set_up_type) :: whole, again
+    type(diary_type) :: diary
+    type(keeper_type) :: keeper
+    real(wp), parameter :: far = 1.0e-3_wp*spacing
+    real(wp) :: s
+    integer :: dynamic
+
+    s = 1.0e-3_wp*youngs_modulus/spacing**2
+    call terms%add(ground(s, s/far**2, 40*far))
+    call box_scene([5, 4], spacing, 0.2_wp, scene)
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%side = 'x_max'
+    scene%loads(1)%pressure = -1.0e-3_wp*youngs_modulus
+    scene%time%method = 'relaxation'
+    scene%relaxation%tolerance = 1.0e-8_wp
+    scene%relaxation%load_steps = 2
+    scene%relaxation%maximum_iterations = 20000
+    do dynamic = 0, 1
+      scene%relaxation%solver = 'conjugate_gradient'
+      if (dynamic == 1) scene%relaxation%solver = 'dynamic_relaxation'
+      call ready_with(scene, terms, whole, error)
+      call ready_with(scene, terms, again, error)
+      if (allocated(error)) return
+      diary = diary_type()
+      call rest(whole, diary, error)
+      if (allocated(error)) return
+      ! the diary has a row for the start, one for each iteration and one for each settled step
+      keeper = keeper_type()
+      keeper%step = (3*(diary%n - 3))/4
+      call rest(again, keeper, error)
+      call ready_with(scene, terms, again, error)
+      if (allocated(error)) return
+      call keeper%shelf%rewind(reading=.true.)
+      call keep_system(keeper%shelf, again%system)
+      call expect_true(error, .not. allocated(keeper%shelf%error), 'the state is not put back')
+      associate (memory => again%system%memory)
+        call expect_true(error, memory%load_step == 2 .and. &
+          & (memory%iteration > 0 .or. allocated(memory%newton)), trim(scene%relaxation%solver)// &
+          & ' is not kept amid a load step')
+      end associate
+      call rest(again, diary, error)
+      if (allocated(error)) return
+      call expect_close(error, again%system%state%u, whole%system%state%u, 0.0_wp, &
+        & trim(scene%relaxation%solver)//': displacements')
+      call expect_close(error, again%system%state%force, whole%system%state%force, 0.0_wp, &
+        & trim(scene%relaxation%solver)//': forces')
+      call expect(error, again%system%external_work, whole%system%external_work, 0.0_wp, &
+        & trim(scene%relaxation%solver)//': work')
+    end do
+  end subroutine test_static_restart
 
   subroutine keep_at_step(observer, system, instant, error)
     class(keeper_type), intent(inout) :: observer

@@ -157,7 +157,6 @@ contains
     early = breaking .and. system%model%breaking .and. .not. system%break_late
     late = breaking .and. system%model%breaking .and. system%break_late
     if (late) call settle_account(system)
-    system%time = t
     call impose(system%motions, t, system%state%u, system%state%v)
     call bring_temperature(system, t)
     if (early) then
@@ -185,6 +184,7 @@ contains
     integer, intent(in), optional :: part
     type(term_view_type) :: view
 
+    system%time = t
     associate (state => system%state)
       call internal_force(system%family, system%model, options_of(system%model), state%u, state%p, &
         & state%force, system%strained, part)
@@ -595,7 +595,7 @@ contains
     where (system%held == 1) v = system%state%v
   end subroutine velocities_now
 
-  !> Kinetic and stored energy [J]: strain energy of the bonds and what terms of the force store;
+  !> Kinetic and stored energy [J]: strain energy of the bonds and what terms of the force store.
   !> `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
     type(system_type), intent(inout), target :: system

@@ -100,6 +100,7 @@ contains
       amid = .false.
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
+      system%time = instant%time
       call bring_temperature(system, instant%time)
       do
         dynamic = system%memory%iteration > 0 .or. .not. (relaxation%conjugate_gradient .or. &

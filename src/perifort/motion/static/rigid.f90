@@ -37,7 +37,7 @@ module pd_motion_static_rigid
 contains
 
   !> The pieces that intact bonds join now, and which rigid motions of each neither a constraint
-  !> nor a term of the force resists. (Terms that join pieces are taken to move with each of them.)
+  !> nor a term of the force resists, while the other pieces stay where they are.
   subroutine find_free_motions(system, rigid)
     type(system_type), intent(in), target :: system
     type(rigid_type), intent(out) :: rigid
@@ -89,8 +89,8 @@ contains
     piece%held = any(system%held(slots, :) == 1_i1)
   end subroutine place_piece
 
-  !> What the terms of the force resist to the six unit motions of each piece, over the largest
-  !> stiffness of a point, so that a point counts about as one that is held.
+  !> What the terms of the force resist to the six unit motions of each piece alone, over the
+  !> largest stiffness of a point, so that a point counts about as one that is held.
   subroutine find_resistance(system, rigid, resistance)
     type(system_type), intent(in), target :: system
     type(rigid_type), intent(in) :: rigid              !! pieces in their places
@@ -98,7 +98,7 @@ contains
     real(wp), allocatable :: w(:, :), kw(:, :), rows(:)
     type(term_view_type) :: view
     real(wp) :: mode(6), largest
-    integer :: i, k, c, p
+    integer :: i, n, k, c, p
 
     allocate (resistance(6, 6, rigid%pieces%number), source=0.0_wp)
     if (system%terms%number() == number_of_loads(system%terms)) return
@@ -108,27 +108,30 @@ contains
     largest = maxval(rows*system%body%volume)
     if (.not. largest > 0.0_wp) return
     allocate (w, kw, mold=system%state%u)
-    do i = 1, 6
-      w = 0.0_wp
-      do c = 1, system%body%dim
-        do k = 1, system%body%n_slots
-          p = rigid%pieces%of(k)
-          if (p == 0) cycle
-          mode = motion_at(rigid%piece(p)%centre, rigid%piece(p)%size, system%body%x(k, :), c)
-          w(k, c) = mode(i)
+    w = 0.0_wp
+    do p = 1, rigid%pieces%number
+      associate (piece => rigid%piece(p), slots => rigid%pieces%slots(rigid%pieces%start(p): &
+        & rigid%pieces%start(p + 1) - 1))
+        do i = 1, 6
+          do c = 1, system%body%dim
+            do n = 1, size(slots)
+              mode = motion_at(piece%centre, piece%size, system%body%x(slots(n), :), c)
+              w(slots(n), c) = mode(i)
+            end do
+          end do
+          kw = 0.0_wp
+          call system%terms%add_tangent(view, w, kw)
+          do c = 1, system%body%dim
+            do n = 1, size(slots)
+              k = slots(n)
+              mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
+              resistance(:, i, p) = resistance(:, i, p) &
+                & + mode*(kw(k, c)*system%body%volume(k)/largest)
+            end do
+          end do
         end do
-      end do
-      kw = 0.0_wp
-      call system%terms%add_tangent(view, w, kw)
-      do c = 1, system%body%dim
-        do k = 1, system%body%n_slots
-          p = rigid%pieces%of(k)
-          if (p == 0) cycle
-          mode = motion_at(rigid%piece(p)%centre, rigid%piece(p)%size, system%body%x(k, :), c)
-          resistance(:, i, p) = resistance(:, i, p) &
-            & + mode*(kw(k, c)*system%body%volume(k)/largest)
-        end do
-      end do
+        w(slots, :) = 0.0_wp
+      end associate
     end do
   end subroutine find_resistance
 

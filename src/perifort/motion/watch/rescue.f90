@@ -53,6 +53,7 @@ contains
     call good%shelf%rewind(reading=.true.)
     call keep_system(good%shelf, system)
     if (allocated(good%shelf%error)) return
+    system%time = good%instant%time
     if (good%most < huge(good%most)) then
       call velocities_now(system, good%instant%time, good%instant%kick, v)
       call energies_of(system, v, energies)
