@@ -24,7 +24,8 @@ module pd_driver
   use pd_output_report_recorder, only: recorder_type
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of, schedule_type
   use pd_output_checkpoint_restart, only: find_restart, put_back, restart_type
-  use pd_output_report_summary, only: checkpoint_line, summary_before, summary_after
+  use pd_output_report_after, only: summary_after
+  use pd_output_report_summary, only: checkpoint_line, summary_before
   use pd_scene_content_rules, only: place_fault
   use pd_set_up_prepare, only: prepare, set_up_type
   use pd_output_fields_check, only: check_names

@@ -1,12 +1,14 @@
 !> What is told of an instant of a run in a line: where it is, and how far a relaxation has come.
 module pd_output_report_lines
+  use pd_base_clock, only: duration_text
+  use pd_base_interrupt, only: interrupted
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
   use pd_motion_observer, only: instant_type
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
-  public :: place_of, relaxation_note, iteration_line
+  public :: place_of, reason_to_stop, relaxation_note, iteration_line
 
 contains
 
@@ -25,6 +27,15 @@ contains
         & to_text(instant%load_step)//', which is not in equilibrium yet'
     end if
   end function place_of
+
+  !> Why a run that is to stop does so.
+  function reason_to_stop(most_seconds) result(reason)
+    real(wp), intent(in) :: most_seconds  !! that it has been given [s]
+    character(:), allocatable :: reason
+    reason = 'interrupted'
+    if (.not. interrupted()) reason = 'stopped after '//duration_text(most_seconds)// &
+      & ', as asked for,'
+  end function reason_to_stop
 
   !> What the progress line adds in relaxation.
   pure function relaxation_note(instant, tolerance) result(note)

@@ -2,7 +2,7 @@
 !> and probes, and the progress line.
 module pd_output_report_recorder
   use pd_base_kinds, only: wp, i8
-  use pd_base_clock, only: duration_text, phase_timer_type, progress_type
+  use pd_base_clock, only: phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
   use pd_base_threads, only: team_type
@@ -16,10 +16,10 @@ module pd_output_report_recorder
   use pd_output_fields_write, only: write_fields
   use pd_output_report_balance, only: balance_type
   use pd_output_report_columns, only: history_row, history_table_type, row_source_type
-  use pd_output_report_lines, only: iteration_line, place_of, relaxation_note
+  use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
   use pd_output_report_probes, only: probe_type
   use pd_output_report_run_warnings, only: contact_warning, rotation_warning, strain_warning
-  use pd_output_report_schedule, only: iteration_due, output_due, schedule_type
+  use pd_output_report_schedule, only: due_at, iteration_due, schedule_type
   use pd_output_results_results, only: results_type
   implicit none (type, external)
   private
@@ -68,7 +68,7 @@ contains
     type(system_type), intent(inout) :: system
     type(instant_type), intent(in) :: instant
     type(error_type), allocatable, intent(out) :: error
-    logical :: row, output, row_due, output_due_now, may_stop, stopping, keeping
+    logical :: row, output, row_due, output_due, may_stop, stopping, keeping
     real(wp), allocatable :: v(:, :)
 
     if (instant%rescued) then
@@ -79,15 +79,12 @@ contains
     associate (schedule => observer%schedule)
       observer%steps_done = instant%step
       observer%time = instant%time
+      call due_at(schedule, instant, row_due, output_due)
       if (schedule%relaxation) then
-        row_due = instant%settled
-        output_due_now = instant%settled .and. mod(instant%load_step, schedule%every) == 0
         call observer%progress%update(int(instant%load_step, i8) &
           & - merge(0_i8, 1_i8, instant%settled .or. instant%load_step == 0), instant%time, &
           & system%broken, relaxation_note(instant, schedule%tolerance))
       else
-        row_due = mod(instant%step, schedule%history_every) == 0
-        output_due_now = output_due(schedule, instant%step, instant%dt)
         call observer%progress%update(int(instant%step, i8), instant%time, system%broken)
       end if
     end associate
@@ -105,9 +102,9 @@ contains
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
     row = row_due .or. stopping .or. instant%last
-    output = output_due_now .or. stopping .or. instant%last
+    output = output_due .or. stopping .or. instant%last
     observer%more_rows = merge(1, 0, row .and. .not. row_due)
-    observer%more_outputs = merge(1, 0, output .and. .not. output_due_now)
+    observer%more_outputs = merge(1, 0, output .and. .not. output_due)
     if (.not. (row .or. output .or. keeping)) return
     call observer%timer%stop('time stepping')
     call velocities_now(system, instant%time, instant%kick, v)
@@ -122,7 +119,7 @@ contains
       call observer%timer%start('output')
       call write_output(observer, system, instant, v, error)
       ! a run that goes on does not have the output that is written because it stops
-      if (output_due_now .or. instant%last) then
+      if (output_due .or. instant%last) then
         call tell(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
           & call tell(observer, 'strain', strain_warning(system, instant%time))
@@ -133,7 +130,7 @@ contains
     end if
     if (keeping) call observer%keep_state(system, finished=.false.)
     call observer%timer%start('time stepping')
-    if (stopping) call fail(error, reason_to_stop(observer)//' at '// &
+    if (stopping) call fail(error, reason_to_stop(observer%most_seconds)//' at '// &
       & place_of(instant, observer%schedule%relaxation)// &
       & ': this state is the last output'//newline//'  to go on: '//observer%command, &
       & status_interrupted)
@@ -187,15 +184,6 @@ contains
     end if
     recorder%rescued = state//' is the last output'
   end subroutine write_rescued
-
-  !> Why the run is to stop now, '' if it isn't.
-  function reason_to_stop(recorder) result(reason)
-    class(recorder_type), intent(in) :: recorder
-    character(:), allocatable :: reason
-    reason = 'interrupted'
-    if (.not. interrupted()) reason = 'stopped after '//duration_text(recorder%most_seconds)// &
-      & ', as asked for,'
-  end function reason_to_stop
 
   !> Write a checkpoint. If that fails, the run goes on with the one before it.
   subroutine keep_state(recorder, system, finished)

@@ -12,7 +12,7 @@ module pd_output_report_schedule
   implicit none (type, external)
   private
   public :: schedule_type, schedule_of, check_schedule, history_interval, planned_outputs, &
-    & planned_rows, output_due, iteration_due
+    & planned_rows, due_at, iteration_due
 
   !> When to write.
   type :: schedule_type
@@ -124,6 +124,21 @@ contains
     number = schedule%steps/schedule%history_every + 1
     if (mod(schedule%steps, schedule%history_every) /= 0) number = number + 1
   end function planned_rows
+
+  !> What is due at an instant: a row, an output.
+  pure subroutine due_at(schedule, instant, row, output)
+    type(schedule_type), intent(in) :: schedule
+    type(instant_type), intent(in) :: instant
+    logical, intent(out) :: row, output
+
+    if (schedule%relaxation) then
+      row = instant%settled
+      output = instant%settled .and. mod(instant%load_step, schedule%every) == 0
+    else
+      row = mod(instant%step, schedule%history_every) == 0
+      output = output_due(schedule, instant%step, instant%dt)
+    end if
+  end subroutine due_at
 
   !> Whether step `step` is the first at or after a multiple of the interval, or a multiple of
   !> every.

@@ -1,4 +1,4 @@
-!> What the user reads on the terminal: what will be computed and why so, and what it came to.
+!> What the user reads on the terminal before a run: what will be computed and why so.
 module pd_output_report_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
@@ -11,10 +11,9 @@ module pd_output_report_summary
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_report_probes, only: probe_type
-  use pd_output_report_recorder, only: recorder_type
   implicit none (type, external)
   private
-  public :: summary_before, summary_after, checkpoint_line, memory_of
+  public :: summary_before, checkpoint_line, memory_of
 
 contains
 
@@ -213,48 +212,6 @@ contains
     if (text == '') text = 'only when the run is interrupted'
     text = '  checkpoints     '//with_unit(real(bytes, wp), 'B', 3)//', the last two kept, '//text
   end function checkpoint_line
-
-  !> What the run came to: time per phase, speed, energies, damage, where the results are.
-  function summary_after(system, recorder, directory) result(text)
-    type(system_type), intent(in) :: system
-    type(recorder_type), intent(in) :: recorder
-    character(*), intent(in) :: directory
-    character(:), allocatable :: text, parts
-    real(wp) :: balance, share
-    integer :: steps
-
-    text = recorder%timer%table()//newline
-    steps = recorder%steps_done - recorder%first_step
-    if (steps > 0) text = text//line('speed', &
-      & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
-      & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
-      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
-      & trim(merge(' iterations/s', ' steps/s     ', recorder%schedule%relaxation)))
-    if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
-    if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
-      & 'load step')//' left to dynamic relaxation by the conjugate gradient')
-    associate (now => recorder%balance%energies)
-      text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
-      text = text//line('strain energy', with_unit(now%strain, 'J'))
-      if (system%model%breaking) then
-        text = text//line('dissipated', with_unit(system%dissipated, 'J'))
-        text = text//line('broken bonds', to_text(system%broken)//' pairs of points')
-        text = text//line('greatest damage', to_text(maxval(system%state%damage), 3))
-      end if
-      text = text//line('external work', with_unit(system%external_work, 'J'))
-      call recorder%energy_balance(system, balance, share)
-      if (share >= 0.0_wp) then
-        parts = to_text(100*share, 2)//' % of the greater of the energy supplied and the '// &
-          & 'energy present'
-        if (abs(system%dissipated) > 0.0_wp) parts = parts//', '// &
-          & to_text(100*abs(balance/system%dissipated), 2)//' % of the dissipated energy'
-        text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '//parts)
-      end if
-    end associate
-    if (recorder%warnings%count() > 0) text = text//line('warnings', &
-      & to_text(recorder%warnings%count())//', kept in warnings.txt')
-    text = text//line('results', directory)
-  end function summary_after
 
   !> Memory of points and families [bytes].
   pure integer(i8) function memory_of(system) result(bytes)
