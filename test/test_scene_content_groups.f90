@@ -220,7 +220,7 @@ contains
 
     call wider_table(table)
     open (newunit=unit, status='scratch', action='readwrite')
-    call write_reference(unit, 'wind', found, table)
+    call write_reference(unit, 'wind', found, table=table)
     call check(error, .not. allocated(found), 'the group has no reference')
     rewind (unit)
     text = ''
