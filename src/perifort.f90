@@ -20,9 +20,9 @@ module perifort
   use pd_scene_content_read, only: read_scene, read_scene_text
   use pd_scene_content_groups, only: list_groups
   use pd_scene_content_types, only: body_group, boundary_group, crack_group, group_table, &
-    & header_type, horizon_group, initial_group, is_set, load_group, material_group, no_fail_group, &
-    & output_group, probe_group, region_group, relaxation_group, scene_type, shape_group, &
-    & time_group, unset
+    & header_type, horizon_group, initial_group, is_set, load_group, material_group, &
+    & no_fail_group, output_group, probe_group, region_group, relaxation_group, scene_type, &
+    & shape_group, time_group, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)

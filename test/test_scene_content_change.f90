@@ -10,7 +10,7 @@ module test_scene_content_change
   use pd_scene_format_source, only: scan_source, source_type, token_type
   use pd_scene_content_types, only: is_set, scene_type
   use bodies, only: expect, expect_true
-  use test_scene_expect, only: expect_parts, line
+  use test_scene_expect, only: changes_of, expect_parts, line
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -218,33 +218,33 @@ contains
   subroutine test_options(error)
     type(error_type), allocatable, intent(out) :: error
 
-    call same([line_type('time%safety=0.25')], 'safety = 0.5', 'safety = 0.25')
-    call same([line_type('time.safety=0.25'), line_type('steps=77')], 'steps = 5 safety = 0.5', &
+    call same('time%safety=0.25', 'safety = 0.5', 'safety = 0.25')
+    call same('time.safety=0.25|steps=77', 'steps = 5 safety = 0.5', &
       & 'steps = 77 safety = 0.25')
-    call same([line_type('material(2)%break_in_compression=.true.')], 'poissons_ratio = 0.2', &
+    call same('material(2)%break_in_compression=.true.', 'poissons_ratio = 0.2', &
       & 'poissons_ratio = 0.2 break_in_compression = T')
-    call same([line_type('body%points=20, 10')], 'points = 100, 50', 'points = 20, 10')
-    call same([line_type('body%points(1)=200'), line_type('body%points(2)=100')], &
+    call same('body%points=20, 10', 'points = 100, 50', 'points = 20, 10')
+    call same('body%points(1)=200|body%points(2)=100', &
       & 'points = 100, 50', 'points = 200, 100')
-    call same([line_type('body%upper=2*0.5'), line_type('points=2*10')], &
+    call same('body%upper=2*0.5|points=2*10', &
       & 'upper = 1, 0.5 points = 100, 50', 'upper = 2*0.5 points = 10 10')
-    call same([line_type('initial%displacement_gradient(2,1)=0.1')], 'gradient(1,2) = 0.5', &
+    call same('initial%displacement_gradient(2,1)=0.1', 'gradient(1,2) = 0.5', &
       & 'gradient(1,2) = 0.5 displacement_gradient(2,1) = 0.1')
     ! texts with quotes and without them
-    call same([line_type("time%integrator='runge_kutta'")], 'steps = 5', &
+    call same("time%integrator='runge_kutta'", 'steps = 5', &
       & "steps = 5 integrator = 'runge_kutta'")
-    call same([line_type('time%integrator=Runge_Kutta')], 'steps = 5', &
+    call same('time%integrator=Runge_Kutta', 'steps = 5', &
       & "steps = 5 integrator = 'runge_kutta'")
-    call same([line_type('scene%title=It''s a / test, isn''t it? ! = 3')], 'dimension = 2', &
+    call same('scene%title=It''s a / test, isn''t it? ! = 3', 'dimension = 2', &
       & "dimension = 2 title = 'It''s a / test, isn''t it? ! = 3'")
     ! groups that are not there, and lists
-    call same([line_type('output%fields=damage, velocity')], '&time', &
+    call same('output%fields=damage, velocity', '&time', &
       & "&output fields = 'damage', 'velocity' /&time")
-    call same([line_type('output%fields="damage" ''velocity''')], '&time', &
+    call same('output%fields="damage" ''velocity''', '&time', &
       & "&output fields = 'damage', 'velocity' /&time")
-    call same([line_type('output%fields(1)=damage'), line_type('output%every=3')], '&time', &
+    call same('output%fields(1)=damage|output%every=3', '&time', &
       & "&output fields = 'damage' every = 3 /&time")
-    call same([line_type('load(1)%values=0, 1'), line_type('load%times=0, 2')], '&time', &
+    call same('load(1)%values=0, 1|load%times=0, 2', '&time', &
       & "&load side = 'x_max' pressure = 1 times = 0, 2 values = 0, 1 /&time", &
       & "&load side = 'x_max' pressure = 1 /")
 
@@ -253,11 +253,12 @@ contains
     !> `options`, given with the text and `more`, make the scene of the text with `new` in the place
     !> of `old`.
     subroutine same(options, old, new, more)
-      type(line_type), intent(in) :: options(:)
+      character(*), intent(in) :: options   !! `group%key=value|...`
       character(*), intent(in) :: old, new
       character(*), intent(in), optional :: more
       type(scene_type) :: expected, scene
       type(scene_error), allocatable :: found
+      type(line_type), allocatable :: list(:)
       character(:), allocatable :: base
       integer :: at
 
@@ -269,11 +270,12 @@ contains
       if (allocated(error)) return
       call read_scene_text(text(:at - 1)//new//text(at + len(old):), 'a.nml', expected, found)
       call accept(error, found)
-      call read_scene_text(base, 'a.nml', scene, found, options)
+      call changes_of(options, list)
+      call read_scene_text(base, 'a.nml', scene, found, list)
       call accept(error, found)
       if (allocated(error)) return
       call check(error, scene_text(scene), scene_text(expected))
-      call expect_true(error, scene%text == base .and. size(scene%changes) == size(options), &
+      call expect_true(error, scene%text == base .and. size(scene%changes) == size(list), &
         & 'the text stays, and the options are kept beside it')
     end subroutine same
   end subroutine test_options
@@ -311,15 +313,17 @@ contains
     subroutine refused(option, parts, second)
       character(*), intent(in) :: option, parts
       character(*), intent(in), optional :: second
+      type(line_type), allocatable :: list(:)
       type(scene_type) :: scene
       type(scene_error), allocatable :: found
 
       if (allocated(error)) return
       if (present(second)) then
-        call read_scene_text(text, 'a.nml', scene, found, [line_type(option), line_type(second)])
+        call changes_of(option//'|'//second, list)
       else
-        call read_scene_text(text, 'a.nml', scene, found, [line_type(option)])
+        call changes_of(option, list)
       end if
+      call read_scene_text(text, 'a.nml', scene, found, list)
       call expect_parts(error, found, parts//'|--> the command line|--set |^')
     end subroutine refused
   end subroutine test_bad_options
@@ -330,13 +334,15 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
     type(scene_error), allocatable :: found
+    type(line_type), allocatable :: list(:)
 
-    call read_scene_text(text, 'a.nml', scene, found, [line_type('time%duration=3')])
+    call changes_of('time%duration=3', list)
+    call read_scene_text(text, 'a.nml', scene, found, list)
     call expect_parts(error, found, "'steps' and 'duration' are both given|--> the "// &
       & 'command line|--set time%duration=3|      ^^^^^^^^^^^^^')
     if (allocated(error)) return
-    call read_scene_text(text, 'a.nml', scene, found, [line_type('time%safety=0.1'), &
-      & line_type('body%upper=2, 1')])
+    call changes_of('time%safety=0.1|body%upper=2, 1', list)
+    call read_scene_text(text, 'a.nml', scene, found, list)
     call accept(error, found)
     if (allocated(error)) return
     call scene_fault(found, scene, 'body', 1, 'upper', 'too large', 'smaller')

@@ -14,7 +14,7 @@ module test_scene_content_groups
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: change_harmless, change_refused, group_type
   use bodies, only: expect, expect_true
-  use test_scene_expect, only: expect_fault, expect_parts, good_head, line
+  use test_scene_expect, only: changes_of, expect_fault, expect_parts, good_head, line
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -91,10 +91,13 @@ contains
     character(*), intent(in) :: text
     type(scene_type), intent(out) :: scene
     type(scene_error), allocatable, intent(out) :: found
-    type(line_type), intent(in), optional :: changes(:)
+    character(*), intent(in), optional :: changes   !! `group%key=value|...`
     type(group_table) :: table
+    type(line_type), allocatable :: list(:)
     call wider_table(table)
-    call read_scene_text(text, 'a/b.nml', scene, found, changes, table)
+    allocate (list(0))
+    if (present(changes)) call changes_of(changes, list)
+    call read_scene_text(text, 'a/b.nml', scene, found, list, table)
   end subroutine read_windy
 
   subroutine test_read(error)
@@ -252,8 +255,7 @@ contains
     type(scene_type) :: scene
     type(scene_error), allocatable :: found
 
-    call read_windy(windy, scene, found, [line_type('wind(2)%speed=4.5'), &
-      & line_type('rain=.false.')])
+    call read_windy(windy, scene, found, 'wind(2)%speed=4.5|rain=.false.')
     if (allocated(found)) then
       call test_failed(error, found%message)
       return
@@ -262,10 +264,10 @@ contains
     if (allocated(error)) return
     call check(error, index(scene_text(scene), '  rain = .false.') > 0, 'rain')
     if (allocated(error)) return
-    call read_windy(windy, scene, found, [line_type('wind%speed=4.5')])
+    call read_windy(windy, scene, found, 'wind%speed=4.5')
     call expect_parts(error, found, '2 groups &wind|say which: wind(1)%speed')
     if (allocated(error)) return
-    call read_windy(windy, scene, found, [line_type('wind(1)%spead=4.5')])
+    call read_windy(windy, scene, found, 'wind(1)%spead=4.5')
     call expect_parts(error, found, "&wind has no key 'spead'|did you mean 'speed'?")
   end subroutine test_set
 
@@ -278,8 +280,7 @@ contains
 
     call wider_table(table)
     call read_windy(windy, first, found)
-    call read_windy(windy, second, found, [line_type('wind(2)%speed=4.5'), &
-      & line_type('wind(1)%name=south')])
+    call read_windy(windy, second, found, 'wind(2)%speed=4.5|wind(1)%name=south')
     differences = scene_differences(scene_text(first), scene_text(second))
     call check(error, size(differences), 2)
     if (allocated(error)) return

@@ -7,7 +7,7 @@ module test_study_trade_plan
   use pd_study_trade_plan, only: plan_from_text, plan_type
   use pd_study_trade_trial, only: outcome_type
   use bodies, only: expect, expect_true
-  use test_scene_expect, only: expect_parts, line
+  use test_scene_expect, only: changes_of, expect_parts, line
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -95,10 +95,11 @@ contains
     character(*), parameter :: text = head//"&study vary = 'horizon%ratio' values = 2.0, 3.0"//rest
     type(plan_type) :: plan
     type(scene_error), allocatable :: found
+    type(line_type), allocatable :: changes(:)
     integer :: t
 
-    call plan_from_text(text, 'a.nml', plan, found, [line_type('time%safety=0.3'), &
-      & line_type('study%values=2.5, 3.5, 4.5')])
+    call changes_of('time%safety=0.3|study%values=2.5, 3.5, 4.5', changes)
+    call plan_from_text(text, 'a.nml', plan, found, changes)
     if (allocated(found)) then
       call test_failed(error, found%message)
       return
@@ -109,11 +110,13 @@ contains
       call expect(error, plan%trials(t)%scene%horizon%ratio, t + 1.5_wp, 0.0_wp, 'ratio')
       call expect(error, plan%trials(t)%scene%time%safety, 0.3_wp, 0.0_wp, 'safety')
     end do
-    call plan_from_text(text, 'a.nml', plan, found, [line_type('ratio=4')])
+    call changes_of('ratio=4', changes)
+    call plan_from_text(text, 'a.nml', plan, found, changes)
     call expect_parts(error, found, "'horizon%ratio' is set here and varied|--> the "// &
       & 'command line|--set ratio=4')
     if (allocated(error)) return
-    call plan_from_text(text, 'a.nml', plan, found, [line_type('study%values=0.5')])
+    call changes_of('study%values=0.5', changes)
+    call plan_from_text(text, 'a.nml', plan, found, changes)
     call expect_parts(error, found, "'ratio' is out of range|--> the command line|^^^")
   end subroutine test_set
 

@@ -288,7 +288,7 @@ contains
       if (status /= 0) call usage(error, line, "'"//name//"' needs a number above 0, as in "// &
         & trim(merge('--error 1e-3', '--time 60   ', name == '--error'))//", found '"//value//"'")
     case ('--set')
-      line%changes = [line%changes, line_type(value)]
+      call add_change(line, value)
       if (index(value, '=') > 1 .and. index(value, '=') < len(value)) return
       call usage(error, line, "'--set' needs a key and its value, as in --set horizon%ratio=4, "// &
         & "found '"//value//"'")
@@ -309,6 +309,21 @@ contains
       call internal_fault('set_option does not know an option of option_names')
     end select
   end subroutine set_option
+
+  !> One more change of a key.
+  subroutine add_change(line, text)
+    type(command_line_type), intent(inout) :: line
+    character(*), intent(in) :: text     !! `group%key=value`
+    type(line_type), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(line%changes) + 1))
+    do i = 1, size(line%changes)
+      call move_alloc(line%changes(i)%text, longer(i)%text)
+    end do
+    longer(size(longer))%text = text
+    call move_alloc(longer, line%changes)
+  end subroutine add_change
 
   !> A number above 0; `status` is not 0 if there is none.
   subroutine read_positive(text, value, status)
