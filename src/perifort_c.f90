@@ -295,7 +295,7 @@ contains
       call run_scene(holder%scene, how, error, answer=found%answer)
     end if
     flush (output_unit)
-    if (c_associated(answer) .and. allocated(found%answer%columns)) then
+    if (c_associated(answer) .and. allocated(found%answer%positions)) then
       call name_parts(found)
       found%next => first_answer
       first_answer => found

@@ -1,7 +1,8 @@
 !> Build a scene in memory: a free plate that is heated by 100 K. Every distance grows by alpha dT,
 !> and nothing is strained beyond that.
 program in_memory
-  use perifort, only: answer_type, error_type, preview_scene, run_options_type, run_scene, scene_type, wp
+  use perifort, only: answer_type, error_type, preview_scene, run_options_type, run_scene, &
+    & scene_type, wp
   implicit none (type, external)
   real(wp), parameter :: alpha = 1.2e-5_wp, heating = 100.0_wp
   type(scene_type) :: scene
@@ -28,7 +29,7 @@ program in_memory
   ! what a run would do, as a text
   options%quiet = .true.
   call preview_scene(scene, options, error, text)
-  if (.not. allocated(error)) print '(a)', text(:index(text, new_line('a'), back=.true.) - 1)
+  if (.not. allocated(error)) print '(a)', text
 
   options%files = .false.
   if (.not. allocated(error)) call run_scene(scene, options, error, answer=answer)

@@ -17,7 +17,8 @@ program sweep
   call read_scene_text("&scene dimension = 1 / &body lower = 0.0, upper = 1.0, points = 25 / "// &
     & "&material model = 'bond_based', youngs_modulus = 200.0e9, density = 7850.0 / "// &
     & "&initial displacement_gradient(1,1) = 1.0e-3 / "// &
-    & "&boundary side = 'x_min', displacement_x = 0.0 / &time duration = 1.0e-4 /", 'bar', scene, error)
+    & "&boundary side = 'x_min', displacement_x = 0.0 / &time duration = 1.0e-4 /", 'bar', scene, &
+    & error)
   scene%time%duration = 2/speed
   options%files = .false.
   options%quiet = .true.

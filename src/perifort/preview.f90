@@ -33,14 +33,16 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable, intent(out), optional :: text    !! what is printed
     type(scene_type) :: complete
+    character(:), allocatable :: all
     integer :: threads
 
     complete = scene
     call complete_scene(complete, error)
     if (allocated(error)) return
     threads = omp_get_max_threads()
-    call examine(complete, options, error, text)
+    call examine(complete, options, error, all)
     call omp_set_num_threads(threads)
+    if (present(text)) text = all
   end subroutine preview_scene
 
   !> `preview_scene` of a complete scene with threads of its own number.
@@ -48,12 +50,12 @@ contains
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable, intent(out), optional :: text
+    character(:), allocatable, intent(out) :: text
     type(set_up_type) :: set_up
     type(probe_type), allocatable :: probes(:)
-    character(:), allocatable :: all, times
+    character(:), allocatable :: times
 
-    all = ''
+    text = ''
     call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
     call foresee_output(scene, set_up, probes, error)
@@ -67,7 +69,6 @@ contains
       call tell_lines(times)
       call tell(checkpoint_line(scene, bytes_of_checkpoint(scene, set_up, probes)))
     end associate
-    if (present(text)) call move_alloc(all, text)
 
   contains
 
@@ -75,7 +76,7 @@ contains
     subroutine tell(part)
       character(*), intent(in) :: part
       call say(part, options%quiet)
-      all = all//part//newline
+      text = text//part//newline
     end subroutine tell
 
     !> The same for lines that end with a newline.

@@ -40,7 +40,7 @@ contains
       if (allocated(error)) then
         observer%own_fault = error%status /= status_interrupted
         if (observer%own_fault) return
-        call move_alloc(error%message, observer%recorder%wish)
+        observer%recorder%wish = error%message
         deallocate (error)
       end if
     end if
