@@ -304,7 +304,8 @@ contains
     call expect_fault('&material number 1', "lacks the key 'youngs_modulus'", 'Pa')
     call flight(scene)
     scene%time%duration = 1.0_wp
-    call expect_fault('&time number 1, key duration', "'steps' and 'duration' are both given", 'one')
+    call expect_fault('&time number 1, key duration', "'steps' and 'duration' are both given", &
+      & 'give one')
     call flight(scene)
     allocate (scene%boundaries(2))
     scene%boundaries(1)%side = 'x_min'
@@ -317,7 +318,8 @@ contains
       & "did you mean 'left'?")
     call flight(scene)
     scene%bodies(1)%upper(1) = 0.07_wp
-    call expect_fault('&body number 1, key points', 'the spacing of the lattice differs', 'spacings')
+    call expect_fault('&body number 1, key points', 'the spacing of the lattice differs', &
+      & 'spacings')
     call flight(scene)
     scene%output%fields = [character(name_length) :: 'displacment']
     call expect_fault('&output number 1, key fields', "unknown value 'displacment'", &
@@ -590,7 +592,8 @@ contains
     call empty%get_column('time', column, fault)
     call expect(error, allocated(fault), 'a column of nothing')
     call empty%get_field('damage', field, fault)
-    call expect(error, allocated(fault) .and. empty%field_number('damage') == 0, 'a field of nothing')
+    call expect(error, allocated(fault) .and. empty%field_number('damage') == 0, &
+      & 'a field of nothing')
   end subroutine test_names
 
   !> A list of size 0 means no fields, and is not taken for the default ones.

@@ -2,10 +2,11 @@
 !>
 !>     ./pf examples from_file [SCENE.nml]
 program from_file
-  use perifort, only: answer_type, error_type, read_scene, run_options_type, run_scene, scene_type, &
-    & wp
+  use perifort, only: answer_type, error_type, read_scene, run_options_type, run_scene, &
+    & scene_type, wp
   implicit none (type, external)
-  real(wp), parameter :: force = 1000.0_wp, distance = 0.5_wp, strain = force/(200.0e9_wp*1.0e-3_wp)
+  real(wp), parameter :: force = 1000.0_wp, distance = 0.5_wp
+  real(wp), parameter :: strain = force/(200.0e9_wp*1.0e-3_wp)   ! F/(E A)
   type(scene_type) :: scene
   type(run_options_type) :: options
   type(answer_type) :: answer

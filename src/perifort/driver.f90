@@ -26,11 +26,10 @@ contains
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options    !! how, where to, with how many threads
     type(error_type), allocatable, intent(out) :: error
-    class(observer_type), intent(inout), optional, target :: observer  !! sees every instant; its
-                                                     !! error with `status_interrupted` stops the
-                                                     !! run in order, any other ends it
-    type(answer_type), intent(out), optional :: answer  !! results in memory, those before an error
-                                                     !! included
+    !> sees every instant; an error with `status_interrupted` stops the run in order, others end it
+    class(observer_type), intent(inout), optional, target :: observer
+    !> results in memory, those before an error included
+    type(answer_type), intent(out), optional :: answer
     type(scene_type) :: complete
     type(handlers_type) :: handlers
     integer :: threads
@@ -60,8 +59,8 @@ contains
     call output%look_back(scene, options, error)
     if (allocated(error) .or. output%complete) return
 
-    ! points and families (7.1, 7.11), volumes (7.2) and surfaces (7.7), conditions (7.8), cracks and
-    ! no-fail zones (7.9), and the time step (7.4) or the mass of relaxation (7.5)
+    ! points and families (7.1, 7.11), volumes (7.2) and surfaces (7.7), conditions (7.8), cracks
+    ! and no-fail zones (7.9), and the time step (7.4) or the mass of relaxation (7.5)
     call prepare(scene, set_up, error, options%threads)
     if (.not. allocated(error)) call output%foresee(scene, set_up, error)
     if (allocated(error)) return

@@ -1,4 +1,4 @@
-!> From the plan of a scene to its motion: explicit steps in time (7.3), or static equilibrium (7.5).
+!> From the plan of a scene to its motion: explicit steps in time (7.3) or static equilibrium (7.5).
 module pd_set_up_move
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp

@@ -21,8 +21,8 @@ module pd_output_report_pair
 contains
 
   !> Let the caller's observer see the instant, then the recorder. An error of the former with
-  !> `status_interrupted` stops the run in order: the recorder writes this state first. The last good
-  !> state of a motion that has gone wrong is shown to the recorder alone.
+  !> `status_interrupted` stops the run in order: the recorder writes this state first. The last
+  !> good state of a motion that has gone wrong is shown to the recorder alone.
   subroutine observe(observer, system, instant, error)
     class(pair_type), intent(inout) :: observer
     type(system_type), intent(inout) :: system

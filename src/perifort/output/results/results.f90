@@ -579,7 +579,8 @@ contains
       call self%csv%close(ignored)
       if (allocated(ignored) .and. .not. allocated(error)) call move_alloc(ignored, error)
     end if
-    if (complete .and. self%in_files .and. .not. allocated(error)) call mark_complete(self%directory, self%stem)
+    if (complete .and. self%in_files .and. .not. allocated(error)) &
+      & call mark_complete(self%directory, self%stem)
   end subroutine close_results
 
 end module pd_output_results_results

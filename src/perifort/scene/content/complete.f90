@@ -20,8 +20,8 @@ contains
   !> scene file, from one place. Errors name the group and the key, since the text is of no file.
   !> Lists of fields of size 0 mean no fields and stay so.
   subroutine complete_scene(scene, error)
-    type(scene_type), intent(inout) :: scene               !! of size 0 or not allocated: no groups
-    type(error_type), allocatable, intent(out) :: error    !! the broken rule; the scene is as it was
+    type(scene_type), intent(inout) :: scene             !! lists of size 0 or none: no groups
+    type(error_type), allocatable, intent(out) :: error  !! the broken rule; then it is as it was
     type(scene_type) :: complete
     type(source_type) :: source
     character(:), allocatable :: file

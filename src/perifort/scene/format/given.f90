@@ -11,10 +11,11 @@ module pd_scene_format_given
 
 contains
 
-  !> Whether the user has given this value.
+  !> Whether the user has given this value. A value that is no number has been given, so that it is
+  !> refused where it matters.
   elemental logical function is_set(value)
     real(wp), intent(in) :: value
-    is_set = value > unset
+    is_set = .not. (value <= unset .and. value >= unset)
   end function is_set
 
 end module pd_scene_format_given
