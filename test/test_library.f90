@@ -1,5 +1,6 @@
 !> The library as other programs see it: nothing of perifort is used here but `perifort`.
 module test_library
+  use, intrinsic :: ieee_arithmetic, only: ieee_negative_inf, ieee_quiet_nan, ieee_value
   use comparisons, only: expect_close
   use perifort, only: answer_type, body_group, boundary_group, check_scene, crack_group, &
     & damage_of, displacements_of, energies_type, fail, fault_type => error_type, find_energies, &
@@ -325,8 +326,15 @@ contains
     call expect_fault('&output number 1, key fields', "unknown value 'displacment'", &
       & "did you mean 'displacement'?")
     call flight(scene)
-    scene%initial(1)%velocity(1) = sqrt(-scene%time%step)
-    call expect_fault('&initial number 1, key velocity_x', "for key 'velocity_x'", 'number')
+    scene%initial(1)%velocity(1) = ieee_value(1.0_wp, ieee_quiet_nan)
+    call expect_fault('&initial number 1, key velocity_x', "bad value 'NaN' for key 'velocity_x'", &
+      & 'expected')
+    call flight(scene)
+    scene%initial(1)%velocity(1) = ieee_value(1.0_wp, ieee_negative_inf)
+    call expect_fault('&initial number 1, key velocity_x', "bad value '-Infinity'", 'expected')
+    call flight(scene)
+    scene%initial(1)%displacement_gradient(2, 1) = ieee_value(1.0_wp, ieee_quiet_nan)
+    call expect_fault('&initial number 1, key displacement_gradient', "bad value 'NaN'", 'expected')
     scene = scene_type()
     call expect_fault('&scene number 1, key dimension', "'dimension' is out of range", '1')
 
