@@ -40,6 +40,7 @@ program main
   use test_force_contract, only: collect_force_contract
   use test_force_frame, only: collect_force_frame
   use test_force_term, only: collect_force_term
+  use test_library, only: collect_library
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_static_conjugate_gradient, only: collect_motion_static_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
@@ -125,6 +126,7 @@ program main
   call register('force_contract', collect_force_contract)
   call register('force_frame', collect_force_frame)
   call register('force_term', collect_force_term)
+  call register('library', collect_library)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_static_conjugate_gradient', collect_motion_static_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)

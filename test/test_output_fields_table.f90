@@ -137,7 +137,7 @@ contains
     options%fields = table
     threads = omp_get_max_threads()
     if (present(only_check)) then
-      call check_scene(scene, options, fault)
+      call preview_scene(scene, options, fault)
     else
       call run_scene(scene, options, fault)
     end if

@@ -29,12 +29,17 @@ contains
   end function place_of
 
   !> Why a run that is to stop does so.
-  function reason_to_stop(most_seconds) result(reason)
+  function reason_to_stop(most_seconds, wish) result(reason)
     real(wp), intent(in) :: most_seconds  !! that it has been given [s]
+    character(:), allocatable, intent(in) :: wish  !! an observer's words why it wants it to stop
     character(:), allocatable :: reason
     reason = 'interrupted'
-    if (.not. interrupted()) reason = 'stopped after '//duration_text(most_seconds)// &
-      & ', as asked for,'
+    if (interrupted()) return
+    if (allocated(wish)) then
+      reason = wish
+    else
+      reason = 'stopped after '//duration_text(most_seconds)//', as asked for,'
+    end if
   end function reason_to_stop
 
   !> What the progress line adds in relaxation.
