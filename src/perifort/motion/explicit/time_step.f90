@@ -251,7 +251,8 @@ contains
     case ('adams_moulton'); limit = 1.29_wp
     case ('runge_kutta'); limit = 2.83_wp
     case ('forward_backward', 'velocity_verlet'); limit = 2.0_wp
-    case default; call internal_fault('unknown integrator')
+    case default
+      call internal_fault('unknown integrator')
     end select
   end function integrator_limit
 
@@ -287,7 +288,8 @@ contains
     case ('runge_kutta'); evaluations = 4
     case ('adams_moulton'); evaluations = 2
     case ('forward_backward', 'velocity_verlet', 'adams_bashforth'); evaluations = 1
-    case default; call internal_fault('unknown integrator')
+    case default
+      call internal_fault('unknown integrator')
     end select
   end function evaluations
 

@@ -178,7 +178,7 @@ contains
         if (len(reason) > 0) call at_key(plan, 'against', reason, 'one run must be at least as '// &
           & 'fine as all others in every key: add it, or compare with a closed form or a file', &
           & error)
-      case default
+      case default  ! the name of a file; one that is not there is an error
         probe = ''
         if (session%measure%probe > 0) probe = trim(plan%scene%probes(session%measure%probe)%name)
         path = resolve_path(plan%against, plan%scene%file)
