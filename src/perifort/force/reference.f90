@@ -127,8 +127,8 @@ contains
     end associate
   end function energy_product
 
-  !> Local damage phi of a point: the part of its family's volume behind broken bonds. 0 without
-  !> bonds [-].
+  !> Local damage phi of a point [-]: the part of its family's volume behind broken bonds, 0 without
+  !> bonds.
   pure real(wp) function point_damage(bonds) result(damage)
     type(bonds_type), intent(in) :: bonds  !! of the point, broken ones included
     real(wp) :: whole, lost
