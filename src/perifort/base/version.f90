@@ -54,7 +54,7 @@ contains
     case ('-O', '-f', '-s', '-g')
       tells = index(word, '-fpre-include') /= 1 .and. index(word, '-fmax-errors') /= 1
     case default
-      continue
+      continue  ! any other word says nothing of the code that is made
     end select
   end function tells
 

@@ -58,8 +58,9 @@ contains
   !> clusters. Members are those within the rule's reach for the bond's mean spacing.
   subroutine new_list_family(body, rule, family)
     type(body_type), intent(inout) :: body
-    type(volume_rule_type), intent(in) :: rule
-    type(list_family_type), intent(out) :: family
+      !! in point order; arranged in the slots of the family on return
+    type(volume_rule_type), intent(in) :: rule     !! volume correction and horizon
+    type(list_family_type), intent(out) :: family  !! whole, all bonds intact
     type(rows_type) :: rows
     real(wp), allocatable :: half_reach(:)
     integer(i4), allocatable :: order(:), point(:), member(:)
@@ -156,10 +157,12 @@ contains
     j = family%member(merge(1, 2, iand(family%first(e), lane_bit(l)) /= 0_i1), e)
   end function other_end
 
+  !> All bonds of slot `k` in the order of its cluster's packs, broken ones too.
   pure subroutine bonds_of(family, k, bonds)
-    class(list_family_type), intent(in) :: family
-    integer, intent(in) :: k
+    class(list_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                       !! slot; a dead one has no bonds
     type(bonds_type), intent(inout) :: bonds
+      !! made by `allocate_bonds`; the first `bonds%n` entries are set
     real(wp) :: spacing
     integer(i8) :: e
     integer :: i, n, c, l, d
@@ -194,9 +197,11 @@ contains
     end do
   end subroutine bonds_of
 
+  !> Break the `i`-th bond of slot `k`; the other direction is another call.
   pure subroutine break_bond(family, k, i)
-    class(list_family_type), intent(inout) :: family
-    integer, intent(in) :: k, i
+    class(list_family_type), intent(inout) :: family  !! with this bond broken on return
+    integer, intent(in) :: k                          !! slot whose bond is broken
+    integer, intent(in) :: i                          !! number of the bond in `bonds_of(k)`, from 1
     integer(i8) :: e
     integer :: c, l, n
 
@@ -212,14 +217,17 @@ contains
     end do
   end subroutine break_bond
 
+  !> Keep the bits of intact bonds, or put them back.
   subroutine keep_bonds(family, archive)
     class(list_family_type), intent(inout) :: family
-    class(archive_type), intent(inout) :: archive
+      !! its intact bonds are set where the archive reads
+    class(archive_type), intent(inout) :: archive     !! a checkpoint that is written or read
     call archive%keep('intact bonds of clusters', family%intact)
   end subroutine keep_bonds
 
+  !> Memory of the packs, slots, fractions and stored weights [bytes].
   pure integer(i8) function bytes(family)
-    class(list_family_type), intent(in) :: family
+    class(list_family_type), intent(in) :: family  !! the family
     ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
     bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
       & + 18_i8*size(family%large)
@@ -228,8 +236,9 @@ contains
     if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
   end function bytes
 
+  !> How many bonds a pack has on average and why it is no lattice, in a line.
   function describe(family) result(text)
-    class(list_family_type), intent(in) :: family
+    class(list_family_type), intent(in) :: family  !! the family
     character(:), allocatable :: text
     text = 'list: packs of the neighbours of every eight points, each with '//to_text( &
       & real(family%n_bonds, wp)/max(1, size(family%bits)), 2)//' bonds'

@@ -25,7 +25,7 @@ contains
   !> if the forces have one, then the forces. Whoever needs internal forces calls this.
   subroutine internal_force(family, model, options, u, p, force, strained, part)
     class(family_type), intent(inout) :: family         !! its loops keep their room there
-    type(model_type), intent(in) :: model
+    type(model_type), intent(in) :: model               !! parameters of the slots
     type(force_options_type), intent(in) :: options     !! what the forces take in
     real(wp), intent(in), contiguous :: u(:, :)         !! displacements (n_slots, dim) [m]
     real(wp), intent(inout), contiguous :: p(:)         !! 2 a d delta theta (n_slots), of size 0
@@ -89,10 +89,10 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine energy_pass(family, model, u, energy)
-    class(family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: energy(:)
+    class(family_type), intent(inout) :: family       !! its loops keep their room there
+    type(model_type), intent(in) :: model             !! parameters of the slots
+    real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
+    real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
 
     select type (family)
     type is (list_family_type)

@@ -19,16 +19,17 @@ contains
   !> `both`. `weight` (lanes, n) may be less than all bonds.
   subroutine general_dilatation(model, options, both, n, weights, weight, first, u, theta, &
     & strained)
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
-    logical, intent(in) :: both
-    integer, intent(in) :: n
-    type(weights_type), intent(in) :: weights
-    real(wp), intent(in) :: weight(:, :)
-    integer(i8), intent(in) :: first
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: theta(:)
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the dilatation takes in
+    logical, intent(in) :: both            !! add to both ends of a bond
+    integer, intent(in) :: n               !! offsets whose bonds are taken, the first of the block
+    type(weights_type), intent(in) :: weights  !! of the block: shifts and geometry
+    real(wp), intent(in) :: weight(:, :)   !! (lanes, n) Gd vc V, 0 for bonds to be left out [m3]
+    integer(i8), intent(in) :: first       !! slot of the block's first lane
+    real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
+    real(wp), intent(inout), contiguous :: theta(:)  !! (n_slots) sums, added to [m3]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) set to 1 for slots with a bond at its limit, of size 0 if none can break
     real(wp), dimension(lanes) :: s, lambda, r, share
     real(wp) :: along(lanes, 3)
     integer(i8) :: j
@@ -48,16 +49,21 @@ contains
   !> Add what the first `n` offsets' bonds pull to `force` (n_slots, dim), at both ends if `both`.
   !> `stretch` (lanes, n) may be less than all bonds.
   subroutine general_force(model, options, both, n, weights, stretch, first, u, p, force, strained)
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
-    logical, intent(in) :: both
-    integer, intent(in) :: n
-    type(weights_type), intent(in) :: weights
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the forces take in
+    logical, intent(in) :: both            !! add to both ends of a bond
+    integer, intent(in) :: n               !! offsets whose bonds are taken, the first of the block
+    type(weights_type), intent(in) :: weights  !! of the block: shifts, geometry and dilatation
     real(wp), intent(in) :: stretch(:, :)
-    integer(i8), intent(in) :: first
-    real(wp), intent(in), contiguous :: u(:, :), p(:)
+      !! (lanes, n) (q_k + q_j) Gb vc V |xi|, less for bonds that were served [N/m2]
+    integer(i8), intent(in) :: first       !! slot of the block's first lane
+    real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
+    real(wp), intent(in), contiguous :: p(:)
+      !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
     real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots, dim) force density, added to [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) set to 1 for slots with a bond at its limit, of size 0 if none can break
     real(wp), dimension(lanes) :: s, lambda, r, magnitude
     real(wp) :: along(lanes, 3)
     integer(i8) :: j
@@ -83,12 +89,15 @@ contains
   !> Sums of the bonds of the block at slot `first`, for its energy: (q_k + q_j) Gb s^2 |xi| vc V,
   !> with q_k twice where materials differ, and Gd s Lambda vc V.
   subroutine general_energy(model, options, weights, first, u, stretches, theta)
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
-    type(weights_type), intent(in) :: weights
-    integer(i8), intent(in) :: first
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(out) :: stretches(lanes), theta(lanes)
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the energy takes in
+    type(weights_type), intent(in) :: weights        !! of the block, in double precision
+    integer(i8), intent(in) :: first                 !! slot of the block's first lane
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
+    real(wp), intent(out) :: stretches(lanes)
+      !! sum of the bonds' squared stretches of each lane [J/m3]
+    real(wp), intent(out) :: theta(lanes)
+      !! sum of Gd s Lambda vc V of each lane, 0 without a dilatation [m3]
     real(wp), dimension(lanes) :: s, lambda, r
     real(wp) :: along(lanes, 3)
     integer(i8) :: j
@@ -167,12 +176,14 @@ contains
     end do
   end subroutine mark_block
 
-  !> Mark slot `k`, one of whose bonds has the stretch `s` beyond the limit.
+  !> Mark slot `k`, one of whose bonds has the stretch `s` beyond the limit. Compression marks it
+  !> only if its bonds break in compression.
   pure subroutine mark_slot(model, k, s, strained)
-    type(model_type), intent(in) :: model
-    integer(i8), intent(in) :: k
-    real(wp), intent(in) :: s
+    type(model_type), intent(in) :: model  !! with bonds that can break
+    integer(i8), intent(in) :: k           !! slot
+    real(wp), intent(in) :: s              !! mechanical stretch, positive in tension [-]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slot `k` on return, unless it is in a no-fail zone or does not break so
 
     if (model%critical(k) < 0.0_wp) return
     if (s < 0.0_wp) then

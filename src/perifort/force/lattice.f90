@@ -41,11 +41,14 @@ contains
   !> in `family%served` which fast formulas serve each block.
   subroutine lattice_dilatation(family, model, options, u, p, strained)
     type(lattice_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! with its weights; `served` and what it keeps in single precision are set
+    type(model_type), intent(in) :: model            !! that the weights were made for
+    type(force_options_type), intent(in) :: options  !! what the forces take in
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
+      !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
@@ -95,12 +98,16 @@ contains
   !> `lattice_dilatation` at the same displacements.
   subroutine lattice_force(family, model, options, u, p, force, strained)
     type(lattice_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+      !! with its weights; what it keeps in single precision is set
+    type(model_type), intent(in) :: model               !! that the weights were made for
     type(force_options_type), intent(in) :: options
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! what the forces take in, as for `lattice_dilatation`
+    real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)
-    real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
+    real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
@@ -151,10 +158,11 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine lattice_energy(family, model, u, energy)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
+    type(lattice_family_type), intent(in) :: family  !! with its weights
+    type(model_type), intent(in) :: model            !! that the weights were made for
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(out), contiguous :: energy(:)
+      !! (n_slots) of each slot, 0 for dead ones [J/m3]
     type(weights_type) :: own, half
     integer :: b
 

@@ -34,7 +34,8 @@ contains
   !> the others. The first pass does it if nobody has; afterwards the model must not change.
   subroutine prepare_list(family, model)
     type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+      !! gets `given`, `plain` and the stored weights; unchanged if it has them
+    type(model_type), intent(in) :: model  !! parameters of the slots
 
     if (allocated(family%given)) return
     call survey(family, model)
@@ -57,11 +58,14 @@ contains
   !> intact bond beyond its limit.
   subroutine list_dilatation(family, model, options, u, p, strained)
     type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! gets the displacements and how far its clusters are strained
+    type(model_type), intent(in) :: model            !! that the family has been prepared for
+    type(force_options_type), intent(in) :: options  !! what the forces take in
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
+      !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
@@ -98,13 +102,16 @@ contains
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `list_dilatation` at the same displacements.
   subroutine list_force(family, model, options, u, p, force, strained)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+    type(list_family_type), intent(inout) :: family     !! gets the displacements and `p`
+    type(model_type), intent(in) :: model               !! that the family has been prepared for
     type(force_options_type), intent(in) :: options
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! what the forces take in, as for `list_dilatation`
+    real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)
-    real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
+    real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
@@ -137,10 +144,10 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine list_energy(family, model, u, energy)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: energy(:)
+    type(list_family_type), intent(inout) :: family   !! gets the displacements
+    type(model_type), intent(in) :: model             !! that the family has been prepared for
+    real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
+    real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
     type(force_options_type) :: options
     type(loops_type) :: loops
     type(work_type) :: work

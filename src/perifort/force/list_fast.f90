@@ -66,8 +66,10 @@ module pd_force_list_fast
       ! allow(C071): as above.
       real(wp), intent(in) :: weight_S(lanes, *)  !! (q_k + q_j) Gb vc V |xi|, if stored
       real(wp), intent(in) :: own(lanes, 16)      !! `at` and `given` of the lanes
-      type(task_type), intent(in) :: task
+      type(task_type), intent(in) :: task         !! what all bonds of the cluster have in common
       real(wp), intent(inout) :: sums(lanes, 3)
+        !! of each lane: theta [m3]; components of the force density [N/m3]; or energy [J/m3] and
+        !! theta
       logical, intent(out) :: missed              !! some bond is strained beyond the limit
     end subroutine pass_loop
   end interface
@@ -77,9 +79,12 @@ contains
   !> The loop of a `pass` in `dim` dimensions. `stored`: of theta and force, with stored weights;
   !> `state`: there is a dilatation, `projected` or not.
   subroutine choose_loop(dim, pass, stored, state, projected, loop)
-    integer, intent(in) :: dim, pass
-    logical, intent(in) :: stored, state, projected
-    procedure(pass_loop), pointer, intent(out) :: loop
+    integer, intent(in) :: dim     !! number of dimensions; 1 takes the loops of 2
+    integer, intent(in) :: pass    !! `for_theta`, `for_force` or `for_energy`
+    logical, intent(in) :: stored  !! for clusters with stored weights; does not count for energies
+    logical, intent(in) :: state   !! the force has a dilatation; counts for forces only
+    logical, intent(in) :: projected  !! with Lambda as printed, else Lambda = 1
+    procedure(pass_loop), pointer, intent(out) :: loop  !! the loop
 
     select case (pass)
     case (for_theta)

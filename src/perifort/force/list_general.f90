@@ -34,9 +34,10 @@ contains
 
   !> Turn to cluster `c`.
   pure subroutine take_up(family, c, work)
-    type(list_family_type), intent(in) :: family
-    integer, intent(in) :: c
+    type(list_family_type), intent(in) :: family  !! prepared for a model, with its state gathered
+    integer, intent(in) :: c                      !! cluster
     type(work_type), intent(inout) :: work
+      !! gets what its slots have; its tables stay those of another cluster
     integer :: d, l
 
     work%cluster = c
@@ -64,11 +65,12 @@ contains
   !> Weights of a cluster's bonds, for any rule, material and surface factor: of those that `bits`
   !> (packs of the cluster) has. `own`: with 2 q_k in place of q_k + q_j, as the energy needs them.
   subroutine fill_tables(family, model, bits, own, work)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    integer(i1), intent(in) :: bits(:)
-    logical, intent(in) :: own
+    type(list_family_type), intent(in) :: family  !! prepared for the model
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    integer(i1), intent(in) :: bits(:)  !! (packs) lanes whose bonds count, such as the intact ones
+    logical, intent(in) :: own          !! 2 q_k in place of q_k + q_j
     type(work_type), intent(inout) :: work
+      !! of the cluster it has taken up; gets the tables of its bonds
     real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c
     logical :: there(lanes), from(lanes)
     integer(i8) :: e
@@ -125,7 +127,8 @@ contains
   !> Store the weights of all clusters whose points are not alike.
   subroutine store_weights(family, model)
     type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+      !! surveyed; gets `stored`, `weight_S` and, with a dilatation, `weight_D`
+    type(model_type), intent(in) :: model  !! parameters of the slots
     type(work_type) :: work
     integer(i8) :: n, b
     integer :: c
@@ -155,11 +158,12 @@ contains
 
   !> theta of the lanes.
   pure subroutine general_theta(family, model, options, work, theta)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
+    type(list_family_type), intent(in) :: family     !! with displacements gathered
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the dilatation takes in
     type(work_type), intent(inout) :: work
-    real(wp), intent(out) :: theta(lanes)
+      !! with tables; gets the greatest tension and compression of each lane
+    real(wp), intent(out) :: theta(lanes)            !! sum of Gd s Lambda vc V of each lane [m3]
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
@@ -175,10 +179,13 @@ contains
   !> Force density of the lanes (lanes, 3) [N/m3].
   pure subroutine general_force(family, model, options, work, force)
     type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
+      !! with displacements, and p if there is one, gathered
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the forces take in
     type(work_type), intent(inout) :: work
+      !! with tables; gets the greatest tension and compression of each lane
     real(wp), intent(out) :: force(lanes, 3)
+      !! force density; components that the body does not have are 0 [N/m3]
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i, c
@@ -199,11 +206,14 @@ contains
   !> Strain energy density of the lanes' stretches [J/m3], from tables with each lane's own q twice,
   !> and theta.
   pure subroutine general_energy(family, model, options, work, energy, theta)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
+    type(list_family_type), intent(in) :: family     !! with displacements gathered
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the energy takes in
     type(work_type), intent(inout) :: work
-    real(wp), intent(out) :: energy(lanes), theta(lanes)
+      !! with tables of each lane's own q; gets the greatest tension and compression
+    real(wp), intent(out) :: energy(lanes)           !! of the stretches alone [J/m3]
+    real(wp), intent(out) :: theta(lanes)
+      !! sum of Gd s Lambda vc V of each lane, 0 without a dilatation [m3]
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i

@@ -26,8 +26,8 @@ contains
 
   !> Put what the model gives into the family, and find the clusters whose points are alike.
   subroutine survey(family, model)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+    type(list_family_type), intent(inout) :: family  !! gets `given` and `plain`
+    type(model_type), intent(in) :: model            !! parameters of the slots
     integer :: k, c, d
 
     ! without a factor the sum of both ends is 1, in directions that the body does not have, too
@@ -88,9 +88,9 @@ contains
 
   !> What the loops for energies must know, and what is the same for all clusters.
   subroutine new_task(family, model, task)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(task_type), intent(out) :: task
+    type(list_family_type), intent(in) :: family  !! with its volume rule
+    type(model_type), intent(in) :: model         !! whether there are surface factors
+    type(task_type), intent(out) :: task          !! without a limit of strain
 
     task%surface = model%surface
     select case (family%rule%kind)
@@ -124,11 +124,12 @@ contains
 
   !> What the loops of plain cluster `c` multiply with.
   pure subroutine plain_task(family, model, options, c, task)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
-    integer, intent(in) :: c
+    type(list_family_type), intent(in) :: family     !! surveyed
+    type(model_type), intent(in) :: model            !! whether there are surface factors
+    type(force_options_type), intent(in) :: options  !! whether the forces have a dilatation
+    integer, intent(in) :: c                         !! cluster whose points are alike
     type(task_type), intent(inout) :: task
+      !! gets the volume correction and the factors of this cluster
     real(wp) :: Gb
 
     associate (given => family%given(:, lanes*(c - 1) + 1))

@@ -50,12 +50,12 @@ contains
   !> The model of a body. `zone` marks slots in no-fail zones, `temperature_change` [K] is per slot.
   !> Surface factors are set by whoever computes them.
   pure subroutine new_model(body, materials, with_lambda, zone, temperature_change, model)
-    type(body_type), intent(in) :: body
-    type(material_type), intent(in) :: materials(:)
+    type(body_type), intent(in) :: body              !! arranged in slots
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
     logical, intent(in) :: with_lambda  !! the dilatation is `projected`, as printed
-    logical, intent(in) :: zone(:)
-    real(wp), intent(in) :: temperature_change(:)
-    type(model_type), intent(out) :: model
+    logical, intent(in) :: zone(:)                   !! (n_slots) slots in no-fail zones
+    real(wp), intent(in) :: temperature_change(:)    !! (n_slots) of each slot [K]
+    type(model_type), intent(out) :: model           !! without surface factors
     logical :: used(size(materials))
     integer :: k
 
@@ -86,7 +86,7 @@ contains
 
   !> What the forces of the model itself take in.
   pure type(force_options_type) function options_of(model) result(options)
-    type(model_type), intent(in) :: model
+    type(model_type), intent(in) :: model  !! the model
 
     options%dilatation = model%dilatation
     options%projected = model%projected
@@ -95,7 +95,7 @@ contains
 
   !> The kind of dilatation of a force.
   pure integer function dilatation_of(options) result(kind)
-    type(force_options_type), intent(in) :: options
+    type(force_options_type), intent(in) :: options  !! what a force takes in
 
     kind = no_dilatation
     if (options%dilatation) kind = merge(projected, unprojected, options%projected)
@@ -103,9 +103,10 @@ contains
 
   !> Limits of the mechanical stretch of the bond k-j: it breaks above `upper` or below `lower`.
   pure subroutine bond_limit(model, k, j, lower, upper)
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: k, j
-    real(wp), intent(out) :: lower, upper
+    type(model_type), intent(in) :: model  !! with bonds that can break
+    integer, intent(in) :: k, j     !! slots of the bond's ends
+    real(wp), intent(out) :: lower  !! < 0; -`never` if the bond does not break in compression [-]
+    real(wp), intent(out) :: upper  !! > 0; `never` if one end is in a no-fail zone [-]
 
     upper = min(model%critical(k), model%critical(j))
     if (upper < 0.0_wp) upper = never

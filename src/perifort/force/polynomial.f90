@@ -60,14 +60,15 @@ contains
   !> Whether the fast formulas know every term that is asked for, so that they serve small strains:
   !> forces and energies both ask here.
   pure logical function fast_terms(options)
-    type(force_options_type), intent(in) :: options
+    type(force_options_type), intent(in) :: options  !! what a force or an energy takes in
     fast_terms = .not. options%thermal
   end function fast_terms
 
-  !> Bonds with |e| below this are served by the fast formulas of a `range`; 0: none.
+  !> Bonds with |e| below this are served by the fast formulas of a `range`; 0: none. Where bonds
+  !> can break it is no more than the |e| at which the first one might.
   pure real(wp) function fast_limit(model, options, range) result(limit)
-    type(model_type), intent(in) :: model
-    type(force_options_type), intent(in) :: options
+    type(model_type), intent(in) :: model            !! with the smallest critical stretch
+    type(force_options_type), intent(in) :: options  !! what a force takes in
     integer, intent(in) :: range  !! `narrow`, `wide` or `single`
     ! what single precision may miss of e: some roundings of eta/|xi| and of its square, both at
     ! most 2 or so where the length hardly changes

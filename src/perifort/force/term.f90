@@ -69,18 +69,20 @@ module pd_force_term
     subroutine add_force_interface(self, view, force)
       import :: force_term_type, term_view_type, wp
       implicit none (type, external)
-      class(force_term_type), intent(in) :: self
-      type(term_view_type), intent(in) :: view
+      class(force_term_type), intent(in) :: self  !! the term
+      type(term_view_type), intent(in) :: view    !! the instant
       real(wp), intent(inout), contiguous :: force(:, :)
+        !! (n_slots, dim) force density, added to [N/m3]
     end subroutine add_force_interface
 
     !> Add the energy density that the term stores [J/m3] to `density` (n_slots).
     subroutine add_energy_interface(self, view, density)
       import :: force_term_type, term_view_type, wp
       implicit none (type, external)
-      class(force_term_type), intent(in) :: self
-      type(term_view_type), intent(in) :: view
+      class(force_term_type), intent(in) :: self  !! the term
+      type(term_view_type), intent(in) :: view    !! the instant
       real(wp), intent(inout), contiguous :: density(:)
+        !! (n_slots) energy density, added to [J/m3]
     end subroutine add_energy_interface
 
     !> Add a bound of the term's stiffness [N/m4] to `bound` (n_slots): for each slot the largest
@@ -91,9 +93,10 @@ module pd_force_term
     subroutine add_bound_interface(self, view, bound)
       import :: force_term_type, term_view_type, wp
       implicit none (type, external)
-      class(force_term_type), intent(in) :: self
-      type(term_view_type), intent(in) :: view
+      class(force_term_type), intent(in) :: self  !! the term
+      type(term_view_type), intent(in) :: view    !! the instant
       real(wp), intent(inout), contiguous :: bound(:)
+        !! (n_slots) bound of the stiffness, added to [N/m4]
     end subroutine add_bound_interface
 
     !> Keep what the term carries from one instant to the next, or put it back: by the same calls of
@@ -101,15 +104,15 @@ module pd_force_term
     subroutine keep_interface(self, archive)
       import :: archive_type, force_term_type
       implicit none (type, external)
-      class(force_term_type), intent(inout) :: self
-      class(archive_type), intent(inout) :: archive
+      class(force_term_type), intent(inout) :: self  !! its history is set where the archive reads
+      class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
     end subroutine keep_interface
 
     !> What the term is, in a line of the summary; '' for no line.
     function describe_interface(self) result(text)
       import :: force_term_type
       implicit none (type, external)
-      class(force_term_type), intent(in) :: self
+      class(force_term_type), intent(in) :: self  !! the term
       character(:), allocatable :: text
     end function describe_interface
   end interface
@@ -152,9 +155,10 @@ contains
   !> Add a bound of the damping [N s/m4] to `bound` (n_slots), as that of the stiffness: of the
   !> derivative with respect to velocities. By default there is none.
   subroutine no_damping(self, view, bound)
-    class(force_term_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(force_term_type), intent(in) :: self  !! the term
+    type(term_view_type), intent(in) :: view    !! the instant
     real(wp), intent(inout), contiguous :: bound(:)
+      !! (n_slots) bound of the damping, added to [N s/m4]
 
     if (.not. (associated(view%u) .and. size(bound) > 0)) call misused(self)
   end subroutine no_damping
@@ -163,10 +167,11 @@ contains
   !> force density in that direction [N/m3], both (n_slots, dim). It must be symmetric in the inner
   !> product weighted with volumes. A term that `has_tangent` has a procedure of its own.
   subroutine no_change(self, view, w, kw)
-    class(force_term_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
-    real(wp), intent(in), contiguous :: w(:, :)
+    class(force_term_type), intent(in) :: self   !! the term
+    type(term_view_type), intent(in) :: view     !! the instant
+    real(wp), intent(in), contiguous :: w(:, :)  !! (n_slots, dim) small displacement [m]
     real(wp), intent(inout), contiguous :: kw(:, :)
+      !! (n_slots, dim) resistance to it, added to [N/m3]
 
     if (self%tangent /= no_stiffness .or. size(w) /= size(kw) .or. .not. associated(view%u)) &
       & call misused(self)
@@ -177,7 +182,8 @@ contains
   !> place to bring a history up to date. By default there is nothing to do.
   subroutine begin_nothing(self, view)
     class(force_term_type), intent(inout) :: self
-    type(term_view_type), intent(in) :: view
+      !! the term, with its history up to date on return
+    type(term_view_type), intent(in) :: view  !! the instant
 
     if (.not. associated(view%u)) call misused(self)
   end subroutine begin_nothing
@@ -201,7 +207,7 @@ contains
 
   !> Add a term, as the last one. Of a list, its terms are added one by one.
   recursive subroutine add(self, term)
-    class(term_list_type), intent(inout) :: self
+    class(term_list_type), intent(inout) :: self  !! the list, with the term at its end on return
     class(force_term_type), intent(in) :: term   !! is copied
     type(item_type), allocatable :: items(:)
     integer :: i, n
@@ -232,7 +238,7 @@ contains
 
   !> How many terms there are.
   pure integer function number(self)
-    class(term_list_type), intent(in) :: self
+    class(term_list_type), intent(in) :: self  !! the list
 
     number = 0
     if (allocated(self%items)) number = size(self%items)
@@ -240,9 +246,10 @@ contains
 
   !> The force density of the terms that are not external, added to `force`.
   subroutine add_force_of_list(self, view, force)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(term_list_type), intent(in) :: self  !! the list
+    type(term_view_type), intent(in) :: view   !! the instant
     real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots, dim) force density, added to [N/m3]
     integer :: i
 
     if (self%inside == 0) return
@@ -253,8 +260,8 @@ contains
 
   !> The force density of the external terms that are not summed apart, added to `force`.
   subroutine add_external(self, view, force)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(term_list_type), intent(in) :: self           !! the list
+    type(term_view_type), intent(in) :: view            !! the instant
     real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) [N/m3]
     integer :: i
 
@@ -266,9 +273,9 @@ contains
 
   !> The energy density that the terms store which are not external.
   subroutine add_energy_of_list(self, view, density)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
-    real(wp), intent(inout), contiguous :: density(:)
+    class(term_list_type), intent(in) :: self          !! the list
+    type(term_view_type), intent(in) :: view           !! the instant
+    real(wp), intent(inout), contiguous :: density(:)  !! (n_slots) energy density, added to [J/m3]
     integer :: i
 
     if (self%inside == 0) return
@@ -279,8 +286,8 @@ contains
 
   !> The energy that the terms store which are not external [J].
   real(wp) function energy(self, view)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(term_list_type), intent(in) :: self  !! the list
+    type(term_view_type), intent(in) :: view   !! the instant
     real(wp), allocatable :: density(:)
 
     energy = 0.0_wp
@@ -292,9 +299,10 @@ contains
 
   !> Bounds of all terms, external ones included: they act on the motion as well.
   subroutine add_bound_of_list(self, view, bound)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(term_list_type), intent(in) :: self  !! the list
+    type(term_view_type), intent(in) :: view   !! the instant
     real(wp), intent(inout), contiguous :: bound(:)
+      !! (n_slots) bound of the stiffness, added to [N/m4]
     integer :: i
 
     do i = 1, self%number()
@@ -304,9 +312,10 @@ contains
 
   !> As above, of the damping.
   subroutine add_damping_of_list(self, view, bound)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(term_list_type), intent(in) :: self  !! the list
+    type(term_view_type), intent(in) :: view   !! the instant
     real(wp), intent(inout), contiguous :: bound(:)
+      !! (n_slots) bound of the damping, added to [N s/m4]
     integer :: i
 
     do i = 1, self%number()
@@ -316,10 +325,11 @@ contains
 
   !> What all terms resist, external ones included.
   subroutine add_tangent_of_list(self, view, w, kw)
-    class(term_list_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
-    real(wp), intent(in), contiguous :: w(:, :)
+    class(term_list_type), intent(in) :: self    !! the list
+    type(term_view_type), intent(in) :: view     !! the instant
+    real(wp), intent(in), contiguous :: w(:, :)  !! (n_slots, dim) small displacement [m]
     real(wp), intent(inout), contiguous :: kw(:, :)
+      !! (n_slots, dim) resistance to it, added to [N/m3]
     integer :: i
 
     do i = 1, self%number()
@@ -330,8 +340,8 @@ contains
 
   !> All terms begin.
   subroutine begin_list(self, view)
-    class(term_list_type), intent(inout) :: self
-    type(term_view_type), intent(in) :: view
+    class(term_list_type), intent(inout) :: self  !! the list, with its terms begun on return
+    type(term_view_type), intent(in) :: view      !! the start
     integer :: i
 
     do i = 1, self%number()
@@ -342,7 +352,8 @@ contains
   !> All terms go on to the instant of the view.
   subroutine advance_list(self, view)
     class(term_list_type), intent(inout) :: self
-    type(term_view_type), intent(in) :: view
+      !! the list, with the histories of its terms up to date on return
+    type(term_view_type), intent(in) :: view  !! the instant
     integer :: i
 
     do i = 1, self%number()
@@ -355,7 +366,8 @@ contains
   !> step, when the forces are known.
   subroutine account(self, view, supplied, lost)
     class(term_list_type), intent(inout) :: self
-    type(term_view_type), intent(in) :: view
+      !! the list; keeps displacements, forces and energies of this instant
+    type(term_view_type), intent(in) :: view        !! the instant
     real(wp), intent(inout) :: supplied             !! [J]
     real(wp), intent(inout) :: lost                 !! [J]
     real(wp), allocatable :: force(:, :), density(:)
@@ -395,7 +407,8 @@ contains
   !> Keep all terms and the accounts of their work.
   subroutine keep_list(self, archive)
     class(term_list_type), intent(inout) :: self
-    class(archive_type), intent(inout) :: archive
+      !! the list; histories and accounts are set where the archive reads
+    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
     integer :: i
 
     do i = 1, self%number()
@@ -411,7 +424,7 @@ contains
 
   !> The lines of all terms, each ended by a newline.
   function describe_list(self) result(text)
-    class(term_list_type), intent(in) :: self
+    class(term_list_type), intent(in) :: self  !! the list
     character(:), allocatable :: text, one
     integer :: i
 
@@ -425,7 +438,7 @@ contains
   !> The name of the first term whose force depends on displacements and that has no tangent; '' if
   !> there is none.
   function without_tangent(self) result(name)
-    class(term_list_type), intent(in) :: self
+    class(term_list_type), intent(in) :: self  !! the list
     character(:), allocatable :: name
     integer :: i
 

@@ -44,7 +44,9 @@ contains
   !> Put loads into a list of terms, before all others.
   subroutine add_loads_to(terms, loads)
     type(term_list_type), intent(inout) :: terms
+      !! without terms other than loads; with these loads at its end on return
     type(load_type), intent(inout) :: loads(:)
+      !! (any number) external, without stiffness and summed apart on return
     integer :: l
 
     if (terms%number() > number_of_loads(terms)) call internal_fault('loads come first')
@@ -58,7 +60,7 @@ contains
 
   !> How many loads a list of terms begins with.
   pure integer function number_of_loads(terms) result(number)
-    type(term_list_type), intent(in) :: terms
+    type(term_list_type), intent(in) :: terms  !! with its loads first
     integer :: i
 
     number = 0
@@ -72,10 +74,11 @@ contains
     end do
   end function number_of_loads
 
-  !> The `l`-th load of a list of terms.
+  !> The `l`-th load of a list of terms. It is the term itself, not a copy.
   function load_of(terms, l) result(load)
-    type(term_list_type), intent(in), target :: terms
+    type(term_list_type), intent(in), target :: terms  !! with its loads first
     integer, intent(in) :: l
+      !! number of the load, from 1; that of another term is a fault of the program
     type(load_type), pointer :: load
 
     load => null()
@@ -89,9 +92,10 @@ contains
 
   !> The load's force density at the time of the view.
   subroutine add_force_of_load(self, view, force)
-    class(load_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(load_type), intent(in) :: self      !! the load
+    type(term_view_type), intent(in) :: view  !! whose time counts
     real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots, dim) force density, added to [N/m3]
     real(wp) :: factor
     integer :: c, i
 
@@ -105,17 +109,19 @@ contains
 
   !> A load stores nothing.
   subroutine add_no_energy(self, view, density)
-    class(load_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(load_type), intent(in) :: self      !! the load
+    type(term_view_type), intent(in) :: view  !! the instant
     real(wp), intent(inout), contiguous :: density(:)
+      !! (n_slots) energy density, left as it is [J/m3]
     call must_be_load(self, view, density)
   end subroutine add_no_energy
 
   !> It doesn't depend on displacements.
   subroutine add_no_bound(self, view, bound)
-    class(load_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
+    class(load_type), intent(in) :: self      !! the load
+    type(term_view_type), intent(in) :: view  !! the instant
     real(wp), intent(inout), contiguous :: bound(:)
+      !! (n_slots) bound of the stiffness, left as it is [N/m4]
     call must_be_load(self, view, bound)
   end subroutine add_no_bound
 
@@ -130,14 +136,14 @@ contains
 
   !> Nor does it carry anything from one instant to the next.
   subroutine keep_nothing(self, archive)
-    class(load_type), intent(inout) :: self
-    class(archive_type), intent(inout) :: archive
+    class(load_type), intent(inout) :: self        !! the load, left as it is
+    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
     if (archive%reading .and. .not. allocated(self%slots)) call internal_fault('an empty load')
   end subroutine keep_nothing
 
   !> The report of a scene tells of its loads.
   function describe_load(self) result(text)
-    class(load_type), intent(in) :: self
+    class(load_type), intent(in) :: self  !! the load
     character(:), allocatable :: text
     text = ''
     if (.not. self%external) text = 'a load outside the list of terms'
@@ -145,8 +151,8 @@ contains
 
   !> Keep the displacements at t = 0, from which imposed velocities integrate.
   pure subroutine remember_start(motions, u)
-    type(motion_type), intent(inout) :: motions(:)
-    real(wp), intent(in) :: u(:, :)
+    type(motion_type), intent(inout) :: motions(:)  !! (any number) get `start`
+    real(wp), intent(in) :: u(:, :)                 !! (n_slots, dim) displacements at t = 0 [m]
     integer :: m, c
 
     do m = 1, size(motions)
@@ -160,8 +166,8 @@ contains
 
   !> Set displacement and velocity of the constrained components at time `t` [s].
   pure subroutine impose(motions, t, u, v)
-    type(motion_type), intent(in) :: motions(:)
-    real(wp), intent(in) :: t
+    type(motion_type), intent(in) :: motions(:)   !! (any number) with `start` and `held` set
+    real(wp), intent(in) :: t  !! time; in relaxation 0 to 1 over the load steps [s]
     real(wp), intent(inout) :: u(:, :)            !! displacements (n_slots, dim) [m]
     real(wp), intent(inout), optional :: v(:, :)  !! velocities (n_slots, dim) [m/s]
     real(wp) :: factor, rate, path

@@ -77,6 +77,7 @@ contains
   !> Make a system ready at t = 0: `u` and `v` hold the initial state, conditions are in place.
   subroutine start_system(system)
     type(system_type), intent(inout), target :: system
+      !! with body, family, model, conditions, `u` and `v`; gets room for forces and marks
     type(term_view_type) :: view
     integer :: n
 
@@ -98,8 +99,9 @@ contains
   !> their place. Valid as long as the system stays where it is in memory.
   subroutine view_of(system, t, view, u)
     type(system_type), intent(in), target :: system
+      !! must not move in memory while the view is used
     real(wp), intent(in) :: t                                    !! [s]
-    type(term_view_type), intent(out) :: view
+    type(term_view_type), intent(out) :: view                    !! points into the system
     real(wp), intent(in), contiguous, target, optional :: u(:, :)  !! (n_slots, dim) [m]
 
     view%body => system%body
@@ -146,6 +148,7 @@ contains
   !> to a step too long, an error of first order in the step; the other order errs both ways.
   subroutine evaluate(system, t, breaking, pairing)
     type(system_type), intent(inout) :: system
+      !! gets imposed motion, temperature, broken bonds and forces of this instant
     real(wp), intent(in) :: t                            !! of this instant [s]
     logical, intent(in) :: breaking                      !! whether bonds may break
     type(pairing_type), intent(in), optional :: pairing  !! for their energy; squares by default
@@ -180,8 +183,9 @@ contains
   !> default; terms come last.
   subroutine renew_forces(system, t, part)
     type(system_type), intent(inout), target :: system
+      !! its displacements stay as they are; forces, dilatation and marks change
     real(wp), intent(in) :: t  !! [s]
-    integer, intent(in), optional :: part
+    integer, intent(in), optional :: part  !! `whole`, `up_to_marks` or `after_marks`
     type(term_view_type) :: view
 
     system%time = t
@@ -200,6 +204,7 @@ contains
   !> Bring the thermal strains to time `t`.
   subroutine bring_temperature(system, t)
     type(system_type), intent(inout) :: system
+      !! its thermal strains change if the temperature varies
     real(wp), intent(in) :: t  !! [s]; in relaxation 0 to 1 over the load steps
     if (allocated(system%heating%curves)) call heat(system%heating, t, system%model%expansion)
   end subroutine bring_temperature
@@ -209,7 +214,8 @@ contains
   !> its energy at fixed displacements.
   subroutine break_now(system, number)
     type(system_type), intent(inout) :: system
-    integer(i8), intent(out) :: number
+      !! with bonds broken, damage and dissipated energy up to date on return
+    integer(i8), intent(out) :: number  !! bonds broken by this call, each counted once
     integer(i4), allocatable :: slots(:)
 
     number = system%broken
@@ -350,10 +356,11 @@ contains
   !> (n_slots, dim); `per_density` divides by the point's density, which turns force density into
   !> acceleration.
   subroutine add_loads(system, t, scale, per_density, values)
-    type(system_type), intent(in), target :: system
-    real(wp), intent(in) :: t, scale
-    logical, intent(in) :: per_density
-    real(wp), intent(inout) :: values(:, :)
+    type(system_type), intent(in), target :: system  !! its external terms
+    real(wp), intent(in) :: t                        !! time of the loads [s]
+    real(wp), intent(in) :: scale                    !! factor
+    logical, intent(in) :: per_density               !! divide by the density of each point
+    real(wp), intent(inout) :: values(:, :)          !! (n_slots, dim) added to
     real(wp), allocatable :: force(:, :)
     type(load_type), pointer :: load
     type(term_view_type) :: view
@@ -400,8 +407,8 @@ contains
 
   !> 1/rho of slot `k` [m3/kg].
   pure real(wp) function inverse_density(model, k)
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: k
+    type(model_type), intent(in) :: model  !! densities of the slots
+    integer, intent(in) :: k               !! slot
     inverse_density = 1.0_wp/model%materials(model%material(k))%density
   end function inverse_density
 
@@ -415,8 +422,9 @@ contains
   !> up to date.
   subroutine account(system, t, at_rest)
     type(system_type), intent(inout), target :: system
-    real(wp), intent(in) :: t
-    logical, intent(in), optional :: at_rest
+      !! its work, reactions and the histories of its terms are those of this instant on return
+    real(wp), intent(in) :: t                 !! time of the displacements [s]
+    logical, intent(in), optional :: at_rest  !! nothing is accelerated; false by default
     real(wp), allocatable :: applied(:, :)
     real(wp) :: force, acceleration, mass
     logical :: first, moving
@@ -526,7 +534,7 @@ contains
 
   !> What the terms of the force store at the present displacements [J].
   real(wp) function stored_energy(system) result(energy)
-    type(system_type), intent(in), target :: system
+    type(system_type), intent(in), target :: system  !! at the instant of its time
     type(term_view_type) :: view
 
     call view_of(system, system%time, view)
@@ -578,9 +586,10 @@ contains
   !> Velocities at the time `t` of the displacements [m/s], half a kick [s] on from those that the
   !> integrator keeps.
   subroutine velocities_now(system, t, kick, v)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t, kick
-    real(wp), allocatable, intent(out) :: v(:, :)
+    type(system_type), intent(in) :: system  !! with the forces of this instant
+    real(wp), intent(in) :: t     !! time of the displacements [s]
+    real(wp), intent(in) :: kick  !! time that velocities lag behind, 0 if they do not [s]
+    real(wp), allocatable, intent(out) :: v(:, :)  !! (n_slots, dim) [m/s]
     integer :: k, c
 
     allocate (v, source=system%state%v)
@@ -599,8 +608,9 @@ contains
   !> `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
     type(system_type), intent(inout), target :: system
-    real(wp), intent(in) :: v(:, :)
-    type(energies_type), intent(out) :: energies
+      !! its state stays as it is; its force loops keep their room in the family
+    real(wp), intent(in) :: v(:, :)               !! (n_slots, dim) [m/s]
+    type(energies_type), intent(out) :: energies  !! those of this instant
     real(wp), allocatable :: density(:), mass(:)
     integer :: k, c
 

@@ -44,9 +44,10 @@ contains
   !> digits remain where displacements are as large as the spacing, more where they are smaller.
   subroutine apply_tangent(system, u, w, kw, options, model)
     type(system_type), intent(inout) :: system
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(in), contiguous :: w(:, :)
-    real(wp), intent(inout), contiguous :: kw(:, :)
+      !! its state stays as it is; its force loops keep their room in the family
+    real(wp), intent(in), contiguous :: u(:, :)                !! (n_slots, dim) displacements [m]
+    real(wp), intent(in), contiguous :: w(:, :)  !! (n_slots, dim) direction, of any length [m]
+    real(wp), intent(inout), contiguous :: kw(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     type(force_options_type), intent(in), optional :: options  !! of the forces; the model's own by
                                                                !! default
     type(model_type), intent(in), optional :: model            !! the system's by default
@@ -82,7 +83,9 @@ contains
   !> `tangent` says: the one product with a stiffness.
   subroutine tangent_product(system, tangent, u, w, kw, moved, forces, model)
     type(system_type), intent(inout) :: system
+      !! its state stays as it is; its force loops keep their room in the family
     type(tangent_type), intent(in) :: tangent
+      !! kind of the difference, its step and what the forces take in
     real(wp), intent(in), contiguous :: u(:, :)          !! where; 0 if `at_rest` [m]
     real(wp), intent(in), contiguous :: w(:, :)          !! direction (n_slots, dim) [m]
     real(wp), intent(inout), contiguous :: kw(:, :)      !! product (n_slots, dim) [N/m3]
@@ -133,8 +136,10 @@ contains
   !> looks at, and the dilatation of the system's own state are left alone.
   subroutine forces_at(system, u, force, options, model)
     type(system_type), intent(inout) :: system
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! its state stays as it is; its force loops keep their room in the family
+    real(wp), intent(in), contiguous :: u(:, :)                !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots, dim) set for all slots, terms not included [N/m3]
     type(force_options_type), intent(in), optional :: options  !! the model's own by default
     type(model_type), intent(in), optional :: model            !! the system's by default
     type(force_options_type) :: taken

@@ -39,11 +39,13 @@ module pd_set_up_plan
 
 contains
 
-  !> Make the plan of a scene for its system.
+  !> Make the plan of a scene for its system. An error is set if no point has a neighbour, if the
+  !> step is not above 0, or if there would be too many steps.
   subroutine make_plan(scene, system, plan, error)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene       !! a checked scene
     type(system_type), intent(inout) :: system
-    type(plan_type), intent(out) :: plan
+      !! ready at t = 0; its state stays as it is
+    type(plan_type), intent(out) :: plan        !! what the run will do
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: bound(:), rows(:)
     real(wp) :: stiffness, damping  ! of the terms of the force, over the density
@@ -197,9 +199,10 @@ contains
     end do
   end subroutine plan_relaxation
 
-  !> What turns dx^dim into a volume: thickness in 2D, area in 1D.
+  !> What turns dx^dim into a volume: thickness in 2D, area in 1D. It is 1 in 3D [m in 2D, m2 in
+  !> 1D].
   pure real(wp) function depth_of(scene) result(depth)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene  !! a checked scene
     select case (scene%header%dimension)
     case (1); depth = scene%header%area
     case (2); depth = scene%header%thickness

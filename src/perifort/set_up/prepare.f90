@@ -48,13 +48,16 @@ contains
 
   !> Points, families, corrections, cracks, conditions and the plan of a scene. With `threads` a
   !> run's team begins, with so many threads or, if that is 0, with a number that suits the body;
-  !> without, threads are the caller's. `terms` of the force act beside those of the scene.
+  !> without, threads are the caller's. `terms` of the force act beside those of the scene. An error
+  !> is set if the scene does not fit into the memory, or if its points, families, conditions or
+  !> plan are impossible.
   subroutine prepare(scene, set_up, error, threads, terms)
-    type(scene_type), intent(in) :: scene
-    type(set_up_type), intent(out) :: set_up
+    type(scene_type), intent(in) :: scene                !! a checked scene
+    type(set_up_type), intent(out) :: set_up             !! ready for the first step
     type(error_type), allocatable, intent(out) :: error
     integer, intent(in), optional :: threads
-    type(term_list_type), intent(in), optional :: terms
+      !! number of threads, 0 for one that suits; without, the caller's are used
+    type(term_list_type), intent(in), optional :: terms  !! copied; none if absent
     type(load_type), allocatable :: loads(:)
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)

@@ -28,13 +28,16 @@ module pd_motion_explicit_integrators
 contains
 
   !> Move `system` through `steps` steps of `dt` [s] from t = 0, or from where it stands if its
-  !> memory says that it has begun.
+  !> memory says that it has begun. An error is set if the motion is unstable or the observer sets
+  !> one.
   subroutine run_explicit(system, integrator, dt, steps, observer, error)
     type(system_type), intent(inout) :: system
-    character(*), intent(in) :: integrator
-    real(wp), intent(in) :: dt
-    integer, intent(in) :: steps
+      !! ready at t = 0, or as a checkpoint left it; after the last step on return
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
+    real(wp), intent(in) :: dt              !! time step [s]
+    integer, intent(in) :: steps            !! number of the last step
     class(observer_type), intent(inout) :: observer
+      !! called once for each step, the start included, that has not been seen before
     type(error_type), allocatable, intent(out) :: error
     type(start_type) :: start
     type(instant_type) :: instant
@@ -202,7 +205,8 @@ contains
   !> Room for what the integrator carries from step to step.
   subroutine begin_memory(system, integrator)
     type(system_type), intent(inout) :: system
-    character(*), intent(in) :: integrator
+      !! with an empty memory, and room for earlier steps if the rule needs them, on return
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
     integer :: n, d
 
     system%memory = memory_type()

@@ -55,8 +55,9 @@ contains
   !> start vector is random, yet always the same, and so is the result, on any number of threads.
   subroutine largest_frequency(system, accuracy, spectrum, options, model)
     type(system_type), intent(inout) :: system
+      !! its state stays as it is; its force loops keep their room in the family
     real(wp), intent(in) :: accuracy              !! of omega^2, relative
-    type(spectrum_type), intent(out) :: spectrum
+    type(spectrum_type), intent(out) :: spectrum               !! what was found
     type(force_options_type), intent(in), optional :: options  !! of the forces; the model's own by
                                                                !! default
     type(model_type), intent(in), optional :: model            !! the system's by default
@@ -105,6 +106,7 @@ contains
   !> the step, and a lattice keeps the tables of its weights.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
+      !! its state stays as it is; its force loops keep their room in the family
     real(wp), intent(in) :: accuracy               !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum   !! `squared` and `residual` of the bound
     real(wp), parameter :: alike = 1.01_wp         !! one material's largest beta over another's
@@ -204,7 +206,7 @@ contains
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
   !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0.
   pure logical function may_be_unstable(system)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! with its model
     may_be_unstable = system%model%dilatation .and. system%model%surface .and. &
       & any(system%model%materials%a < 0.0_wp .and. &
       & system%model%materials%poissons_ratio < suspicious_ratio)
@@ -216,7 +218,8 @@ contains
   !> lowest eigenvalue may lie further down.
   subroutine lowest_eigenvalue(system, lowest)
     type(system_type), intent(inout) :: system
-    real(wp), intent(out) :: lowest
+      !! its state stays as it is; its force loops keep their room in the family
+    real(wp), intent(out) :: lowest  !! < 0 if the body is unstable, else 0 [-]
     real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :), &
       & undeformed(:, :)
     real(wp), allocatable :: diagonal(:), beside(:)
@@ -251,7 +254,7 @@ contains
 
   !> 2/omega [s], with the residual on the side of caution; huge if nothing vibrates.
   elemental real(wp) function stable_step_of(spectrum) result(step)
-    type(spectrum_type), intent(in) :: spectrum
+    type(spectrum_type), intent(in) :: spectrum  !! as found
     step = huge(step)
     if (spectrum%squared > 0.0_wp) step = 2/sqrt(spectrum%squared + spectrum%residual)
   end function stable_step_of

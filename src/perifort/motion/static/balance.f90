@@ -259,8 +259,9 @@ contains
   !> Twice the stored energy of every piece, or that of its heat alone if that is larger.
   subroutine weigh_energies(system, rigid, balance)
     type(system_type), intent(inout), target :: system
-    type(rigid_type), intent(in) :: rigid
-    type(balance_type), intent(inout) :: balance
+      !! at the state that is weighed; its force loops keep their room in the family
+    type(rigid_type), intent(in) :: rigid         !! its pieces
+    type(balance_type), intent(inout) :: balance  !! gets the energy of every piece
     type(term_view_type) :: view
     real(wp), allocatable :: energy(:)
     integer :: k, p
@@ -335,17 +336,17 @@ contains
   !> Whether the forces of every piece are in balance as weighed; what remains to be known is how
   !> far off its displacements are.
   pure logical function balanced_but_for_error(relaxation, rigid, balance) result(balanced)
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
-    type(balance_type), intent(in) :: balance
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
+    type(rigid_type), intent(in) :: rigid            !! its pieces
+    type(balance_type), intent(in) :: balance        !! as weighed
     balanced = all(piece_balanced(relaxation, rigid%piece%size, balance%piece))
   end function balanced_but_for_error
 
-  !> The error energy (error . stiffness . error) that each piece's displacements may have [J]:
-  !> relative to the strain energy its root is 100 times the tolerance, and at most 1e-3.
+  !> The error energy (error . stiffness . error) that each piece's displacements may have (pieces)
+  !> [J]: relative to the strain energy its root is 100 times the tolerance, and at most 1e-3.
   pure function allowed_error(relaxation, balance) result(allowed)
-    type(relaxation_type), intent(in) :: relaxation
-    type(balance_type), intent(in) :: balance
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
+    type(balance_type), intent(in) :: balance        !! as weighed, with energies
     real(wp), allocatable :: allowed(:)
     allocate (allowed(size(balance%piece)), source= &
       & min(1.0e-3_wp, 100*relaxation%tolerance)**2*balance%piece%energy)
@@ -365,7 +366,7 @@ contains
 
   !> The largest relative residual of all pieces; 0 where nothing but rounding is left.
   pure real(wp) function relative_residual(balance) result(residual)
-    type(balance_type), intent(in) :: balance
+    type(balance_type), intent(in) :: balance  !! as weighed
     residual = maxval(relative_to_scale(balance%piece))
   end function relative_residual
 
@@ -385,9 +386,9 @@ contains
 
   !> The error of a relaxation whose iterations are used up; `balance` is where it stands.
   subroutine fail_unconverged(system, relaxation, rigid, balance, load_step, t, change, error)
-    type(system_type), intent(in) :: system
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system          !! where its iterations ended
+    type(relaxation_type), intent(in) :: relaxation  !! whose iterations are used up
+    type(rigid_type), intent(in) :: rigid            !! its pieces
     type(balance_type), intent(in) :: balance   !! as weighed
     integer, intent(in) :: load_step            !! its number
     real(wp), intent(in) :: t                   !! its time [s]
@@ -412,7 +413,7 @@ contains
 
   !> What to say about an accepted state whose residual is above the tolerance, '' if it is not.
   function rounding_note(relaxation, balance) result(text)
-    type(relaxation_type), intent(in) :: relaxation
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
     type(balance_type), intent(in) :: balance   !! as weighed
     character(:), allocatable :: text
 
@@ -426,9 +427,9 @@ contains
   !> An error if what acts on some piece vanishes in the rounding of its forces: then nothing is
   !> known of its equilibrium.
   subroutine check_drowned(system, relaxation, rigid, balance, error)
-    type(system_type), intent(in) :: system
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system          !! at the accepted state
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
+    type(rigid_type), intent(in) :: rigid            !! its pieces
     type(balance_type), intent(in) :: balance   !! as weighed, of an accepted state
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: text
@@ -481,8 +482,8 @@ contains
 
   !> What is left over in a piece and where, in words.
   function describe_left_over(system, rigid, balance, piece, t) result(text)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system      !! at the state that is weighed
+    type(rigid_type), intent(in) :: rigid        !! its pieces
     type(balance_type), intent(in) :: balance    !! as weighed
     integer, intent(in) :: piece                 !! its number
     real(wp), intent(in) :: t                    !! time of the loads [s]

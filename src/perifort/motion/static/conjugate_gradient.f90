@@ -66,16 +66,19 @@ contains
   !> Bring `system`, at rest under earlier conditions, to rest at `instant%time`; bonds don't break.
   !> If its memory says that it is on the way there, it goes on from where it stands. `trend` is the
   !> change of displacement in the load step before, or of size 0. If `gave_way`, no rest was found,
-  !> and the displacements are the best on the way.
+  !> and the displacements are the best on the way. An error is set if the iterations are used up,
+  !> if rounding hides the equilibrium, or if the observer sets one.
   subroutine relax_by_conjugate_gradient(system, relaxation, rigid, trend, instant, observer, &
     & gave_way, error)
     type(system_type), intent(inout) :: system
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
-    real(wp), intent(in) :: trend(:, :)
+      !! at rest on return; how far it is meanwhile stands in its memory
+    type(relaxation_type), intent(in) :: relaxation  !! tolerance, iterations and the preconditioner
+    type(rigid_type), intent(in) :: rigid            !! its pieces and their free motions
+    real(wp), intent(in) :: trend(:, :)              !! (n_slots, dim), or of 0 rows [m]
     type(instant_type), intent(inout) :: instant
-    class(observer_type), intent(inout) :: observer
-    logical, intent(out) :: gave_way
+      !! time and load step; gets step, iterations and notes
+    class(observer_type), intent(inout) :: observer  !! called once for each iteration
+    logical, intent(out) :: gave_way                 !! dynamic relaxation has to go on
     type(error_type), allocatable, intent(out) :: error
     type(newton_type), allocatable :: newton
     type(balance_type) :: balance

@@ -29,9 +29,10 @@ contains
   !> Room for a system's solves, where there is none yet; `mass` (n_slots, dim) is the
   !> preconditioner [N/m4].
   subroutine make_room(system, mass, krylov)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: mass(:, :)
+    type(system_type), intent(in) :: system  !! whose constrained components are held
+    real(wp), intent(in) :: mass(:, :)       !! (n_slots, dim) [N/m4]
     type(krylov_type), intent(inout) :: krylov
+      !! gets room, and the inverse of `mass`, 0 where held
 
     if (.not. allocated(krylov%residual)) allocate (krylov%residual, krylov%direction, &
       & krylov%origin, source=0.0_wp*mass)
@@ -41,10 +42,11 @@ contains
 
   !> The residual from the system's forces and the loads at `t`, and its sums.
   subroutine take_residual(system, t, krylov, sums)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: t
+    type(system_type), intent(inout) :: system  !! with its forces at the present displacements
+    real(wp), intent(in) :: t             !! time of the loads [s]
     type(krylov_type), intent(inout) :: krylov
-    type(sums_type), intent(out) :: sums
+      !! with the preconditioner; gets the residual, 0 where held
+    type(sums_type), intent(out) :: sums  !! over the residual and the supports; nothing has moved
 
     krylov%residual = system%state%force
     call add_loads(system, t, 1.0_wp, .false., krylov%residual)
@@ -56,8 +58,9 @@ contains
 
   !> Start anew from the residual: the direction is the preconditioned residual.
   subroutine first_direction(system, krylov)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! its volumes and horizon
     type(krylov_type), intent(inout) :: krylov
+      !! with the residual; gets the direction and its scale
     real(wp) :: largest
     integer :: k, c
 
@@ -80,9 +83,10 @@ contains
 
   !> The next direction, conjugate to those before; `rho` belongs to the new residual.
   subroutine next_direction(system, rho, krylov)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: rho
+    type(system_type), intent(in) :: system  !! its volumes and horizon
+    real(wp), intent(in) :: rho  !! residual . preconditioned residual, weighted with volume
     type(krylov_type), intent(inout) :: krylov
+      !! with the new residual and the last direction; gets the next one
     real(wp) :: beta, largest, scaled
     integer :: k, c
 
@@ -145,9 +149,9 @@ contains
 
   !> Take a displacement for the direction; `scale` is 0 if it is none.
   subroutine take_direction(system, displacement, krylov)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: displacement(:, :)
-    type(krylov_type), intent(inout) :: krylov
+    type(system_type), intent(in) :: system     !! its horizon
+    real(wp), intent(in) :: displacement(:, :)  !! (n_slots, dim) [m]
+    type(krylov_type), intent(inout) :: krylov  !! gets the direction, made small, and its scale
     real(wp) :: largest
 
     largest = maxval(abs(displacement))
@@ -174,8 +178,11 @@ contains
   !> there takes the place of the undeformed stiffness.
   subroutine linearise(system, deformed, krylov)
     type(system_type), intent(inout) :: system
+      !! at the displacements of the origin; its force loops keep their room in the family
     logical, intent(in) :: deformed
+      !! the tangent at these displacements, else the undeformed stiffness
     type(krylov_type), intent(inout) :: krylov
+      !! gets the origin and, if `deformed`, the unprojected forces there
 
     krylov%origin = system%state%u
     krylov%deformed = deformed
@@ -203,7 +210,8 @@ contains
   !> Terms of the force resist with the tangents that they give.
   subroutine apply_stiffness(system, krylov)
     type(system_type), intent(inout), target :: system
-    type(krylov_type), intent(inout), target :: krylov
+      !! its state stays as it is; its force loops keep their room in the family
+    type(krylov_type), intent(inout), target :: krylov  !! with the direction; gets the product
     type(tangent_type) :: tangent
     type(term_view_type) :: view
 
@@ -227,10 +235,10 @@ contains
   !> Go `length` along the direction: displacements, the forces that follow linearly, the residual.
   !> The sums are formed in blocks of fixed length.
   subroutine go_along(system, length, krylov, sums)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: length
-    type(krylov_type), intent(inout) :: krylov
-    type(sums_type), intent(out) :: sums
+    type(system_type), intent(inout) :: system  !! its displacements and forces move on
+    real(wp), intent(in) :: length              !! in units of the direction [-]
+    type(krylov_type), intent(inout) :: krylov  !! with direction and product; its residual moves on
+    type(sums_type), intent(out) :: sums        !! after the step
     type(sums_type), allocatable :: part(:)
     integer :: block, blocks, c, first, last
 
@@ -307,8 +315,8 @@ contains
 
   !> Sum of V a b over all components, in blocks of fixed length.
   function volume_inner(system, a, b) result(sum_of_all)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in), contiguous :: a(:, :), b(:, :)
+    type(system_type), intent(in) :: system               !! its volumes
+    real(wp), intent(in), contiguous :: a(:, :), b(:, :)  !! (n_slots, dim) fields
     real(wp) :: sum_of_all
     real(wp), allocatable :: part(:)
     integer :: block, blocks, first, last, c

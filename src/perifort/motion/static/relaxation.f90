@@ -56,11 +56,14 @@ module pd_motion_static_relaxation
 contains
 
   !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if
-  !> its memory says that it has begun, it goes on from there.
+  !> its memory says that it has begun, it goes on from there. An error is set if there is no
+  !> equilibrium, if it is not found, or if the observer sets one.
   subroutine run_relaxation(system, relaxation, observer, error)
     type(system_type), intent(inout) :: system
-    type(relaxation_type), intent(in) :: relaxation
+      !! ready, or as a checkpoint left it; settled at the last load step on return
+    type(relaxation_type), intent(in) :: relaxation  !! solver, load steps, tolerance and mass
     class(observer_type), intent(inout) :: observer
+      !! called once for each iteration and settled load step
     type(error_type), allocatable, intent(out) :: error
     type(instant_type) :: instant
     type(rigid_type) :: rigid
@@ -226,7 +229,8 @@ contains
   !> Fill a system's memory with all that a relaxation may ever carry, whose size is then known.
   subroutine fill_memory(system, relaxation)
     type(system_type), intent(inout) :: system
-    type(relaxation_type), intent(in) :: relaxation
+      !! with a memory of the largest size, without contents, on return
+    type(relaxation_type), intent(in) :: relaxation  !! solver and number of load steps
 
     system%memory = memory_type()
     if (.not. relaxation%conjugate_gradient) then

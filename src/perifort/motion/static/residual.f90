@@ -18,10 +18,10 @@ module pd_motion_static_residual
 
 contains
 
-  !> (V F).(V F) over the free components of a force density.
+  !> (V F).(V F) over the free components of a force density [N2].
   pure real(wp) function squared_force(system, density) result(squared)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: density(:, :)
+    type(system_type), intent(in) :: system  !! its volumes and constrained components
+    real(wp), intent(in) :: density(:, :)    !! (n_slots, dim) force density [N/m3]
     integer :: c
     squared = 0.0_wp
     do c = 1, size(density, 2)

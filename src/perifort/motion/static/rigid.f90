@@ -39,8 +39,8 @@ contains
   !> The pieces that intact bonds join now, and which rigid motions of each neither a constraint
   !> nor a term of the force resists, while the other pieces stay where they are.
   subroutine find_free_motions(system, rigid)
-    type(system_type), intent(in), target :: system
-    type(rigid_type), intent(out) :: rigid
+    type(system_type), intent(in), target :: system  !! with its bonds as they are now
+    type(rigid_type), intent(out) :: rigid           !! pieces and free motions
     type(load_type), pointer :: load
     real(wp), allocatable :: resistance(:, :, :)
     integer :: p, l, i
@@ -203,10 +203,10 @@ contains
   !> An error unless the loads at time `t` leave the free motions of every piece alone. `status` is
   !> that of the error.
   subroutine check_balance(system, rigid, t, status, error)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    real(wp), intent(in) :: t
-    integer, intent(in) :: status
+    type(system_type), intent(in) :: system  !! its loads
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
+    real(wp), intent(in) :: t                !! time of the loads [s]
+    integer, intent(in) :: status            !! exit status of the error
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: loads(:, :)
     real(wp) :: work(6), applied, mode(6), share(6)
@@ -272,9 +272,10 @@ contains
   !> Take the free rigid motions of every piece out of a field (n_slots, dim), by linear modes about
   !> the undeformed body.
   subroutine remove_free_motions(system, rigid, field)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system  !! its positions, volumes and constrained components
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
     real(wp), intent(inout) :: field(:, :)
+      !! (n_slots, dim) constrained components stay as they are
     real(wp) :: mode(6)
     integer :: p, i, k, c
 
@@ -320,10 +321,10 @@ contains
   !> were in the least squares of volume). Of a piece that is held in part, and of all pieces
   !> without `turning`, a free translation is taken back, and a free rotation left as it is.
   subroutine turn_back(system, rigid, turning, u)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    logical, intent(in) :: turning
-    real(wp), intent(inout) :: u(:, :)
+    type(system_type), intent(in) :: system  !! its positions, volumes and constrained components
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
+    logical, intent(in) :: turning           !! pieces without any constraint are turned back
+    real(wp), intent(inout) :: u(:, :)       !! (n_slots, dim) displacements [m]
     real(wp) :: mode(6), amount(6), largest
     integer :: p, turn, i, c
 
@@ -399,11 +400,14 @@ contains
   !> iterations on the finite motion, to the last digit of what is left of the displacements.
   !> Motions that no weighted component sees are left alone.
   subroutine fit_rigid_motion(system, rigid, p, target, weight, u)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    integer, intent(in) :: p
-    real(wp), intent(in) :: target(:, :), weight(:, :)
+    type(system_type), intent(in) :: system  !! its positions and volumes
+    type(rigid_type), intent(in) :: rigid    !! its pieces
+    integer, intent(in) :: p                 !! number of the piece
+    real(wp), intent(in) :: target(:, :)     !! (n_slots, dim) displacements to come near to [m]
+    real(wp), intent(in) :: weight(:, :)
+      !! (n_slots, dim) of each component, 0 for those that do not count
     real(wp), intent(inout) :: u(:, :)
+      !! (n_slots, dim) displacements; those of the piece change [m]
     real(wp) :: matrix(6, 6), vectors(6, 6), values(6), side(6), mode(6), part(6), centre(3)
     integer :: turn, n, k, c, i
 

@@ -31,10 +31,10 @@ contains
   !> as a rigid body that is where they carry it. `trend`, the change of displacement that is to be
   !> tried next (n_slots, dim, or of size 0), loses what is done here.
   subroutine move_along(system, rigid, t, trend)
-    type(system_type), intent(inout) :: system
-    type(rigid_type), intent(in) :: rigid
-    real(wp), intent(in) :: t
-    real(wp), intent(inout) :: trend(:, :)
+    type(system_type), intent(inout) :: system  !! its displacements change
+    type(rigid_type), intent(in) :: rigid       !! as `find_free_motions` found it
+    real(wp), intent(in) :: t                   !! at which the load step ends [s]
+    real(wp), intent(inout) :: trend(:, :)      !! (n_slots, dim), or of 0 rows [m]
     real(wp), allocatable :: imposed(:, :), rate(:, :), moved(:, :), weight(:, :), goal(:, :)
     logical, allocatable :: acted(:)
     real(wp) :: before, after
@@ -143,9 +143,9 @@ contains
   !> What to say about pieces that nothing holds, '' if there is nothing: `parts` was the number of
   !> pieces before bonds broke.
   function loose_text(system, rigid, parts) result(text)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    integer, intent(in) :: parts
+    type(system_type), intent(in) :: system  !! for numbers of points
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
+    integer, intent(in) :: parts             !! number of pieces before
     character(:), allocatable :: text
     integer :: p, loose, points, first
 

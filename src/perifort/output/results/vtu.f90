@@ -397,7 +397,7 @@ contains
         safe = safe//'&lt;'
       case ('"')
         safe = safe//'&quot;'
-      case default
+      case default  ! any other character stands for itself
         safe = safe//text(i:i)
       end select
     end do

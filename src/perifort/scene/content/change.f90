@@ -31,9 +31,10 @@ module pd_scene_content_change
 contains
 
   !> The text of a scene that has been read before, scanned again, with what `--set` changes in it.
+  !> An error is set if the text cannot be scanned or a change is wrong.
   subroutine scan_scene(scene, source, error)
     type(scene_type), intent(in) :: scene          !! with its text
-    type(source_type), intent(out) :: source
+    type(source_type), intent(out) :: source       !! the scanned text with the changes in it
     type(error_type), allocatable, intent(out) :: error
     type(group_table) :: table
 
@@ -47,6 +48,7 @@ contains
   !> change has its place on the command line.
   subroutine apply_changes(source, changes, error, table)
     type(source_type), intent(inout) :: source
+      !! scanned; with the new values, and the options as lines of its text, on return
     type(line_type), intent(in) :: changes(:)         !! `group%key=value`, a change each
     type(error_type), allocatable, intent(out) :: error
     type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
@@ -147,12 +149,13 @@ contains
 
   !> The key that `name` means: `group%key`, `group.key`, or `key` alone where only one group has
   !> such a key; a group that is repeated needs its number, `group(2)%key`; `key(2)` is an element.
-  !> `place` is where the name stands, for messages.
+  !> `place` is where the name stands, for messages. An error is set if no key or several keys are
+  !> meant, or if the scene has no such group.
   subroutine find_target(source, name, place, target, error, table, setting)
-    type(source_type), intent(in) :: source
-    character(*), intent(in) :: name
-    type(token_type), intent(in) :: place
-    type(target_type), intent(out) :: target
+    type(source_type), intent(in) :: source           !! the scanned scene
+    character(*), intent(in) :: name  !! of the key, in any case, with or without blanks
+    type(token_type), intent(in) :: place             !! where the name stands
+    type(target_type), intent(out) :: target  !! the key with its group, number, subscript and kind
     type(error_type), allocatable, intent(out) :: error
     type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
     logical, intent(in), optional :: setting          !! for `--set`; without, for `&study`
@@ -260,8 +263,8 @@ contains
 
   !> The name in full, `group(2)%key(1)`; the number only where the scene has several such groups.
   function full_name(source, target) result(name)
-    type(source_type), intent(in) :: source
-    type(target_type), intent(in) :: target
+    type(source_type), intent(in) :: source  !! the scanned scene
+    type(target_type), intent(in) :: target  !! as `find_target` found it
     character(:), allocatable :: name
 
     name = target%group
@@ -271,12 +274,12 @@ contains
   end function full_name
 
   !> Give the key the value that `word` says: one value as it is written, or several parted by
-  !> commas. `place` is where it stands.
+  !> commas. `place` is where it stands. An error is set if the key has no such element.
   subroutine change_key(source, target, word, place, error)
-    type(source_type), intent(inout) :: source
-    type(target_type), intent(in) :: target
-    character(*), intent(in) :: word
-    type(token_type), intent(in) :: place
+    type(source_type), intent(inout) :: source  !! scanned; with the new value on return
+    type(target_type), intent(in) :: target     !! as `find_target` found it
+    character(*), intent(in) :: word            !! the value, as in a scene file
+    type(token_type), intent(in) :: place       !! gets the blame for what is wrong with the value
     type(error_type), allocatable, intent(out) :: error
     type(token_type), allocatable :: tokens(:)
 
@@ -307,9 +310,9 @@ contains
 
   !> The tokens of a word as it is written: a text in quotes, or values parted by commas.
   subroutine words_of(word, place, tokens)
-    character(*), intent(in) :: word
-    type(token_type), intent(in) :: place
-    type(token_type), allocatable, intent(out) :: tokens(:)
+    character(*), intent(in) :: word                         !! the value, as in a scene file
+    type(token_type), intent(in) :: place                    !! given to all tokens
+    type(token_type), allocatable, intent(out) :: tokens(:)  !! (values) each without quotes
     character(:), allocatable :: rest
     integer :: number, i, comma
 

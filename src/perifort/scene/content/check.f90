@@ -20,11 +20,12 @@ contains
   !> Check a scene and complete it: afterwards every list is allocated, every body has its
   !> material, Poisson's ratios, ramps, the factor of relaxation and the lists of fields are the
   !> ones to compute with. `source` gives the messages their places. A complete scene stays as it
-  !> is.
+  !> is. An error is set at the first broken rule.
   subroutine check_scene(scene, error, source)
-    type(scene_type), intent(inout) :: scene
+    type(scene_type), intent(inout) :: scene           !! as read or built; complete on return
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
+      !! the scanned file; without, messages name group and key only
     integer :: i
 
     call allocate_groups(scene)
@@ -82,6 +83,7 @@ contains
   !> Lists that nobody has filled get size 0, so that loops need no question.
   subroutine allocate_groups(scene)
     type(scene_type), intent(inout) :: scene
+      !! every list of groups, the text and the name of the file are allocated on return
     type(group_table) :: table
 
     if (.not. allocated(scene%file)) scene%file = ''

@@ -63,7 +63,7 @@ contains
   !> Whether rows of the history, where the user says nothing, are so few that they take little
   !> time. Their number follows from the steps, which only the plan of a run knows.
   pure logical function rows_by_cost(scene)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene  !! checked, with its version of the defaults
     rows_by_cost = .not. before_0_2(scene)
   end function rows_by_cost
 

@@ -23,7 +23,7 @@ contains
 
   !> The table of the program's own groups.
   subroutine list_groups(table)
-    type(group_table), intent(out) :: table
+    type(group_table), intent(out) :: table  !! all groups, in the order of the reference
     logical, parameter :: once = .false., repeated = .true.
 
     call table%add('scene', 'The problem as a whole: its title, its dimension and what that '// &
@@ -64,8 +64,8 @@ contains
 
   !> The table of a scene's groups: its own, or the program's.
   subroutine table_of(scene, table)
-    type(scene_type), intent(in) :: scene
-    type(group_table), intent(out) :: table
+    type(scene_type), intent(in) :: scene    !! with or without a table of its own
+    type(group_table), intent(out) :: table  !! a copy
 
     if (allocated(scene%table)) then
       table = scene%table

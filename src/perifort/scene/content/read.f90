@@ -15,10 +15,11 @@ module pd_scene_content_read
 
 contains
 
-  !> Read the scene file at `path`. On an error `scene` is not fit for use.
+  !> Read the scene file at `path`. On an error `scene` is not fit for use. An error is set if the
+  !> file cannot be read, or if the scene or a change breaks a rule.
   subroutine read_scene(path, scene, error, changes, table)
-    character(*), intent(in) :: path
-    type(scene_type), intent(out) :: scene
+    character(*), intent(in) :: path  !! of the file; paths in it are relative to its folder
+    type(scene_type), intent(out) :: scene               !! checked and complete, with its text
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(group_table), intent(in), optional :: table     !! of the groups that it may have
@@ -29,11 +30,12 @@ contains
     call read_scene_text(text, path, scene, error, changes, table)
   end subroutine read_scene
 
-  !> Read a scene from its text; `name` stands for the file in messages and for relative paths.
+  !> Read a scene from its text; `name` stands for the file in messages and for relative paths. An
+  !> error is set if the scene or a change breaks a rule.
   subroutine read_scene_text(text, name, scene, error, changes, table)
-    character(*), intent(in) :: text
-    character(*), intent(in) :: name
-    type(scene_type), intent(out) :: scene
+    character(*), intent(in) :: text                     !! of a scene file
+    character(*), intent(in) :: name                     !! path of the file; there need be none
+    type(scene_type), intent(out) :: scene               !! checked and complete, with its text
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(group_table), intent(in), optional :: table     !! of the groups that it may have
@@ -48,10 +50,11 @@ contains
     if (present(changes)) scene%changes = changes
   end subroutine read_scene_text
 
-  !> Read a scene from a scanned file; its text is left empty.
+  !> Read a scene from a scanned file; its text is left empty. An error is set if the scene breaks a
+  !> rule.
   subroutine read_scene_source(source, scene, error, table)
-    type(source_type), intent(in), target :: source
-    type(scene_type), intent(out) :: scene
+    type(source_type), intent(in), target :: source      !! scanned, with all changes in it
+    type(scene_type), intent(out) :: scene               !! checked and complete, without its text
     type(error_type), allocatable, intent(out) :: error
     type(group_table), intent(in), optional :: table     !! of the groups that it may have
     type(group_table) :: known

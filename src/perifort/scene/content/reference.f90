@@ -18,8 +18,8 @@ contains
   !> Write the reference of one group, or of all with a heading if `group` is ''. The group may be
   !> given with or without `&`. An error if there is no such group.
   subroutine write_reference(unit, group, error, fields, table)
-    integer, intent(in) :: unit
-    character(*), intent(in) :: group
+    integer, intent(in) :: unit                       !! open for formatted writing
+    character(*), intent(in) :: group                 !! its name in any case, or ''
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in), optional :: fields(:)   !! names of the fields of the output
     type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own

@@ -21,11 +21,15 @@ contains
   !> the key is not given or ''. With `value`, at that value of the key.
   subroutine rule_fault(error, group, number, key, message, note, source, value)
     type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key, message, note
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
+    character(*), intent(in) :: key                    !! name of the key, or ''
+    character(*), intent(in) :: message                !! what is wrong
+    character(*), intent(in) :: note                   !! what was expected instead; '' for none
     type(source_type), intent(in), optional :: source
+      !! the scanned file; without, the message names group, number and key
     character(*), intent(in), optional :: value
+      !! the word that is wrong; without it, or if it is not there, the key is the place
     character(:), allocatable :: text
     integer :: section, entry, token
 
@@ -67,10 +71,14 @@ contains
   subroutine scene_fault(error, scene, group, number, key, message, note, value)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key, message, note
+      !! whose text gives the place; built in memory it gives none
+    character(*), intent(in) :: group            !! name of the group, without `&`
+    integer, intent(in) :: number                !! which group of this name, from 1
+    character(*), intent(in) :: key              !! name of the key, or ''
+    character(*), intent(in) :: message          !! what is wrong
+    character(*), intent(in) :: note             !! what was expected instead; '' for none
     character(*), intent(in), optional :: value
+      !! the word that is wrong; without it, or if it is not there, the key is the place
     type(source_type) :: source
     type(error_type), allocatable :: ignored
 
@@ -90,10 +98,10 @@ contains
   !> blames, or of the one named here. One that has a place keeps it.
   subroutine place_fault(error, scene, group, number, key)
     type(error_type), allocatable, intent(inout) :: error
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
+    type(scene_type), intent(in) :: scene  !! whose text gives the place
+    character(*), intent(in) :: group      !! to blame if the error names none
+    integer, intent(in) :: number          !! which group of this name, from 1
+    character(*), intent(in) :: key        !! of that group, or ''
     type(error_type), allocatable :: placed
 
     if (.not. allocated(error)) return
@@ -125,13 +133,14 @@ contains
 
   !> A name must be one of `names`; blank ones among these do not count.
   subroutine check_known(name, names, kind, group, number, key, error, source)
-    character(*), intent(in) :: name
-    character(*), intent(in) :: names(:)
-    character(*), intent(in) :: kind, group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
+    character(*), intent(in) :: name                   !! to be found; a blank one is right
+    character(*), intent(in) :: names(:)               !! (any number) the known ones
+    character(*), intent(in) :: kind                   !! what they are names of, for the message
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
+    character(*), intent(in) :: key                    !! that has the name as its value
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(name_length), allocatable :: known(:)
     character(:), allocatable :: note, nearest
 
@@ -151,10 +160,10 @@ contains
 
   !> Names must differ; blank ones do not count.
   subroutine check_unique(names, group, error, source)
-    character(*), intent(in) :: names(:)
-    character(*), intent(in) :: group
+    character(*), intent(in) :: names(:)               !! (groups) of all groups of a kind
+    character(*), intent(in) :: group                  !! the kind, without `&`
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: i
 
     do i = 2, size(names)
@@ -167,12 +176,13 @@ contains
 
   !> Keys `<key>_x`.. of directions that the dimension does not have must not be given.
   subroutine check_components(value, dimension, key, group, number, error, source)
-    real(wp), intent(in) :: value(3)
-    integer, intent(in) :: dimension
-    character(*), intent(in) :: key, group
-    integer, intent(in) :: number
+    real(wp), intent(in) :: value(3)  !! of <key>_x, <key>_y and <key>_z, `unset` where not given
+    integer, intent(in) :: dimension                   !! of the scene
+    character(*), intent(in) :: key                    !! name of the three keys, without _x
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
     integer :: i
 
@@ -185,14 +195,16 @@ contains
     end do
   end subroutine check_components
 
-  !> A position or direction: all components of the dimension given, none other but zeros.
+  !> A position or direction: all components of the dimension given, none other but zeros. Else, and
+  !> if the key is not given at all, an error is set.
   subroutine check_vector(value, dimension, key, group, number, error, source)
-    real(wp), intent(in) :: value(3)
-    integer, intent(in) :: dimension
-    character(*), intent(in) :: key, group
-    integer, intent(in) :: number
+    real(wp), intent(in) :: value(3)                   !! the vector, `unset` where not given
+    integer, intent(in) :: dimension                   !! of the scene
+    character(*), intent(in) :: key                    !! name of the key
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: i
 
     if (.not. any(is_set(value))) then
@@ -214,11 +226,11 @@ contains
 
   !> Where both corners bound a direction, the lower one must be below the upper.
   subroutine check_finite_box(lower, upper, group, number, error, source)
-    real(wp), intent(in) :: lower(:), upper(:)
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
+    real(wp), intent(in) :: lower(:), upper(:)  !! (up to 3) corners, `unset` where unbounded [m]
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
     integer :: i
 

@@ -21,8 +21,8 @@ contains
 
   !> Write the template `name`, the first one if it is ''. An error if there is no such template.
   subroutine write_template(unit, name, error, fields)
-    integer, intent(in) :: unit
-    character(*), intent(in) :: name
+    integer, intent(in) :: unit                      !! open for formatted writing
+    character(*), intent(in) :: name                 !! one of `template_names`, or ''
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
@@ -34,8 +34,8 @@ contains
 
   !> The text of the template `name`, as `write_template` prints it.
   subroutine template_text(name, text, error, fields)
-    character(*), intent(in) :: name
-    character(:), allocatable, intent(out) :: text
+    character(*), intent(in) :: name                 !! one of `template_names`, or ''
+    character(:), allocatable, intent(out) :: text   !! a scene file; '' on an error
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     type(scene_type) :: scene

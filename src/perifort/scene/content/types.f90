@@ -94,8 +94,8 @@ module pd_scene_content_types
     subroutine group_interface(scene, group)
       import :: group_type, scene_type
       implicit none (type, external)
-      type(scene_type), intent(inout), target :: scene
-      class(group_type), pointer, intent(out) :: group
+      type(scene_type), intent(inout), target :: scene  !! the scene
+      class(group_type), pointer, intent(out) :: group  !! its group, not a copy
     end subroutine group_interface
 
     !> Where a scene has all groups of a kind, of size 0 if nobody has filled them. With `room` they
@@ -104,8 +104,10 @@ module pd_scene_content_types
       import :: group_type, scene_type
       implicit none (type, external)
       type(scene_type), intent(inout), target :: scene
-      class(group_type), pointer, intent(out) :: groups(:)
+        !! whose list is allocated on return, and new with `room`
+      class(group_type), pointer, intent(out) :: groups(:)  !! (any number) its groups, not copies
       integer, intent(in), optional :: room
+        !! number of new groups; without, the groups stay as they are
     end subroutine groups_interface
   end interface
 
@@ -113,7 +115,7 @@ contains
 
   !> Add a group. Without `one` or `all` the scene holds it among `added`.
   subroutine add(table, name, purpose, repeatable, fresh, one, all)
-    class(group_table), intent(inout) :: table
+    class(group_table), intent(inout) :: table  !! with one more line at its end on return
     character(*), intent(in) :: name        !! as in the file, lower case, without `&`
     character(*), intent(in) :: purpose     !! what it is for, in one or two sentences
     logical, intent(in) :: repeatable       !! may be given more than once
@@ -146,7 +148,7 @@ contains
 
   !> The names of all groups, in the order of the table.
   pure function names(table)
-    class(group_table), intent(in) :: table
+    class(group_table), intent(in) :: table  !! the table
     character(name_length) :: names(table%count)
 
     names(:) = table%entries(:table%count)%name
@@ -154,8 +156,8 @@ contains
 
   !> The line of a group in the table, 0 if there is no such group.
   pure integer function place_of(table, name) result(place)
-    class(group_table), intent(in) :: table
-    character(*), intent(in) :: name
+    class(group_table), intent(in) :: table  !! the table
+    character(*), intent(in) :: name         !! as in the file, lower case, without `&`
 
     do place = table%count, 1, -1
       if (table%entries(place)%name == name) return
@@ -165,8 +167,9 @@ contains
   !> Let `keys` know all keys of a group with their defaults.
   subroutine describe(table, name, keys)
     class(group_table), intent(in) :: table
-    character(*), intent(in) :: name
-    type(keys_type), intent(inout) :: keys
+      !! with this group; another name is a fault of the program
+    character(*), intent(in) :: name         !! as in the file, lower case, without `&`
+    type(keys_type), intent(inout) :: keys   !! started anew; describes the group on return
     class(group_type), allocatable :: fresh
 
     if (table%place_of(name) == 0) call internal_fault('there is no group '//name)
@@ -178,9 +181,10 @@ contains
 
   !> How many groups of line `place` a scene has.
   integer function number_in(table, scene, place) result(number)
-    class(group_table), intent(in) :: table
+    class(group_table), intent(in) :: table           !! of the scene's groups
     type(scene_type), intent(inout), target :: scene
-    integer, intent(in) :: place
+      !! whose list is allocated, if empty, on return
+    integer, intent(in) :: place                      !! line of the table
     class(group_type), pointer :: groups(:)
 
     associate (entry => table%entries(place))
@@ -197,10 +201,12 @@ contains
 
   !> Give a scene so many new groups of line `place`.
   subroutine make_room(table, scene, place, number)
-    class(group_table), intent(in) :: table
+    class(group_table), intent(in) :: table           !! of the scene's groups
     type(scene_type), intent(inout), target :: scene
-    integer, intent(in) :: place
+      !! with new groups of this line, at their defaults, on return; those before are lost
+    integer, intent(in) :: place                      !! line of the table
     integer, intent(in) :: number
+      !! of new groups; counts only where the group may be repeated or is among `added`
     class(group_type), pointer :: groups(:)
     type(added_type), allocatable :: added(:)
     integer :: i, kept
@@ -230,8 +236,8 @@ contains
 
   !> Give a scene an empty list where it has none, so that loops need no question.
   subroutine complete(table, scene)
-    class(group_table), intent(in) :: table
-    type(scene_type), intent(inout), target :: scene
+    class(group_table), intent(in) :: table           !! of the scene's groups
+    type(scene_type), intent(inout), target :: scene  !! with all lists allocated on return
     class(group_type), pointer :: groups(:)
     integer :: g
 
@@ -243,11 +249,12 @@ contains
 
   !> Show the keys of a scene's `number`-th group of line `place` to a visitor.
   subroutine visit(table, scene, place, number, keys)
-    class(group_table), intent(in) :: table
-    type(scene_type), intent(inout), target :: scene
-    integer, intent(in) :: place
-    integer, intent(in) :: number
+    class(group_table), intent(in) :: table           !! of the scene's groups
+    type(scene_type), intent(inout), target :: scene  !! whose group the visitor may read or set
+    integer, intent(in) :: place                      !! line of the table
+    integer, intent(in) :: number                     !! which group of this line, from 1
     type(keys_type), intent(inout) :: keys
+      !! the visitor, started for reading, writing or describing
     class(group_type), pointer :: group, groups(:)
     integer :: i, found
 

@@ -19,9 +19,9 @@ contains
   !> Add the warnings about a checked scene to `warnings`. Keys are looked for in its text; a scene
   !> built in memory has none.
   subroutine warnings_of_scene(scene, edges, warnings)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene           !! checked
     real(wp), intent(in) :: edges(:)   !! of the box around all bodies (dim) [m]
-    type(warnings_type), intent(inout) :: warnings
+    type(warnings_type), intent(inout) :: warnings  !! added to
     type(source_type) :: source
     type(error_type), allocatable :: ignored
     integer :: i, b

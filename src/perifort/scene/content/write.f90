@@ -17,7 +17,7 @@ contains
   !> The resolved scene as text; keys without a value are left out. Lists that are not allocated
   !> count as empty.
   function scene_text(scene) result(text)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene  !! lists that are not allocated count as empty
     character(:), allocatable :: text
     text = all_groups(scene, commented=.false.)
   end function scene_text
@@ -26,6 +26,7 @@ contains
   !> behind a `!`.
   function commented_text(scene, fields) result(text)
     type(scene_type), intent(in) :: scene
+      !! the template; lists that are not allocated count as empty
     character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
     text = all_groups(scene, commented=.true., fields=fields)

@@ -9,10 +9,11 @@ contains
 
   !> Whether the file gives this key; false for a scene built in memory.
   pure logical function given(group, number, key, source)
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
+    character(*), intent(in) :: group  !! name of the group, without `&`
+    integer, intent(in) :: number      !! which group of this name, from 1
+    character(*), intent(in) :: key    !! name of the key
     type(source_type), intent(in), optional :: source
+      !! the scanned file; absent if the scene was built in memory
     integer :: section
 
     given = .false.
@@ -23,9 +24,9 @@ contains
 
   !> The place of the `number`-th group of a name, 0 if there is none.
   pure integer function find_section(source, group, number) result(section)
-    type(source_type), intent(in) :: source
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
+    type(source_type), intent(in) :: source  !! the scanned file
+    character(*), intent(in) :: group        !! name of the group, without `&`
+    integer, intent(in) :: number            !! which group of this name, from 1
     integer :: i, found
 
     section = 0
@@ -37,11 +38,12 @@ contains
     end do
   end function find_section
 
-  !> The place of a key in a group, 0 if it is not given.
+  !> The place of a key in a group, 0 if it is not given. Of a key that is given element by element
+  !> it is the first entry.
   pure integer function find_entry(source, section, key) result(entry)
-    type(source_type), intent(in) :: source
-    integer, intent(in) :: section
-    character(*), intent(in) :: key
+    type(source_type), intent(in) :: source  !! the scanned file
+    integer, intent(in) :: section           !! place of the group
+    character(*), intent(in) :: key          !! name of the key
     integer :: i
 
     entry = 0

@@ -79,8 +79,9 @@ contains
 
   !> Let descriptions list the fields of the output, which the scene does not know by itself.
   pure subroutine describe_fields(keys, names)
-    class(keys_type), intent(inout) :: keys
+    class(keys_type), intent(inout) :: keys  !! the visitor, with these names on return
     character(*), intent(in), optional :: names(:)
+      !! (any number) of the fields of the output; without, descriptions list none
 
     if (.not. present(names)) return
     allocate (keys%fields(size(names)))
@@ -89,7 +90,7 @@ contains
 
   !> Names of the fields of the output, none if they are not known.
   pure function field_names(keys) result(names)
-    class(keys_type), intent(in) :: keys
+    class(keys_type), intent(in) :: keys  !! the visitor
     character(name_length), allocatable :: names(:)
 
     allocate (names(0))
@@ -415,13 +416,15 @@ contains
   !> Names, as many as are given, kept in lower case. `known` is what descriptions list; whether a
   !> name is known is checked where the whole list is.
   subroutine text_list(keys, name, value, meaning, known, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
+    class(keys_type), intent(inout) :: keys  !! the visitor
+    character(*), intent(in) :: name         !! of the key
     ! allow(C072): a text is assigned only after its length has been checked.
     character(*), allocatable, intent(inout) :: value(:)
-    character(*), intent(in) :: meaning
-    character(*), intent(in) :: known(:)
+      !! (any number); in reading made anew if the file gives the key
+    character(*), intent(in) :: meaning      !! what it is, for the reference
+    character(*), intent(in) :: known(:)     !! (any number) names that descriptions list
     character(*), intent(in), optional :: default
+      !! what descriptions show for it; the value if absent
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, listed, message, note
     integer :: i

@@ -394,7 +394,7 @@ contains
 
   !> Add a line that stands on the command line instead of the file; `line` is its number.
   subroutine add_option(source, text, line)
-    type(source_type), intent(inout) :: source
+    type(source_type), intent(inout) :: source  !! with the line behind those of the file on return
     character(*), intent(in) :: text      !! the option as it is typed, without the shell's quotes
     integer, intent(out) :: line          !! its number, for places
     type(line_type), allocatable :: longer(:)

@@ -129,7 +129,7 @@ contains
       value = .true.
     case ('.false.', 'false', 'f', '.f.')
       value = .false.
-    case default
+    case default  ! neither: the note says so to the caller
       note = 'expected .true. or .false.'
     end select
   end subroutine parse_logical

@@ -25,8 +25,8 @@ module pd_scene_groups_group
     subroutine visit_interface(group, keys)
       import :: group_type, keys_type
       implicit none (type, external)
-      class(group_type), intent(inout) :: group
-      type(keys_type), intent(inout) :: keys
+      class(group_type), intent(inout) :: group  !! its components are read or shown
+      type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
     end subroutine visit_interface
   end interface
 

@@ -31,8 +31,8 @@ contains
 
   !> The keys of the group.
   subroutine visit(group, keys)
-    class(header_type), intent(inout) :: group
-    type(keys_type), intent(inout) :: keys
+    class(header_type), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
 
     call keys%key('title', group%title, 'what the scene shows')
     call keys%key('dimension', group%dimension, '', 'number of directions', required=.true., &
@@ -50,7 +50,7 @@ contains
 
   !> The title says nothing of the problem; what `defaults` sets is compared key by key.
   pure integer function change_of(key) result(change)
-    character(*), intent(in) :: key
+    character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     change = change_refused
     if (key == 'title' .or. key == 'defaults') change = change_harmless

@@ -28,8 +28,8 @@ contains
 
   !> The keys of the group.
   subroutine visit(group, keys)
-    class(material_group), intent(inout) :: group
-    type(keys_type), intent(inout) :: keys
+    class(material_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys         !! visitor: reads, describes or writes
 
     call keys%key('name', group%name, 'name of the material', word=.true.)
     call keys%key('model', group%model, 'law of the bonds; bond_based holds for one '// &

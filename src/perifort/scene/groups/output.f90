@@ -31,8 +31,8 @@ contains
 
   !> The keys of the group.
   subroutine visit(group, keys)
-    class(output_group), intent(inout) :: group
-    type(keys_type), intent(inout) :: keys
+    class(output_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys       !! visitor: reads, describes or writes
 
     call keys%key('every', group%every, '', 'steps (relaxation: load steps) between outputs', &
       & at_least=1, default='a tenth of the steps; relaxation: 1', hidden=group%every == 0)
@@ -58,7 +58,7 @@ contains
 
   !> When something is written may change at any time, what is written only with other files.
   pure integer function change_of(key) result(change)
-    character(*), intent(in) :: key
+    character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     change = change_harmless
     if (any(key == [character(9) :: 'fields', 'precision', 'format'])) change = change_of_the_files

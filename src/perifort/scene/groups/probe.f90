@@ -25,8 +25,8 @@ contains
 
   !> The keys of the group.
   subroutine visit(group, keys)
-    class(probe_group), intent(inout) :: group
-    type(keys_type), intent(inout) :: keys
+    class(probe_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
 
     call keys%key('name', group%name, 'start of its column names', required=.true., word=.true.)
     call keys%key('point', group%point, 'm', 'position; the nearest point is taken', &
@@ -37,7 +37,7 @@ contains
 
   !> Probes are columns of the history.
   pure integer function change_of(key) result(change)
-    character(*), intent(in) :: key
+    character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     associate (unused_key => key)
     end associate

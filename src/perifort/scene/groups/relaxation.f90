@@ -25,8 +25,8 @@ contains
 
   !> The keys of the group.
   subroutine visit(group, keys)
-    class(relaxation_group), intent(inout) :: group
-    type(keys_type), intent(inout) :: keys
+    class(relaxation_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys           !! visitor: reads, describes or writes
 
     call keys%key('solver', group%solver, 'conjugate_gradient: Newton''s method with conjugate '// &
       & 'gradients; dynamic_relaxation: adaptive, as in the book', &
@@ -46,7 +46,7 @@ contains
 
   !> More iterations are the same iterations.
   pure integer function change_of(key) result(change)
-    character(*), intent(in) :: key
+    character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     change = change_refused
     if (key == 'maximum_iterations') change = change_harmless

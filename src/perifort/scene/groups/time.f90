@@ -27,8 +27,8 @@ contains
 
   !> The keys of the group.
   subroutine visit(group, keys)
-    class(time_group), intent(inout) :: group
-    type(keys_type), intent(inout) :: keys
+    class(time_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
 
     call keys%key('method', group%method, 'explicit steps in time, or relaxation to '// &
       & 'static equilibrium', allowed=[character(10) :: 'explicit', 'relaxation'])
@@ -52,7 +52,7 @@ contains
 
   !> A run may become longer or shorter.
   pure integer function change_of(key) result(change)
-    character(*), intent(in) :: key
+    character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     change = change_refused
     if (key == 'steps' .or. key == 'duration') change = change_of_the_end

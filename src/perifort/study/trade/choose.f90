@@ -40,9 +40,10 @@ contains
   !> The whole command. `target`: the error to be met; `limit`: the longest a run may take [s], 0
   !> for any. An error with the status of bad input if the target is missed.
   subroutine run_choose(path, options, target, limit, error, changes)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
-    real(wp), intent(in) :: target, limit
+    character(*), intent(in) :: path                     !! of the scene file
+    type(run_options_type), intent(in) :: options        !! of the command line
+    real(wp), intent(in) :: target  !! error to be met, in the norm of the study
+    real(wp), intent(in) :: limit  !! longest time that a run may take, 0 for any [s]
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session

@@ -47,12 +47,12 @@ contains
   !> The field at `x` (dim) [m] and time `t` [s]; `known` is false where the form says nothing of
   !> it.
   pure subroutine field_at(form, field, x, t, values, known)
-    type(closed_form_type), intent(in) :: form
-    type(output_field_type), intent(in) :: field
-    real(wp), intent(in) :: x(:)
-    real(wp), intent(in) :: t
+    type(closed_form_type), intent(in) :: form    !! completed for the scene
+    type(output_field_type), intent(in) :: field  !! which field of the output
+    real(wp), intent(in) :: x(:)                  !! (dim) position [m]
+    real(wp), intent(in) :: t  !! time, for the forms that move [s]
     real(wp), intent(out) :: values(:)  !! (components)
-    logical, intent(out) :: known
+    logical, intent(out) :: known                 !! `values` are set to the closed form's answer
     type(exact_type) :: state
 
     if (all(x >= form%lower) .and. all(x <= form%upper)) then

@@ -46,13 +46,16 @@ module pd_study_trade_measure
 
 contains
 
-  !> What the name `name` means in a scene; `source` gives an error its place.
+  !> What the name `name` means in a scene; `source` gives an error its place. An error is set if
+  !> the scene has no such probe, column or field.
   subroutine resolve_measure(name, region, norm, scene, table, source, measure, error)
-    character(*), intent(in) :: name, region, norm
+    character(*), intent(in) :: name             !! value of `measure` in &study
+    character(*), intent(in) :: region  !! value of `region` in &study, '' for all body points
+    character(*), intent(in) :: norm             !! value of `norm` in &study
     type(scene_type), intent(in) :: scene        !! whose fields are in the table
     type(field_table_type), intent(in) :: table  !! of fields
-    type(source_type), intent(in) :: source
-    type(measure_type), intent(out) :: measure
+    type(source_type), intent(in) :: source      !! the scanned file, for places
+    type(measure_type), intent(out) :: measure   !! what the name means
     type(error_type), allocatable, intent(out) :: error
     type(column_type), allocatable :: columns(:)
     type(output_field_type) :: field

@@ -64,10 +64,11 @@ module pd_study_trade_plan
 
 contains
 
-  !> Plan the study in the scene file at `path`.
+  !> Plan the study in the scene file at `path`. An error is set if the file cannot be read, or if
+  !> the scene or its studies break a rule.
   subroutine plan_study(path, plan, error, changes)
-    character(*), intent(in) :: path
-    type(plan_type), intent(out) :: plan
+    character(*), intent(in) :: path                     !! of the scene file
+    type(plan_type), intent(out) :: plan                 !! its runs, with their scenes
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     character(:), allocatable :: text
@@ -77,10 +78,12 @@ contains
     call plan_from_text(text, path, plan, error, changes)
   end subroutine plan_study
 
-  !> The same from a text; `name` stands for the file in messages.
+  !> The same from a text; `name` stands for the file in messages. An error is set if the scene or
+  !> its studies break a rule.
   subroutine plan_from_text(text, name, plan, error, changes)
-    character(*), intent(in) :: text, name
-    type(plan_type), intent(out) :: plan
+    character(*), intent(in) :: text                     !! of a scene file
+    character(*), intent(in) :: name                     !! path of the file; there need be none
+    type(plan_type), intent(out) :: plan                 !! its runs, with their scenes
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
 

@@ -47,10 +47,11 @@ module pd_study_trade_study
 
 contains
 
-  !> The whole command. An interrupt keeps what is done.
+  !> The whole command. An interrupt keeps what is done. An error is set if the study is wrong, a
+  !> run cannot be made, or none has an answer.
   subroutine run_study(path, options, error, changes)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
+    character(*), intent(in) :: path                     !! of the scene file
+    type(run_options_type), intent(in) :: options        !! of the command line
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session
@@ -79,11 +80,13 @@ contains
     text = text//' plot '//quoted(directory)
   end function plot_command
 
-  !> Plan everything, and check and set up every scene before the first run.
+  !> Plan everything, and check and set up every scene before the first run. An error is set if the
+  !> study is wrong, a scene cannot be set up, or there are results already.
   subroutine begin_study(path, options, session, error, changes)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
+    character(*), intent(in) :: path                     !! of the scene file
+    type(run_options_type), intent(in) :: options        !! of the command line
     type(session_type), intent(out) :: session
+      !! planned, with what the runs are compared with, and its folder made
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     integer :: t
@@ -178,7 +181,7 @@ contains
         if (len(reason) > 0) call at_key(plan, 'against', reason, 'one run must be at least as '// &
           & 'fine as all others in every key: add it, or compare with a closed form or a file', &
           & error)
-      case default
+      case default  ! the name of a file; one that is not there is an error
         probe = ''
         if (session%measure%probe > 0) probe = trim(plan%scene%probes(session%measure%probe)%name)
         path = resolve_path(plan%against, plan%scene%file)

@@ -146,7 +146,7 @@ contains
       text = text//'the closed form'
     case ('finest')
       text = text//'the finest run'
-    case default
+    case default  ! the name of a file
       text = text//plan%against
     end select
     text = text//newline

@@ -80,10 +80,10 @@ contains
   !> `form` gets what only the points tell of it. An error that ends a run without an answer is kept
   !> in `outcome`; others, and interrupts, in `error`.
   subroutine run_trial(scene, table, measure, around, terminal, form, outcome, record, error)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene       !! a checked scene
     type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
-    type(measure_type), intent(in) :: measure
-    real(wp), intent(in) :: around
+    type(measure_type), intent(in) :: measure   !! what is kept
+    real(wp), intent(in) :: around              !! [m]; counts for probes only
     logical, intent(in) :: terminal            !! show the progress of the steps
     type(closed_form_type), allocatable, intent(inout) :: form
       !! what is compared with, completed on return; not allocated: none
@@ -116,9 +116,9 @@ contains
   !> what is measured is not there, or if the closed form does not hold for the points. The largest
   !> frequency of `limit = 'spectral'` is not measured.
   subroutine check_trial(scene, table, measure, form, error)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene        !! a checked scene
     type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure    !! what a run would keep
     type(closed_form_type), allocatable, intent(inout) :: form
       !! what is compared with, completed on return; not allocated: none
     type(error_type), allocatable, intent(out) :: error
