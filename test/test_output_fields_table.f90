@@ -6,7 +6,8 @@ module test_output_fields_table
   use pd_base_error, only: fault_type => error_type, status_input
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_text, only: to_text
-  use pd_driver, only: check_scene, run_scene
+  use pd_driver, only: run_scene
+  use pd_preview, only: preview_scene
   use pd_output_fields_field, only: output_field_type, rank_symmetric
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_report_begin, only: run_options_type

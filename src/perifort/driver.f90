@@ -4,6 +4,7 @@ module pd_driver
   use pd_base_error, only: error_type
   use pd_base_interrupt, only: handlers_type, let_writes_fail, put_back_handlers, &
     & signal_handlers, watch_for_interrupt
+  use pd_force_term, only: term_list_type
   use pd_motion_observer, only: observer_type
   use pd_output_report_begin, only: run_options_type
   use pd_output_report_pair, only: pair_type
@@ -22,7 +23,7 @@ contains
   !> Compute a scene and write its results. The scene, which may have been read from a file or built
   !> in memory, is completed and checked first; the caller's stays as it is. Number of threads and
   !> handlers of signals are the caller's again thereafter.
-  subroutine run_scene(scene, options, error, observer, answer)
+  subroutine run_scene(scene, options, error, observer, answer, terms)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options    !! how, where to, with how many threads
     type(error_type), allocatable, intent(out) :: error
@@ -30,6 +31,8 @@ contains
     class(observer_type), intent(inout), optional, target :: observer
     !> results in memory, those before an error included
     type(answer_type), intent(out), optional :: answer
+    !> that act on the points beside their bonds, loads and boundaries
+    type(term_list_type), intent(in), optional :: terms
     type(scene_type) :: complete
     type(handlers_type) :: handlers
     integer :: threads
@@ -39,18 +42,19 @@ contains
     if (allocated(error)) return
     threads = omp_get_max_threads()
     handlers = signal_handlers()
-    call compute(complete, options, error, observer, answer)
+    call compute(complete, options, error, observer, answer, terms)
     call put_back_handlers(handlers)
     call omp_set_num_threads(threads)
   end subroutine run_scene
 
   !> `run_scene` of a complete scene, with signals and threads of its own.
-  subroutine compute(scene, options, error, observer, answer)
+  subroutine compute(scene, options, error, observer, answer, terms)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
     class(observer_type), intent(inout), optional, target :: observer
     type(answer_type), intent(out), optional :: answer
+    type(term_list_type), intent(in), optional :: terms
     type(set_up_type) :: set_up
     type(run_output_type), target :: output
     type(pair_type) :: watchers
@@ -61,7 +65,7 @@ contains
 
     ! points and families (7.1, 7.11), volumes (7.2) and surfaces (7.7), conditions (7.8), cracks
     ! and no-fail zones (7.9), and the time step (7.4) or the mass of relaxation (7.5)
-    call prepare(scene, set_up, error, options%threads)
+    call prepare(scene, set_up, error, options%threads, terms)
     if (.not. allocated(error)) call output%foresee(scene, options, set_up, error)
     if (allocated(error)) return
 

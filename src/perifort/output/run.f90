@@ -50,8 +50,8 @@ module pd_output_run
 
 contains
 
-  !> See to it that the scene's fields are known and that no earlier results are overwritten unasked,
-  !> or find the checkpoint that a run is to go on from.
+  !> See to it that the scene's fields are known and that no earlier results are overwritten
+  !> unasked, or find the checkpoint that a run is to go on from.
   subroutine look_back(self, scene, options, error)
     class(run_output_type), intent(inout) :: self
     type(scene_type), intent(in) :: scene
