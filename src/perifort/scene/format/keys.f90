@@ -344,11 +344,14 @@ contains
     character(*), intent(in) :: meaning      !! what the reference says of the key
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
+    logical :: given
     integer :: i, j, k
 
     shown = ''
     if (keys%mode == mode_describe) shown = '0.0'
-    if (any(ieee_is_nan(value)) .or. any(abs(value) > 0.0_wp)) shown = list_text([value])
+    given = any(ieee_is_nan(value))
+    if (.not. given) given = any(abs(value) > 0.0_wp)
+    if (given) shown = list_text([value])
     call keys%note_key(name, 'real('//to_text(size(value, 1))//','//to_text(size(value, 2))//')', &
       & unit, meaning, shown, '')
     if (keys%mode /= mode_read) return
