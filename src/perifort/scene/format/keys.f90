@@ -6,6 +6,7 @@
 !> allowed values and the default, which is the component's own initial value; writing puts the
 !> present value down as namelist text; a template does so with comments.
 module pd_scene_format_keys
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
   use pd_base_text, only: join, nearest_name, to_text
@@ -287,11 +288,14 @@ contains
     character(*), intent(in) :: unit, meaning
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
+    logical :: given
     integer :: i, j, k
 
     shown = ''
     if (keys%mode == mode_describe) shown = '0.0'
-    if (any(abs(value) > 0.0_wp)) shown = list_text([value])
+    given = any(ieee_is_nan(value))
+    if (.not. given) given = any(abs(value) > 0.0_wp)
+    if (given) shown = list_text([value])
     call keys%note_key(name, 'real('//to_text(size(value, 1))//','//to_text(size(value, 2))//')', &
       & unit, meaning, shown, '')
     if (keys%mode /= mode_read) return

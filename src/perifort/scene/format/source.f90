@@ -44,6 +44,7 @@ module pd_scene_format_source
     type(entry_type), allocatable :: entries(:)
     type(token_type), allocatable :: tokens(:)
     integer :: section_count = 0, entry_count = 0, token_count = 0
+    logical :: in_memory = .false.     !! the text of a scene in memory: places are groups and keys
   end type source_type
 
   character(*), parameter :: tab = achar(9)
@@ -59,16 +60,19 @@ module pd_scene_format_source
 
 contains
 
-  !> Scan `text`; `file` is the name used in messages.
-  subroutine scan_source(text, file, source, error)
+  !> Scan `text`; `file` is the name used in messages. With `in_memory` the text is of no file, and
+  !> messages name groups and keys in place of lines.
+  subroutine scan_source(text, file, source, error, in_memory)
     character(*), intent(in) :: text
     character(*), intent(in) :: file
     type(source_type), intent(out) :: source
     type(error_type), allocatable, intent(out) :: error
+    logical, intent(in), optional :: in_memory
     integer :: line, column, state
     logical :: inside
 
     source%file = file
+    if (present(in_memory)) source%in_memory = in_memory
     call split_lines(text, source%lines)
     call check_text(source, error)
     if (allocated(error)) return
@@ -395,6 +399,12 @@ contains
     character(:), allocatable :: number, text, shown, pad
     integer :: first, last, i, carets
 
+    if (source%in_memory) then
+      text = message//newline//' --> '//place_in_memory(source, line)
+      if (len(note) > 0) text = text//newline//'  = '//note
+      call fail(error, text)
+      return
+    end if
     if (line < 1 .or. line > size(source%lines)) then
       text = message//newline//' --> '//source%file
       if (len(note) > 0) text = text//newline//'  = '//note
@@ -429,6 +439,30 @@ contains
     if (len(note) > 0) text = text//' '//note
     call fail(error, text)
   end subroutine source_fault
+
+  !> The group, and the key if there is one, that stand in a line of a text that is of no file.
+  pure function place_in_memory(source, line) result(place)
+    type(source_type), intent(in) :: source
+    integer, intent(in) :: line
+    character(:), allocatable :: place
+    integer :: s, e, here
+
+    place = 'the scene in memory'
+    here = 0
+    do s = 1, source%section_count
+      if (source%sections(s)%line <= line) here = s
+    end do
+    if (here == 0 .or. line < 1) return
+    associate (section => source%sections(here))
+      place = 'group &'//section%name//' number '// &
+        & to_text(count([(source%sections(s)%name == section%name, s=1, here)]))
+      do e = section%first, section%last
+        if (source%entries(e)%line /= line) cycle
+        place = place//', key '//source%entries(e)%key
+        return
+      end do
+    end associate
+  end function place_in_memory
 
   !> Whether a byte is a later one of an UTF-8 character.
   pure logical function continues(byte)

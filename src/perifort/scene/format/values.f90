@@ -3,6 +3,7 @@
 !> A word's form is checked first, because list-directed reads accept too much (`5abc/`, `NaN`,
 !> `yes`); the runtime then does the conversion.
 module pd_scene_format_values
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_base_kinds, only: wp
   use pd_base_text, only: lower_case, to_text
   implicit none (type, external)
@@ -140,6 +141,14 @@ contains
     integer :: n, status
     real(wp) :: back
 
+    ! what is no number is written as such, to be refused when it is read
+    if (ieee_is_nan(value)) then
+      text = 'NaN'
+      return
+    else if (abs(value) > huge(value)) then
+      text = trim(merge('-Infinity', 'Infinity ', value < 0.0_wp))
+      return
+    end if
     do n = 6, 17
       text = to_text(value, n)
       read (text, *, iostat=status) back
