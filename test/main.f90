@@ -39,6 +39,7 @@ program main
   use test_force_breaking, only: collect_force_breaking
   use test_force_contract, only: collect_force_contract
   use test_force_frame, only: collect_force_frame
+  use test_library, only: collect_library
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_static_conjugate_gradient, only: collect_motion_static_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
@@ -120,6 +121,7 @@ program main
   call register('force_breaking', collect_force_breaking)
   call register('force_contract', collect_force_contract)
   call register('force_frame', collect_force_frame)
+  call register('library', collect_library)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_static_conjugate_gradient', collect_motion_static_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)

@@ -7,9 +7,10 @@ module pd_commands
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
-  use pd_driver, only: check_scene, run_scene
+  use pd_driver, only: run_scene
   use pd_output_report_begin, only: run_options_type
   use pd_output_results_hdf5, only: hdf5_version
+  use pd_preview, only: preview_scene
   use pd_scene_content_read, only: read_scene
   use pd_scene_content_reference, only: write_reference
   use pd_scene_content_template, only: write_template
@@ -62,7 +63,7 @@ contains
       case ('run')
         call run_scene(scene, options, error)
       case ('check')
-        call check_scene(scene, options, error)
+        call preview_scene(scene, options, error)
       case ('limits')
         call run_limits(scene, options, line%seconds, error)
       case default

@@ -45,6 +45,7 @@ module pd_output_checkpoint_checkpoint
     integer :: written = 0
     integer :: last_step = 0            !! step of the last one
     real(wp) :: last = 0.0_wp           !! wall time of the last one, or of the start [s]
+    logical :: in_files = .true.        !! there is a folder to write to
   contains
     procedure :: start
     procedure :: is_due
@@ -130,7 +131,7 @@ contains
     bytes = meter%bytes
   end function checkpoint_bytes
 
-  !> Begin: the clock runs from here.
+  !> Begin: the clock runs from here. With the path '' none is ever due.
   subroutine start(self, path, every, minutes, goes_on, keep_newest)
     class(checkpoint_type), intent(inout) :: self
     character(*), intent(in) :: path
@@ -140,8 +141,9 @@ contains
     logical, intent(in) :: keep_newest  !! the newest of them is whole
 
     self%path = path
-    self%every = every
-    self%minutes = minutes
+    self%in_files = path /= ''
+    self%every = merge(every, 0, self%in_files)
+    self%minutes = merge(minutes, 0.0_wp, self%in_files)
     self%keep_newest = keep_newest
     self%written = merge(1, 0, goes_on)
     self%last = wall_time()

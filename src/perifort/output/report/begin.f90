@@ -24,23 +24,26 @@ module pd_output_report_begin
   public :: run_options_type, open_recorder, keep_checkpoints, schedule_of, check_schedule, &
     & history_interval, output_directory, stem_of, command_of, text_of
 
-  !> How to run, from the command line.
+  !> How to run, from the command line or from a program that uses the library.
   type :: run_options_type
+    logical :: files = .true.                      !! .false.: nothing is written to the disk
     character(:), allocatable :: output_directory  !! '' = out/<stem of the scene file>
     character(:), allocatable :: command           !! as typed, kept in the results
     integer :: threads = 0                         !! 0 = as many as OpenMP offers
-    logical :: overwrite = .false.
+    logical :: overwrite = .false.                 !! replace results that are there
     logical :: restart = .false.                   !! go on from a checkpoint, if there is one
     character(:), allocatable :: checkpoint        !! its path; '' = the newest of the run
     real(wp) :: max_minutes = 0.0_wp               !! of wall time, then stop in order; 0 = no limit
     character(:), allocatable :: restart_command   !! goes on with the run, for messages
-    logical :: quiet = .false.
+    logical :: quiet = .false.                     !! print nothing
   end type run_options_type
 
 contains
 
-  !> Files, history and progress of a run, whose probes the recorder has.
-  subroutine open_recorder(scene, options, system, plan, directory, stem, restart, recorder, error)
+  !> Files, history and progress of a run, whose probes the recorder has. With `in_memory` the last
+  !> output stays in memory, too.
+  subroutine open_recorder(scene, options, system, plan, directory, stem, restart, recorder, &
+    & in_memory, error)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(system_type), intent(in) :: system
@@ -48,6 +51,7 @@ contains
     character(*), intent(in) :: directory, stem
     type(restart_type), intent(in) :: restart
     type(recorder_type), intent(inout) :: recorder
+    logical, intent(in) :: in_memory
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: positions(:, :)
     type(kept_type), allocatable :: kept
@@ -78,6 +82,7 @@ contains
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
         & program_version, options%overwrite .or. options%restart, error, kept)
       if (allocated(error)) return
+      if (in_memory) call recorder%results%keep_outputs(positions)
       if (.not. recorder%results%goes_on()) call put_points(scene, body, recorder, error)
       if (allocated(error)) return
       call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet, &
@@ -158,12 +163,15 @@ contains
     end if
   end function history_interval
 
-  !> The folder of the results: the one asked for, or out/ and the scene file's name.
+  !> The folder of the results: the one asked for, or out/ and the scene file's name; '' if nothing
+  !> is to be written.
   pure function output_directory(scene, options) result(directory)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     character(:), allocatable :: directory
 
+    directory = ''
+    if (.not. options%files) return
     directory = 'out/'//stem_of(scene)
     if (.not. allocated(options%output_directory)) return
     if (options%output_directory /= '') directory = options%output_directory
@@ -179,12 +187,16 @@ contains
     character(*), intent(in) :: directory, stem
     type(restart_type), intent(in) :: restart
     type(recorder_type), intent(inout) :: recorder
+    character(:), allocatable :: path
 
     recorder%about = new_about(scene_text(scene), start, plan%steps, plan%step)
-    recorder%command = command_of(options)
+    recorder%command = ''
+    if (directory /= '') recorder%command = command_of(options)
     recorder%quiet = options%quiet
     recorder%most_seconds = 60*options%max_minutes
-    call recorder%checkpoint%start(checkpoint_path(directory, stem), &
+    path = ''
+    if (directory /= '') path = checkpoint_path(directory, stem)
+    call recorder%checkpoint%start(path, &
       & scene%output%checkpoint_every, scene%output%checkpoint_minutes, goes_on=restart%found, &
       & keep_newest=restart%newest)
     if (.not. restart%found) return

@@ -77,7 +77,8 @@ module pd_output_report_recorder
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
     integer :: more_outputs = 0              !! which goes on would not have
     real(wp) :: most_seconds = 0.0_wp        !! wall time until the run stops by itself, if > 0 [s]
-    character(:), allocatable :: command     !! goes on with the run
+    character(:), allocatable :: command     !! goes on with the run; '' = nothing does
+    character(:), allocatable :: wish        !! why another observer asks to stop in order
     character(:), allocatable :: rescued     !! what was saved of a motion that has gone wrong
   contains
     procedure :: observe
@@ -229,8 +230,10 @@ contains
       if (allocated(error)) return
     end if
     may_stop = .not. instant%last
-    stopping = may_stop .and. (interrupted() .or. time_is_over(observer))
+    stopping = may_stop .and. (interrupted() .or. time_is_over(observer) &
+      & .or. allocated(observer%wish))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
+    keeping = keeping .and. observer%checkpoint%in_files
     row = row_due .or. stopping .or. instant%last
     output = output_due_now .or. stopping .or. instant%last
     observer%more_rows = merge(1, 0, row .and. .not. row_due)
@@ -261,8 +264,7 @@ contains
     call observer%timer%start('time stepping')
     if (stopping) call fail(error, reason_to_stop(observer)//' at '// &
       & place_of(instant, observer%schedule%relaxation)// &
-      & ': this state is the last output'//newline//'  to go on: '//observer%command, &
-      & status_interrupted)
+      & ': this state is the last output'//way_on(observer), status_interrupted)
   end subroutine observe
 
   !> Count the load steps that the conjugate gradient leaves to dynamic relaxation, and say so at
@@ -319,9 +321,23 @@ contains
     class(recorder_type), intent(in) :: recorder
     character(:), allocatable :: reason
     reason = 'interrupted'
-    if (.not. interrupted()) reason = 'stopped after '//duration_text(recorder%most_seconds)// &
+    if (interrupted()) return
+    if (allocated(recorder%wish)) then
+      reason = recorder%wish
+      return
+    end if
+    reason = 'stopped after '//duration_text(recorder%most_seconds)// &
       & ', as asked for,'
   end function reason_to_stop
+
+  !> A line that says how a run that has stopped goes on, if it can.
+  function way_on(recorder) result(text)
+    class(recorder_type), intent(in) :: recorder
+    character(:), allocatable :: text
+
+    text = ''
+    if (recorder%command /= '') text = newline//'  to go on: '//recorder%command
+  end function way_on
 
   !> Write a checkpoint. If that fails, the run goes on with the one before it.
   subroutine keep_state(recorder, system, finished)

@@ -196,7 +196,7 @@ contains
   function summary_after(system, recorder, directory) result(text)
     type(system_type), intent(in) :: system
     type(recorder_type), intent(in) :: recorder
-    character(*), intent(in) :: directory
+    character(*), intent(in) :: directory   !! of the results; '' = there are no files
     character(:), allocatable :: text, parts
     real(wp) :: balance, share
     integer :: steps
@@ -230,8 +230,13 @@ contains
       end if
     end associate
     if (recorder%warnings%count() > 0) text = text//line('warnings', &
-      & to_text(recorder%warnings%count())//', kept in warnings.txt')
-    text = text//line('results', directory)
+      & to_text(recorder%warnings%count())//trim(merge(', kept in warnings.txt', &
+      & repeat(' ', 22), directory /= '')))
+    if (directory == '') then
+      text = text//line('results', 'in memory alone')
+    else
+      text = text//line('results', directory)
+    end if
   end function summary_after
 
   !> Memory of points and families [bytes].

@@ -10,11 +10,15 @@
 !>
 !> Nothing of an earlier run is touched before the first output is complete. After an error call
 !> `close` none the less: it leaves the files as they were at the last complete output.
+!>
+!> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
+!> are the fields of the last output, and `answer` gives both.
 module pd_output_results_results
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_text, only: join, lower_case, to_text, with_unit
   use pd_output_checkpoint_checkpoint, only: remove_checkpoints
+  use pd_output_results_answer, only: answer_type, values_type
   use pd_output_results_description, only: check_description
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
@@ -53,6 +57,10 @@ module pd_output_results_results
     logical :: started = .false.         !! the files have their names
     logical :: resumed = .false.         !! they are those of a run that goes on
     logical :: failed = .false.
+    logical :: in_files = .true.         !! there is a folder to write to
+    real(wp), allocatable :: positions(:, :)       !! what stays in memory: points, ...
+    type(values_type), allocatable :: latest(:)    !! fields of the output under way, ...
+    type(values_type), allocatable :: complete(:)  !! and of the last complete one
   contains
     procedure :: create
     procedure, private :: put_points_real, put_points_i4, put_points_i1
@@ -72,11 +80,14 @@ module pd_output_results_results
     procedure :: sync
     procedure :: kept => rows_and_times
     procedure :: goes_on
+    procedure :: keep_outputs
+    procedure :: answer
   end type results_type
 
 contains
 
-  !> Begin the results `directory/stem.*` and `directory/history.csv`.
+  !> Begin the results `directory/stem.*` and `directory/history.csv`, or, where `directory` is '',
+  !> results that are in memory alone.
   !>
   !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
   !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
@@ -103,11 +114,14 @@ contains
     call check_description(positions, fields, columns, precision, format, error)
     if (allocated(error)) return
     self%resumed = .false.
-    if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
-    if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
-    if (allocated(error)) return
-    call make_directory(directory, error)
-    if (allocated(error)) return
+    self%in_files = directory /= ''
+    if (self%in_files) then
+      if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
+      if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
+      if (allocated(error)) return
+      call make_directory(directory, error)
+      if (allocated(error)) return
+    end if
 
     self%directory = trim(directory)
     self%stem = trim(stem)
@@ -117,8 +131,8 @@ contains
     self%points = size(positions, 1)
     self%planned_outputs = planned_outputs
     single = lower_case(precision) == 'single'
-    self%use_vtkhdf = lower_case(format) /= 'vtu'
-    self%use_vtu = lower_case(format) /= 'vtkhdf'
+    self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
+    self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
     call self%history%start(size(columns))
     allocate (self%times(0))
     if (present(kept)) call self%history%restore(kept%rows, written=self%resumed)
@@ -212,6 +226,7 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
     if (allocated(error)) call explain_output(self, error)
     self%given(field) = .not. allocated(error)
+    if (allocated(self%latest)) self%latest(field)%values = reshape(values, [size(values), 1])
   end subroutine put_scalar_at
 
   subroutine put_vector_at(self, field, values, error)
@@ -226,6 +241,7 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
     if (allocated(error)) call explain_output(self, error)
     self%given(field) = .not. allocated(error)
+    if (allocated(self%latest)) self%latest(field)%values = values
   end subroutine put_vector_at
 
   subroutine put_scalar_named(self, name, values, error)
@@ -318,6 +334,10 @@ contains
       self%outputs = self%outputs + 1
       self%times = [self%times, self%time]
       self%in_output = .false.
+      if (allocated(self%latest)) then
+        call move_alloc(self%latest, self%complete)
+        allocate (self%latest(size(self%fields)))
+      end if
     end if
   end subroutine end_output
 
@@ -343,6 +363,8 @@ contains
     class(results_type), intent(inout) :: self
     type(error_type), allocatable, intent(out) :: error
 
+    if (self%started) return
+    self%started = .not. self%in_files
     if (self%started) return
     call mark_unfinished(self%directory, self%stem, error)
     if (allocated(error)) return
@@ -387,7 +409,7 @@ contains
     integer, intent(in) :: last
     type(error_type), allocatable, intent(out) :: error
 
-    if (.not. self%started .or. self%failed) return
+    if (.not. (self%started .and. self%in_files) .or. self%failed) return
     if (.not. self%iterations%has_begun()) call self%iterations%begin( &
       & in_directory(self%directory, 'iterations.csv'), self%resumed, last, error)
     if (.not. allocated(error)) call self%iterations%add(line, error)
@@ -408,6 +430,7 @@ contains
       if (self%warnings == text) return
     end if
     self%warnings = text
+    if (.not. self%in_files) return
     if (text == '') then
       call remove_file(in_directory(self%directory, 'warnings.txt'))
       return
@@ -487,6 +510,33 @@ contains
     goes_on = self%resumed
   end function goes_on
 
+  !> From now on keep the fields of each output in memory until the next one is complete.
+  subroutine keep_outputs(self, positions)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: positions(:, :)   !! of the points (point, 3) [m]
+
+    self%positions = positions
+    if (.not. allocated(self%latest)) allocate (self%latest(size(self%fields)))
+  end subroutine keep_outputs
+
+  !> The history so far, and the last complete output if it was to be kept.
+  subroutine answer(self, found)
+    class(results_type), intent(in) :: self
+    type(answer_type), intent(out) :: found
+
+    found%warnings = ''
+    if (allocated(self%warnings)) found%warnings = self%warnings
+    if (.not. allocated(self%columns)) return
+    found%columns = self%columns
+    found%history = transpose(self%history%first_rows(0))
+    found%fields = self%fields
+    found%outputs = self%outputs
+    if (self%outputs > 0) found%time = self%times(self%outputs)
+    if (allocated(self%positions)) found%positions = self%positions
+    allocate (found%values(size(self%fields)))
+    if (allocated(self%complete)) found%values = self%complete
+  end subroutine answer
+
   !> Complete the files. Those of a run that was `stopped` stay as they are, to go on another time;
   !> with `keep_mark` they stay marked as unfinished. After an error in writing they stay as they
   !> were at the last complete output; if nothing was written, nothing is left behind.
@@ -529,7 +579,8 @@ contains
       call self%csv%close(ignored)
       if (allocated(ignored) .and. .not. allocated(error)) call move_alloc(ignored, error)
     end if
-    if (complete .and. .not. allocated(error)) call mark_complete(self%directory, self%stem)
+    if (complete .and. self%in_files .and. .not. allocated(error)) &
+      & call mark_complete(self%directory, self%stem)
   end subroutine close_results
 
 end module pd_output_results_results
