@@ -1,11 +1,12 @@
 !> The library as other programs see it: nothing of perifort is used here but `perifort`.
 module test_library
   use, intrinsic :: ieee_arithmetic, only: ieee_negative_inf, ieee_quiet_nan, ieee_value
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use perifort, only: answer_type, body_group, boundary_group, check_scene, crack_group, &
     & damage_of, displacements_of, energies_type, fail, fault_type => error_type, find_energies, &
     & force_densities_of, header_type, horizon_group, initial_group, instant_type, is_set, &
-    & load_group, material_group, name_length, number_of_points, observer_type, output_group, &
+    & load_group, material_group, name_length, no_fail_group, number_of_points, observer_type, &
+    & output_group, region_group, &
     & point_near, positions_of, preview_scene, probe_group, program_version, read_scene_text, &
     & relaxation_group, run_options_type, run_scene, scene_text, scene_type, shape_group, &
     & status_input, status_interrupted, status_no_answer, study_group, system_type, time_group, &
@@ -131,8 +132,8 @@ contains
     u = displacements_of(system)
     v = velocities_of(system, instant)
     do c = 1, 2
-      observer%worst = max(observer%worst, maxval(abs(u(:, c) - velocity(c)*instant%time)))
-      observer%slowest = max(observer%slowest, maxval(abs(v(:, c) - velocity(c))))
+      observer%worst = max(observer%worst, max_abs(u(:, c) - velocity(c)*instant%time))
+      observer%slowest = max(observer%slowest, max_abs(v(:, c) - velocity(c)))
     end do
     x = positions_of(system)
     observer%corner = point_near(system, points*spacing)
@@ -141,7 +142,7 @@ contains
     observer%kinetic = energies%kinetic
     observer%strain = energies%strain
     observer%volume = sum(volumes_of(system))
-    observer%force = maxval(abs(force_densities_of(system)))
+    observer%force = max_abs(force_densities_of(system))
     observer%damage = maxval(damage_of(system))
     if (size(u, 1) /= number_of_points(system)) observer%corner = -1
     if (instant%step == observer%stop_at) call fail(error, 'seen enough', observer%status)
@@ -196,8 +197,8 @@ contains
       & density=density, critical_stretch=0.1_wp)]
     scene%removed = [shape_group(shape='sphere', centre=[0.05_wp, 0.05_wp, 0.0_wp], &
       & radius=0.01_wp)]
-    scene%regions = [shape_group(name='left', shape='box', upper=[0.02_wp, unset, unset])]
-    scene%no_fail = [shape_group(region='left')]
+    scene%regions = [region_group(name='left', shape='box', upper=[0.02_wp, unset, unset])]
+    scene%no_fail = [no_fail_group(region='left')]
     scene%horizon = horizon_group(ratio=2.5_wp)
     scene%cracks = [crack_group(from=[0.0_wp, 0.03_wp, unset], to=[0.03_wp, 0.03_wp, unset])]
     scene%initial = [initial_group(region='left', velocity=[1.0_wp, unset, unset])]
@@ -314,7 +315,7 @@ contains
     scene%boundaries(2)%region = 'lef'
     scene%boundaries(2)%displacement(1) = 0.0_wp
     allocate (scene%regions(1))
-    scene%regions(1) = shape_group(name='left', shape='box', upper=[0.1_wp, unset, unset])
+    scene%regions(1) = region_group(name='left', shape='box', upper=[0.1_wp, unset, unset])
     call expect_fault('&boundary number 2, key region', "no region is named 'lef'", &
       & "did you mean 'left'?")
     call flight(scene)

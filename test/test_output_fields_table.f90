@@ -22,6 +22,7 @@ module test_output_fields_table
   use pd_study_trade_study, only: begin_study, run_all, session_type
   use pd_study_trade_table, only: put_file
   use bodies, only: density_of_steel, expect, expect_true
+  use comparisons, only: expect_close
   use own_fields, only: momentum_flux_field, motion_energy_field, never_field
   use test_scene_expect, only: expect_parts, line
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
@@ -222,18 +223,18 @@ contains
       & tensors, fault)
     call accept(error, fault)
     call expect_true(error, components == 3 .and. rows == 2*points, 'shape of the tensor')
-    call expect(error, maxval(abs(scalars - energy)), 0.0_wp, 1.0e-9_wp*energy, 'energy')
+    call expect_close(error, scalars, energy, 1.0e-9_wp*energy, 'energy')
     do c = 1, 3
-      call expect(error, maxval(abs(tensors(c, :) - flux(c))), 0.0_wp, 1.0e-9_wp*energy, pairs(c))
+      call expect_close(error, tensors(c, :), flux(c), 1.0e-9_wp*energy, pairs(c))
       if (.not. allocated(error)) call read_rows(file, '/history/p_momentum_flux_'//pairs(c), &
         & 0_i8, column, fault)
       call accept(error, fault)
-      call expect(error, maxval(abs(column - flux(c))), 0.0_wp, 1.0e-9_wp*energy, 'p '//pairs(c))
+      call expect_close(error, column, flux(c), 1.0e-9_wp*energy, 'p '//pairs(c))
     end do
     if (.not. allocated(error)) call read_rows(file, '/history/p_motion_energy', 0_i8, column, &
       & fault)
     call accept(error, fault)
-    call expect(error, maxval(abs(column - energy)), 0.0_wp, 1.0e-9_wp*energy, 'p energy')
+    call expect_close(error, column, energy, 1.0e-9_wp*energy, 'p energy')
     call close_file(file, fault)
     if (allocated(error)) return
     call read_text_file(here//'/own/own_000001.vtu', text, fault)
