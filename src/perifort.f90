@@ -29,8 +29,7 @@ module perifort
   use pd_output_report_begin, only: run_options_type
   use pd_output_results_answer, only: answer_type, values_type
   use pd_output_results_types, only: column_type, field_type, label_length
-  use pd_preview, only: preview_scene
-  use pd_scene_content_complete, only: check_scene => complete_scene
+  use pd_preview, only: check_scene, preview_scene
   use pd_scene_content_read, only: read_scene, read_scene_text
   use pd_scene_content_groups, only: list_groups
   use pd_scene_content_types, only: body_group, boundary_group, crack_group, group_table, &

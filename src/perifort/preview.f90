@@ -1,4 +1,5 @@
-!> What a run would do, without running: what `perifort check` prints.
+!> What is known of a scene before it runs: whether it keeps the rules, and what a run would do,
+!> which `perifort check` prints.
 module pd_preview
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_error, only: error_type
@@ -6,6 +7,7 @@ module pd_preview
   use pd_base_text, only: newline
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_bytes, new_about
   use pd_output_fields_check, only: check_names
+  use pd_output_fields_table, only: field_table_type
   use pd_output_report_before, only: foresee_output
   use pd_output_report_begin, only: fields_of, run_options_type
   use pd_output_report_columns, only: history_columns
@@ -22,9 +24,25 @@ module pd_preview
   use pd_set_up_prepare, only: prepare, set_up_type
   implicit none (type, external)
   private
-  public :: preview_scene
+  public :: check_scene, preview_scene
 
 contains
+
+  !> Complete a scene in place, and hold it to every rule that needs no points: those of a scene
+  !> file, and the names of fields.
+  subroutine check_scene(scene, error, fields)
+    type(scene_type), intent(inout) :: scene             !! built or changed in memory, or read
+    type(error_type), allocatable, intent(out) :: error  !! the broken rule; the scene is as it was
+    type(field_table_type), intent(in), optional :: fields  !! that it may name; none: `all_fields`
+    type(scene_type) :: complete
+    type(run_options_type) :: options
+
+    if (present(fields)) options%fields = fields
+    complete = scene
+    call complete_scene(complete, error)
+    if (.not. allocated(error)) call check_names(complete, fields_of(options), error)
+    if (.not. allocated(error)) scene = complete
+  end subroutine check_scene
 
   !> Check a scene, build points and families, and say what a run would do: size, forces, time step,
   !> warnings, predicted duration. No files are written. The caller's number of threads is as it was

@@ -30,9 +30,10 @@ contains
     file = ''
     if (allocated(scene%file)) file = scene%file
     call scan_source(scene_text(scene), file, source, error, in_memory=.true.)
-    if (.not. allocated(error)) call read_scene_source(source, complete, error)
+    if (.not. allocated(error)) call read_scene_source(source, complete, error, scene%table)
     if (allocated(error)) return
     if (allocated(scene%text)) complete%text = scene%text
+    if (allocated(scene%changes)) complete%changes = scene%changes
     if (is_empty(scene%output%fields)) complete%output%fields = scene%output%fields
     do i = 1, size(complete%probes)
       if (is_empty(scene%probes(i)%fields)) complete%probes(i)%fields = scene%probes(i)%fields
