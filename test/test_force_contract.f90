@@ -7,6 +7,7 @@ module test_force_contract
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_numbers, only: pi
   use pd_family_lattice, only: lattice_family_type
+  use pd_family_list, only: list_family_type
   use pd_family_volume, only: volume_none
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
   use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
@@ -38,6 +39,7 @@ contains
       & new_unittest('breaking is the same from both ends', test_breaking), &
       & new_unittest('the same bits on 1, 2 and 4 threads', test_threads), &
       & new_unittest('keys that collide change nothing', test_collisions), &
+      & new_unittest('clusters of lists share tables', test_shared), &
       & new_unittest('any critical stretch leaves the fast formulas their range', test_critical)]
   end subroutine collect_force_contract
 
@@ -587,7 +589,7 @@ contains
     integer :: kind, dim, i
 
     do kind = 1, size(kinds)
-      if (kinds(kind) == 'list') cycle
+      if (kinds(kind) == 'list' .or. kinds(kind) == 'tables') cycle
       do dim = 1, 3
         subject = subject_type(kind=kinds(kind), dim=dim, surface=.true., two_materials=.true., &
           & hole=.true., crack=.true., dilatant=dim == 1)
@@ -615,6 +617,59 @@ contains
       end do
     end do
   end subroutine test_collisions
+
+  !> Clusters of lists share tables where points lie alike, also where their bonds are cut. Forces
+  !> are those of a list without shared tables, and those with one key for all clusters, or two.
+  subroutine test_shared(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: points(3, 3) = reshape([400, 1, 1, 150, 20, 1, 90, 6, 6], [3, 3])
+    integer(i8), parameter :: bits(*) = [not(0_i8), 0_i8, 1_i8]
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), other(:, :), p(:), p_other(:)
+    integer(i8) :: weights, packs
+    integer :: dim, variant, i
+
+    do dim = 1, 3
+      do variant = 1, 3
+        call make(dim, variant, not(0_i8), huge(0), subject)
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, dim))
+        call shake(subject%body, some_gradient(0.004_wp), 0.004_wp*spacing, 71, u)
+        call fast_force(subject, u, force, p)
+        do i = 1, size(bits)
+          call make(dim, variant, bits(i), 8, subject)
+          call fast_force(subject, u, other, p_other)
+          select type (family => subject%family)
+          type is (list_family_type)
+            weights = size(family%weight_S, 2, kind=i8)
+            packs = size(family%bits, kind=i8)
+            if (i == 1) call expect_true(error, 2*weights < packs, 'few weights are shared, ' &
+              & //name_of(subject, 0))
+            if (i == 1) call expect_true(error, count(family%shape > 0_i8) &
+              & > size(family%shape)/2, 'few shapes are shared')
+          end select
+          call expect_close(error, other, force, 1.0e-13_wp*max_abs(force), 'force, ' &
+            & //name_of(subject, i))
+          call expect_close(error, p_other, p, 1.0e-13_wp*max_abs(p), 'dilatation, ' &
+            & //name_of(subject, i))
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+
+  contains
+
+    subroutine make(dim, variant, key_bits, least_shared, subject)
+      integer, intent(in) :: dim, variant, least_shared
+      integer(i8), intent(in) :: key_bits
+      type(subject_type), intent(out) :: subject
+
+      subject = subject_type(kind='list', dim=dim, bond_based=variant == 3, &
+        & projected=variant == 1, surface=.true., two_materials=variant == 2, hole=.true., &
+        & crack=.true., key_bits=key_bits, least_shared=least_shared, points=points(:, dim))
+      call build(subject)
+    end subroutine make
+  end subroutine test_shared
 
   !> Tables of weights that a lattice has.
   integer function tables_of(subject) result(tables)

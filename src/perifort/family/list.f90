@@ -37,11 +37,16 @@ module pd_family_list
                                                !! displacement and p of the pass (8, n_slots)
     real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
     integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike: set by
-                                               !! the first pass (`pd_force_list_points`)
-    integer(i8), allocatable :: stored(:)      !! place of the other clusters' first pack in
+                                               !! the first pass (`pd_force_list_points`), as are
+    integer(i8), allocatable :: stored(:)      !! the place of each cluster's first pack in
     real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
     real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
-                                               !! of all bonds, intact or not
+                                               !! of all bonds, intact or not; 0: has none; and
+    integer(i8), allocatable :: shape(:)       !! that of its first column in
+    real(wp), allocatable :: geometry(:, :)    !! xi and 2/|xi|^2 (lanes, columns of each pack)
+    integer :: least_shared = 8                !! clusters that tables are made for, if they share
+                                               !! them; tests take fewer or more
+    integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
@@ -222,10 +227,11 @@ contains
     class(list_family_type), intent(in) :: family
     ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
     bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
-      & + 18_i8*size(family%large)
+      & + 26_i8*size(family%large)
     if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
     if (allocated(family%weight_D)) bytes = bytes + 8*size(family%weight_D, kind=i8)
     if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
+    if (allocated(family%geometry)) bytes = bytes + 8*size(family%geometry, kind=i8)
   end function bytes
 
   function describe(family) result(text)

@@ -6,10 +6,12 @@ module pd_force_list
   use pd_family_list, only: list_family_type, at_moved, at_p
   use pd_family_offsets, only: lanes
   use pd_force_general, only: mark_slot
-  use pd_force_list_fast, only: choose_loop, for_energy, for_force, for_theta, pass_loop, task_type
+  use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
+    & no_tables, pass_loop, task_type, weights_alone
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy, store_weights, take_up
+    & general_energy, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
+  use pd_force_list_tables, only: drop_tables, make_tables
   use pd_force_model, only: model_type
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
@@ -22,23 +24,24 @@ module pd_force_list
 
   !> The loops of a pass, and the strains that they serve.
   type :: loops_type
-    procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters of points alike
-    procedure(pass_loop), pointer, nopass :: stored => null()  !! for those with stored weights
+    procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters without tables,
+    procedure(pass_loop), pointer, nopass :: stored => null()  !! with weights,
+    procedure(pass_loop), pointer, nopass :: shaped => null()  !! with weights and geometry
     type(task_type) :: task                                    !! what is the same for all
     real(wp) :: narrow = 0.0_wp, wide = 0.0_wp                 !! limits of |e|, 0: none
   end type loops_type
 
 contains
 
-  !> Make what the family keeps of the model: which clusters have points alike, and the weights of
-  !> the others. The first pass does it if nobody has; afterwards the model must not change.
+  !> Make what the family keeps of the model: which clusters have points alike, and tables. The
+  !> first pass does it if nobody has; afterwards the model must not change.
   subroutine prepare_list(family, model)
     type(list_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
 
     if (allocated(family%given)) return
     call survey(family, model)
-    call store_weights(family, model)
+    call make_tables(family, model)
   end subroutine prepare_list
 
   !> Drop what the family keeps of the model, which is about to change or has changed: the next pass
@@ -48,9 +51,7 @@ contains
 
     if (.not. allocated(family%given)) return
     deallocate (family%given, family%plain)
-    if (allocated(family%stored)) deallocate (family%stored)
-    if (allocated(family%weight_D)) deallocate (family%weight_D)
-    if (allocated(family%weight_S)) deallocate (family%weight_S)
+    call drop_tables(family)
   end subroutine forget_model
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
@@ -179,8 +180,10 @@ contains
     integer, intent(in) :: pass
     type(loops_type), intent(out) :: loops
 
-    call choose_loop(family%dim, pass, .false., model%dilatation, model%projected, loops%plain)
-    call choose_loop(family%dim, pass, .true., model%dilatation, model%projected, loops%stored)
+    call choose_loop(family%dim, pass, no_tables, model%dilatation, model%projected, loops%plain)
+    call choose_loop(family%dim, pass, weights_alone, model%dilatation, model%projected, &
+      & loops%stored)
+    call choose_loop(family%dim, pass, all_tables, model%dilatation, model%projected, loops%shaped)
     call new_task(family, model, loops%task)
     loops%narrow = fast_limit(model, narrow)
     loops%wide = fast_limit(model, wide)
@@ -201,7 +204,7 @@ contains
     logical :: missed
 
     task = loops%task
-    if (family%plain(work%cluster) == 1_i1) call plain_task(family, model, work%cluster, task)
+    if (family%stored(work%cluster) == 0_i8) call plain_task(family, model, work%cluster, task)
     if (strain == little .and. loops%narrow > 0.0_wp) then
       task%limit = loops%narrow
       call run_either(family, work, loops, task, sums, missed)
@@ -217,7 +220,7 @@ contains
     strain = beyond
   end subroutine sum_up
 
-  !> The loop that has the weights of the cluster.
+  !> The loop for the tables that the cluster has.
   subroutine run_either(family, work, loops, task, sums, missed)
     type(list_family_type), intent(in) :: family
     type(work_type), intent(in) :: work
@@ -226,10 +229,12 @@ contains
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
 
-    if (family%plain(work%cluster) == 1_i1) then
+    if (family%stored(work%cluster) == 0_i8) then
       call run_loop(family, work, loops%plain, task, sums, missed)
-    else
+    else if (family%shape(work%cluster) == 0_i8) then
       call run_loop(family, work, loops%stored, task, sums, missed)
+    else
+      call run_loop(family, work, loops%shaped, task, sums, missed)
     end if
   end subroutine run_either
 
@@ -241,17 +246,18 @@ contains
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
-    integer(i8) :: e, last, b, f, d
+    integer(i8) :: e, last, b, f, d, s
 
     ! tables that are not there have no second element; loops that need them are not called then
     e = family%start(work%cluster)
     last = e + work%n - 1
-    b = family%stored(work%cluster)
+    b = max(1_i8, family%stored(work%cluster))
+    s = max(1_i8, family%shape(work%cluster))
     f = merge(e, 1_i8, size(family%fraction) > 0)
     d = merge(b, 1_i8, size(family%weight_D) > 0)
     call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
-      & family%at, family%given, family%fraction(:, f:), family%weight_D(:, d:), &
-      & family%weight_S(:, b:), work%own, task, sums, missed)
+      & family%at, family%given, family%fraction(:, f:), family%geometry(:, s:), &
+      & family%weight_D(:, d:), family%weight_S(:, b:), work%own, task, sums, missed)
   end subroutine run_loop
 
   !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end

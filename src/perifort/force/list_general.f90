@@ -12,8 +12,7 @@ module pd_force_list_general
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: work_type, fill_tables, general_theta, general_force, general_energy, store_weights
-  public :: take_up
+  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
@@ -121,37 +120,6 @@ contains
       end do
     end do
   end subroutine fill_tables
-
-  !> Store the weights of all clusters whose points are not alike.
-  subroutine store_weights(family, model)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    type(work_type) :: work
-    integer(i8) :: n, b
-    integer :: c
-
-    allocate (family%stored(size(family%plain)), source=1_i8)
-    n = 0_i8
-    do c = 1, size(family%plain)
-      if (family%plain(c) == 1_i1) cycle
-      family%stored(c) = n + 1
-      n = n + family%start(c + 1) - family%start(c)
-    end do
-    allocate (family%weight_S(lanes, n))
-    allocate (family%weight_D(lanes, merge(n, 0_i8, model%dilatation)))
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model) private(work, b, c)
-    do c = 1, size(family%plain)
-      if (family%plain(c) == 1_i1) cycle
-      call take_up(family, c, work)
-      call fill_tables(family, model, family%bits(family%start(c):family%start(c + 1) - 1), &
-        & .false., work)
-      b = family%stored(c)
-      associate (n => work%n)
-        family%weight_S(:, b:b + n - 1) = work%stretch(:, :n)/work%geometry(:, :n)
-        if (model%dilatation) family%weight_D(:, b:b + n - 1) = work%dilatation(:, :n)
-      end associate
-    end do
-  end subroutine store_weights
 
   !> theta of the lanes.
   pure subroutine general_theta(family, model, work, theta)
