@@ -9,7 +9,7 @@ module pd_force_list
   use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
     & no_tables, pass_loop, task_type, weights_alone
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy, take_up
+    & general_energy, take_given, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
   use pd_force_list_tables, only: drop_tables, make_tables
   use pd_force_model, only: model_type
@@ -112,7 +112,12 @@ contains
 
     call prepare_list(family, model)
     call new_loops(family, model, for_force, loops)
-    call gather_state(family, u, p)
+    ! with a dilatation, the pass before has gathered the displacements
+    if (model%dilatation) then
+      call gather_p(family, p)
+    else
+      call gather_state(family, u)
+    end if
     !$omp parallel do schedule(dynamic, 32) default(none) &
     !$omp shared(family, model, force, strained, loops) private(work, sums, strain, c, d)
     do c = 1, size(family%large)
@@ -153,6 +158,7 @@ contains
     !$omp private(work, sums, missed, c, k, l)
     do c = 1, size(family%large)
       call take_up(family, c, work)
+      call take_given(family, work)
       if (model%thermal) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
@@ -260,23 +266,40 @@ contains
       & family%weight_D(:, d:), family%weight_S(:, b:), work%own, task, sums, missed)
   end subroutine run_loop
 
-  !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
-  !> then stands in one place.
-  subroutine gather_state(family, u, p)
+  !> Copy displacements, point by point: what a bond needs of its other end then stands in one
+  !> place.
+  subroutine gather_state(family, u)
     type(list_family_type), intent(inout) :: family
     real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(in), contiguous, optional :: p(:)
-    integer :: k, c
+    integer :: k
 
-    !$omp parallel do schedule(static) default(none) shared(family, u, p) private(k, c)
-    do k = 1, family%n_slots
-      do c = 1, size(u, 2)
-        family%at(at_moved + c, k) = u(k, c)
+    select case (size(u, 2))
+    case (3)
+      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
+      do k = 1, family%n_slots
+        family%at(at_moved + 1:at_moved + 3, k) = u(k, :3)
       end do
-      if (.not. present(p)) cycle
-      if (size(p) > 0) family%at(at_p, k) = p(k)
-    end do
+    case (2)
+      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
+      do k = 1, family%n_slots
+        family%at(at_moved + 1:at_moved + 2, k) = u(k, :2)
+      end do
+    case default
+      family%at(at_moved + 1, :) = u(:, 1)
+    end select
   end subroutine gather_state
+
+  !> Copy the dilatation coefficients beside them.
+  subroutine gather_p(family, p)
+    type(list_family_type), intent(inout) :: family
+    real(wp), intent(in), contiguous :: p(:)
+    integer :: k
+
+    !$omp parallel do schedule(static) default(none) shared(family, p) private(k)
+    do k = 1, family%n_slots
+      family%at(at_p, k) = p(k)
+    end do
+  end subroutine gather_p
 
   ! ---------------------------------------------------------------- breaking
 

@@ -12,7 +12,8 @@ module pd_force_list_general
   use pd_force_model, only: model_type
   implicit none (type, external)
   private
-  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up
+  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up, &
+    & take_given
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
@@ -44,10 +45,22 @@ contains
     do d = 1, at_p
       do l = 1, lanes
         work%own(l, d) = family%at(d, work%first + l - 1)
-        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
       end do
     end do
   end subroutine take_up
+
+  !> Take what the model gives its slots, too.
+  pure subroutine take_given(family, work)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(inout) :: work
+    integer :: d, l
+
+    do d = 1, at_p
+      do l = 1, lanes
+        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
+      end do
+    end do
+  end subroutine take_given
 
   !> Room for the tables of any cluster.
   subroutine allocate_tables(family, work)
@@ -74,6 +87,7 @@ contains
     integer :: i, j, m, f
 
     call allocate_tables(family, work)
+    call take_given(family, work)
     do i = 1, work%n
       e = family%start(work%cluster) + i - 1
       j = family%member(1, e)
