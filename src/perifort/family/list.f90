@@ -3,7 +3,9 @@
 !> are packs of each cluster's members: one, or two that no lane has both in its family, with a bit
 !> for every lane that has a bond. The loops take the eight lanes of one pack at a time.
 !>
-!> Nothing else is stored: xi, |xi| and v_c come from the points, but for exact volumes.
+!> Nothing else of the family is stored: xi, |xi| and v_c come from the points, but for exact
+!> volumes. Tables of what they and the model give are kept for the loops, where it helps them
+!> (`pd_force_list_tables`).
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8

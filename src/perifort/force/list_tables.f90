@@ -18,6 +18,13 @@ module pd_force_list_tables
   !> What all shapes may take [bytes], and what they may take for each slot beside.
   integer(i8), parameter :: room = 16777216_i8, bytes_per_slot = 100_i8
 
+  !> What the values of each lane are multiplied with, so that their sum may stand for them in a
+  !> key: of 20 bits, so that nothing overflows, and odd.
+  integer(i8), parameter :: factors(lanes, 3) = reshape([648055_i8, 353197_i8, 1001289_i8, &
+    & 772423_i8, 127641_i8, 885667_i8, 514229_i8, 290531_i8, 961333_i8, 431747_i8, 705961_i8, &
+    & 218645_i8, 839211_i8, 573859_i8, 162907_i8, 1020703_i8, 387433_i8, 743551_i8, 95621_i8, &
+    & 916157_i8, 619789_i8, 254043_i8, 807331_i8, 468977_i8], [lanes, 3])
+
   !> Clusters with one key.
   type :: kinds_type
     integer(i4), allocatable :: of(:)     !! number of each cluster's kind, 0: none
@@ -153,28 +160,21 @@ contains
   pure integer(i8) function shape_key(family, c) result(key)
     type(list_family_type), intent(in) :: family
     integer, intent(in) :: c  !! cluster
-    integer(i8), parameter :: low = 2097151_i8  ! 21 bits
     real(wp), parameter :: off = 0.37_wp
-    real(wp) :: scale
+    real(wp) :: geometry(lanes, columns(family)), scale
     integer(i8) :: e, value
-    integer :: l, d, j, k
+    integer :: d
 
     scale = 65536/family%rule%delta
     key = packs_of(family, c)
     do e = family%start(c), family%start(c + 1) - 1
-      key = mix(key, ior(ishft(iand(int(family%first(e), i8), 255_i8), 8), &
-        & iand(int(family%bits(e), i8), 255_i8)))
-      do l = 1, lanes
-        if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
-        k = lanes*(c - 1) + l
-        j = family%member(merge(1, 2, iand(family%first(e), lane_bit(l)) /= 0_i1), e)
-        value = 0_i8
-        do d = 1, family%dim
-          value = ior(ishft(value, 21), iand(nint((family%at(d, j) - family%at(d, k))*scale + off, &
-            & i8), low))
-        end do
-        key = mix(key, value)
+      call geometry_of(family, c, e, geometry)
+      value = ior(ishft(iand(int(family%first(e), i8), 255_i8), 8), &
+        & iand(int(family%bits(e), i8), 255_i8))
+      do d = 1, family%dim
+        value = value + sum(factors(:, d)*nint(geometry(:, d)*scale + off, i8))
       end do
+      key = mix(key, value)
     end do
   end function shape_key
 
@@ -206,21 +206,22 @@ contains
     type(work_type), intent(in) :: work
     integer(i8), intent(in) :: shape  !! number of its shape
     real(wp) :: most_S, most_D
-    integer :: i, l
+    integer(i8) :: value
+    integer :: i
 
     most_S = max(tiny(1.0_wp), maxval(abs(work%stretch(:, :work%n))))
     most_D = max(tiny(1.0_wp), maxval(work%dilatation(:, :work%n)))
-    key = mix(shape, bits_of(fraction(most_S) + fraction(most_D)/3))
+    key = mix(shape, int(bits_of(fraction(most_S) + fraction(most_D)/3), i8))
     do i = 1, work%n
-      do l = 1, lanes
-        key = mix(key, ieor(bits_of(work%stretch(l, i)/most_S), &
-          & merge(ishft(bits_of(work%dilatation(l, i)/most_D), 32), 0_i8, model%dilatation)))
-      end do
+      value = sum(factors(:, 1)*bits_of(work%stretch(:, i)/most_S))
+      if (model%dilatation) value = value &
+        & + sum(factors(:, 2)*bits_of(work%dilatation(:, i)/most_D))
+      key = mix(key, value)
     end do
   end function weight_key
 
   !> A value's bits in single precision.
-  pure integer(i8) function bits_of(value)
+  elemental integer(i4) function bits_of(value)
     real(wp), intent(in) :: value
     bits_of = transfer(real(value, sp), 0_i4)
   end function bits_of
