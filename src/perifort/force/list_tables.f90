@@ -402,19 +402,23 @@ contains
     integer, intent(in) :: c
     integer(i8), intent(in) :: e
     real(wp), intent(out) :: geometry(:, :)  !! (lane, column)
-    integer :: l, d, j, n
+    real(wp) :: square(lanes)
+    logical :: there(lanes), from(lanes)
+    integer :: d, j, m, k
 
-    n = columns(family)
-    geometry(:, :n - 1) = 0.0_wp
-    geometry(:, n) = 1.0_wp
-    do l = 1, lanes
-      if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
-      j = family%member(merge(1, 2, iand(family%first(e), lane_bit(l)) /= 0_i1), e)
-      do d = 1, family%dim
-        geometry(l, d) = family%at(d, j) - family%at(d, lanes*(c - 1) + l)
-      end do
-      geometry(l, n) = 2/sum(geometry(l, :n - 1)**2)
+    j = family%member(1, e)
+    m = family%member(2, e)
+    k = lanes*(c - 1)
+    from = iand(family%first(e), lane_bit) /= 0_i1
+    there = iand(family%bits(e), lane_bit) /= 0_i1
+    geometry = 0.0_wp
+    square = 0.0_wp
+    do d = 1, family%dim
+      geometry(:, d) = merge(merge(family%at(d, j), family%at(d, m), from) &
+        & - family%at(d, k + 1:k + lanes), 0.0_wp, there)
+      square = square + geometry(:, d)**2
     end do
+    geometry(:, columns(family)) = 2/merge(square, 2.0_wp, there)
   end subroutine geometry_of
 
   !> Columns of a pack in `geometry`. The loops have two components at least.
