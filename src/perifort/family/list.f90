@@ -3,7 +3,9 @@
 !> are packs of each cluster's members: one, or two that no lane has both in its family, with a bit
 !> for every lane that has a bond. The loops take the eight lanes of one pack at a time.
 !>
-!> Nothing else is stored: xi, |xi| and v_c come from the points, but for exact volumes.
+!> Nothing else of the family is stored: xi, |xi| and v_c come from the points, but for exact
+!> volumes. Tables of what they and the model give are kept for the loops, where it helps them
+!> (`pd_force_list_tables`).
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
@@ -37,11 +39,16 @@ module pd_family_list
                                                !! displacement and p of the pass (8, n_slots)
     real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
     integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike: set by
-                                               !! the first pass (`pd_force_list_points`)
-    integer(i8), allocatable :: stored(:)      !! place of the other clusters' first pack in
+                                               !! the first pass (`pd_force_list_points`), as are
+    integer(i8), allocatable :: stored(:)      !! the place of each cluster's first pack in
     real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
     real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
-                                               !! of all bonds, intact or not
+                                               !! of all bonds, intact or not; 0: has none; and
+    integer(i8), allocatable :: shape(:)       !! that of its first column in
+    real(wp), allocatable :: geometry(:, :)    !! xi and 2/|xi|^2 (lanes, columns of each pack)
+    integer :: least_shared = 8                !! clusters that tables are made for, if they share
+                                               !! them; tests take fewer or more
+    integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
@@ -230,10 +237,11 @@ contains
     class(list_family_type), intent(in) :: family  !! the family
     ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
     bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
-      & + 18_i8*size(family%large)
+      & + 26_i8*size(family%large)
     if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
     if (allocated(family%weight_D)) bytes = bytes + 8*size(family%weight_D, kind=i8)
     if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
+    if (allocated(family%geometry)) bytes = bytes + 8*size(family%geometry, kind=i8)
   end function bytes
 
   !> How many bonds a pack has on average and why it is no lattice, in a line.

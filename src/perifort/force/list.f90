@@ -6,10 +6,12 @@ module pd_force_list
   use pd_base_lanes, only: lanes
   use pd_family_list, only: list_family_type, at_moved, at_p
   use pd_force_general, only: mark_slot
-  use pd_force_list_fast, only: choose_loop, for_energy, for_force, for_theta, pass_loop, task_type
+  use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
+    & no_tables, pass_loop, task_type, weights_alone
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy, store_weights, take_up
+    & general_energy, take_given, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
+  use pd_force_list_tables, only: drop_tables, make_tables
   use pd_force_model, only: early, force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
@@ -22,16 +24,17 @@ module pd_force_list
 
   !> The loops of a pass, and the strains that they serve.
   type :: loops_type
-    procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters of points alike
-    procedure(pass_loop), pointer, nopass :: stored => null()  !! for those with stored weights
+    procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters without tables,
+    procedure(pass_loop), pointer, nopass :: stored => null()  !! with weights,
+    procedure(pass_loop), pointer, nopass :: shaped => null()  !! with weights and geometry
     type(task_type) :: task                                    !! what is the same for all
     real(wp) :: narrow = 0.0_wp, wide = 0.0_wp                 !! limits of |e|, 0: none
   end type loops_type
 
 contains
 
-  !> Make what the family keeps of the model: which clusters have points alike, and the weights of
-  !> the others. The first pass does it if nobody has; afterwards the model must not change.
+  !> Make what the family keeps of the model: which clusters have points alike, and tables. The
+  !> first pass does it if nobody has; afterwards the model must not change.
   subroutine prepare_list(family, model)
     type(list_family_type), intent(inout) :: family
       !! gets `given`, `plain` and the stored weights; unchanged if it has them
@@ -39,7 +42,7 @@ contains
 
     if (allocated(family%given)) return
     call survey(family, model)
-    call store_weights(family, model)
+    call make_tables(family, model)
   end subroutine prepare_list
 
   !> Drop what the family keeps of the model, which is about to change or has changed: the next pass
@@ -49,9 +52,7 @@ contains
 
     if (.not. allocated(family%given)) return
     deallocate (family%given, family%plain)
-    if (allocated(family%stored)) deallocate (family%stored)
-    if (allocated(family%weight_D)) deallocate (family%weight_D)
-    if (allocated(family%weight_S)) deallocate (family%weight_S)
+    call drop_tables(family)
   end subroutine forget_model
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
@@ -120,7 +121,12 @@ contains
 
     call prepare_list(family, model)
     call new_loops(family, model, options, for_force, loops)
-    call gather_state(family, u, p)
+    ! with a dilatation, the pass before has gathered the displacements
+    if (options%dilatation) then
+      call gather_p(family, p)
+    else
+      call gather_state(family, u)
+    end if
     !$omp parallel do schedule(dynamic, 32) default(none) &
     !$omp shared(family, model, options, force, strained, loops) private(work, sums, strain, c, d)
     do c = 1, size(family%large)
@@ -163,6 +169,7 @@ contains
     !$omp shared(family, model, options, energy, loops) private(work, sums, missed, c, k, l)
     do c = 1, size(family%large)
       call take_up(family, c, work)
+      call take_given(family, work)
       if (options%thermal) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
@@ -191,8 +198,12 @@ contains
     integer, intent(in) :: pass
     type(loops_type), intent(out) :: loops
 
-    call choose_loop(family%dim, pass, .false., options%dilatation, options%projected, loops%plain)
-    call choose_loop(family%dim, pass, .true., options%dilatation, options%projected, loops%stored)
+    call choose_loop(family%dim, pass, no_tables, options%dilatation, options%projected, &
+      & loops%plain)
+    call choose_loop(family%dim, pass, weights_alone, options%dilatation, options%projected, &
+      & loops%stored)
+    call choose_loop(family%dim, pass, all_tables, options%dilatation, options%projected, &
+      & loops%shaped)
     call new_task(family, model, loops%task)
     loops%narrow = fast_limit(model, options, narrow)
     loops%wide = fast_limit(model, options, wide)
@@ -214,7 +225,7 @@ contains
     logical :: missed
 
     task = loops%task
-    if (family%plain(work%cluster) == 1_i1) &
+    if (family%stored(work%cluster) == 0_i8) &
       & call plain_task(family, model, options, work%cluster, task)
     if (strain == little .and. loops%narrow > 0.0_wp) then
       task%limit = loops%narrow
@@ -231,7 +242,7 @@ contains
     strain = beyond
   end subroutine sum_up
 
-  !> The loop that has the weights of the cluster.
+  !> The loop for the tables that the cluster has.
   subroutine run_either(family, work, loops, task, sums, missed)
     type(list_family_type), intent(in) :: family
     type(work_type), intent(in) :: work
@@ -240,10 +251,12 @@ contains
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
 
-    if (family%plain(work%cluster) == 1_i1) then
+    if (family%stored(work%cluster) == 0_i8) then
       call run_loop(family, work, loops%plain, task, sums, missed)
-    else
+    else if (family%shape(work%cluster) == 0_i8) then
       call run_loop(family, work, loops%stored, task, sums, missed)
+    else
+      call run_loop(family, work, loops%shaped, task, sums, missed)
     end if
   end subroutine run_either
 
@@ -255,36 +268,54 @@ contains
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
-    integer(i8) :: e, last, b, f, d
+    integer(i8) :: e, last, b, f, d, s
 
     ! tables that are not there have no second element; loops that need them are not called then
     e = family%start(work%cluster)
     last = e + work%n - 1
-    b = family%stored(work%cluster)
+    b = max(1_i8, family%stored(work%cluster))
+    s = max(1_i8, family%shape(work%cluster))
     f = merge(e, 1_i8, size(family%fraction) > 0)
     d = merge(b, 1_i8, size(family%weight_D) > 0)
     call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
-      & family%at, family%given, family%fraction(:, f:), family%weight_D(:, d:), &
-      & family%weight_S(:, b:), work%own, task, sums, missed)
+      & family%at, family%given, family%fraction(:, f:), family%geometry(:, s:), &
+      & family%weight_D(:, d:), family%weight_S(:, b:), work%own, task, sums, missed)
   end subroutine run_loop
 
-  !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
-  !> then stands in one place.
-  subroutine gather_state(family, u, p)
+  !> Copy displacements, point by point: what a bond needs of its other end then stands in one
+  !> place.
+  subroutine gather_state(family, u)
     type(list_family_type), intent(inout) :: family
     real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(in), contiguous, optional :: p(:)
-    integer :: k, c
+    integer :: k
 
-    !$omp parallel do schedule(static) default(none) shared(family, u, p) private(k, c)
-    do k = 1, family%n_slots
-      do c = 1, size(u, 2)
-        family%at(at_moved + c, k) = u(k, c)
+    select case (size(u, 2))
+    case (3)
+      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
+      do k = 1, family%n_slots
+        family%at(at_moved + 1:at_moved + 3, k) = u(k, :3)
       end do
-      if (.not. present(p)) cycle
-      if (size(p) > 0) family%at(at_p, k) = p(k)
-    end do
+    case (2)
+      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
+      do k = 1, family%n_slots
+        family%at(at_moved + 1:at_moved + 2, k) = u(k, :2)
+      end do
+    case default
+      family%at(at_moved + 1, :) = u(:, 1)
+    end select
   end subroutine gather_state
+
+  !> Copy the dilatation coefficients beside them.
+  subroutine gather_p(family, p)
+    type(list_family_type), intent(inout) :: family
+    real(wp), intent(in), contiguous :: p(:)
+    integer :: k
+
+    !$omp parallel do schedule(static) default(none) shared(family, p) private(k)
+    do k = 1, family%n_slots
+      family%at(at_p, k) = p(k)
+    end do
+  end subroutine gather_p
 
   ! ---------------------------------------------------------------- breaking
 

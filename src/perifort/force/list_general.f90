@@ -12,8 +12,8 @@ module pd_force_list_general
   use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
-  public :: work_type, fill_tables, general_theta, general_force, general_energy, store_weights
-  public :: take_up
+  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up, &
+    & take_given
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
@@ -46,10 +46,22 @@ contains
     do d = 1, at_p
       do l = 1, lanes
         work%own(l, d) = family%at(d, work%first + l - 1)
-        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
       end do
     end do
   end subroutine take_up
+
+  !> Take what the model gives its slots, too.
+  pure subroutine take_given(family, work)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(inout) :: work
+    integer :: d, l
+
+    do d = 1, at_p
+      do l = 1, lanes
+        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
+      end do
+    end do
+  end subroutine take_given
 
   !> Room for the tables of any cluster.
   subroutine allocate_tables(family, work)
@@ -77,6 +89,7 @@ contains
     integer :: i, j, m, f
 
     call allocate_tables(family, work)
+    call take_given(family, work)
     do i = 1, work%n
       e = family%start(work%cluster) + i - 1
       j = family%member(1, e)
@@ -123,38 +136,6 @@ contains
       end do
     end do
   end subroutine fill_tables
-
-  !> Store the weights of all clusters whose points are not alike.
-  subroutine store_weights(family, model)
-    type(list_family_type), intent(inout) :: family
-      !! surveyed; gets `stored`, `weight_S` and, with a dilatation, `weight_D`
-    type(model_type), intent(in) :: model  !! parameters of the slots
-    type(work_type) :: work
-    integer(i8) :: n, b
-    integer :: c
-
-    allocate (family%stored(size(family%plain)), source=1_i8)
-    n = 0_i8
-    do c = 1, size(family%plain)
-      if (family%plain(c) == 1_i1) cycle
-      family%stored(c) = n + 1
-      n = n + family%start(c + 1) - family%start(c)
-    end do
-    allocate (family%weight_S(lanes, n))
-    allocate (family%weight_D(lanes, merge(n, 0_i8, model%dilatation)))
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model) private(work, b, c)
-    do c = 1, size(family%plain)
-      if (family%plain(c) == 1_i1) cycle
-      call take_up(family, c, work)
-      call fill_tables(family, model, family%bits(family%start(c):family%start(c + 1) - 1), &
-        & .false., work)
-      b = family%stored(c)
-      associate (n => work%n)
-        family%weight_S(:, b:b + n - 1) = work%stretch(:, :n)/work%geometry(:, :n)
-        if (model%dilatation) family%weight_D(:, b:b + n - 1) = work%dilatation(:, :n)
-      end associate
-    end do
-  end subroutine store_weights
 
   !> theta of the lanes.
   pure subroutine general_theta(family, model, options, work, theta)

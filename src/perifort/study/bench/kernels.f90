@@ -10,7 +10,7 @@ module pd_study_bench_kernels
   use pd_family_family, only: family_type
   use pd_family_lattice, only: both_ends, lattice_family_type
   use pd_family_list, only: list_family_type
-  use pd_force_model, only: dilatation_of, options_of, no_dilatation, unprojected
+  use pd_force_model, only: dilatation_of, options_of, no_dilatation, projected, unprojected
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: evaluate, system_type
@@ -251,26 +251,30 @@ contains
   !> Lattice, both loops: eta d, x and e 2(2d - 1), 2x + g e 3, polynomial 15. Dilatation: sum 4.
   !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. Where a bond is computed
   !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
-  !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
-  !> loops: xi and eta 2d, |xi|^2, x and e 3(2d - 1), the rest of them and the weight 9, polynomial
-  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more;
-  !> stored weights save 6 and are not counted.
-  !> Unprojected, the sum of the dilatation is 2 less, and what it adds to the force 3.
+  !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. Unprojected, the sum
+  !> of the dilatation is 2 less, and what it adds to the force 3.
+  !>
+  !> List, both loops: eta d, e 4d, projected 2 more, polynomial 15. Dilatation: sum 2, projected 5.
+  !> Force: magnitude 2, direction and sums 3d, with a dilatation 5 more, projected 9. Without
+  !> stored geometry, both loops: xi d, |xi|^2 2d - 1, root and division 2, weight 3.
   pure real(wp) function flops_of_bond(family, kind) result(flops)
     class(family_type), intent(in) :: family  !! of lists or of one lattice; any other kind is an
                                               !! internal fault
     integer, intent(in) :: kind  !! of the dilatation, see `dilatation_of`
-    integer :: d, geometry
+    real(wp) :: geometry
+    integer :: d
     logical :: dilatation
 
     dilatation = kind /= no_dilatation
     d = family%dim
     select type (family)
     type is (list_family_type)
-      geometry = 2*d + 3*(2*d - 1) + 9 + 15
-      flops = geometry + 4 + 3*d
-      if (dilatation) flops = flops + 9 + geometry + 4
-      if (kind == unprojected) flops = flops - 5
+      geometry = 5*d + 15
+      if (allocated(family%shape)) geometry = geometry + (3*d + 4)*count(family%shape == 0_i8) &
+        & /real(max(1, size(family%shape)), wp)
+      flops = geometry + 2 + 3*d
+      if (dilatation) flops = flops + 5 + geometry + 2
+      if (kind == projected) flops = flops + 2 + 4 + 2 + 3
     type is (lattice_family_type)
       geometry = d + 2*(2*d - 1) + 3 + 15
       if (family%mixed) geometry = geometry + 2*d - 4
@@ -291,7 +295,8 @@ contains
   !> sums are set to zero and read, and p is made of theta in a loop of its own. In mixed precision
   !> u is split and p rounded, and sums for both ends are set, added to and read. Lists, by each
   !> pass: number and bits of every cluster's members, and what a point has in one place, read and
-  !> written with the displacements in it, and read again by the loop.
+  !> written with the displacements in it, and read again by the loop; tables of weights, once for
+  !> all clusters that share them, and of the geometry.
   pure real(wp) function bytes_of_step(system) result(bytes)
     type(system_type), intent(in) :: system  !! gives dimension, points, bonds and model
     integer :: d, passes
@@ -309,6 +314,7 @@ contains
       bytes = bytes + passes*(11*real(size(family%bits), wp) + points*8*3*8)
       if (allocated(family%weight_S)) bytes = bytes + 8*(real(size(family%weight_S), wp) &
         & + 2*real(size(family%weight_D), wp))
+      if (allocated(family%geometry)) bytes = bytes + passes*8*real(size(family%geometry), wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
       both = both_ends(d, family%mixed)
