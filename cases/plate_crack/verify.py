@@ -59,15 +59,15 @@ def main():
               relative=0.06)
     case.below("   below the Rayleigh speed [m/s]", speed, RAYLEIGH)
     part, off, columns = branched(slow, CRACKED)
-    case.above("20 m/s: columns that the crack has crossed", columns, 250)
+    case.above("20 m/s: columns that the crack has crossed, regression", columns, 250)
     case.equal("   of them with more than one band", f"{100 * part:.0f} %", "0 %")
     case.below("   largest distance of the crack from its line, in spacings", off / SPACING, 5.0)
     runs = {"slow": slow}
     if not case.options.quick:
         fast = runs["fast"] = case.run("fast.nml")
         part, off, columns = branched(fast, CRACKED)
-        case.above("50 m/s, horizon 3 spacings: columns crossed", columns, 200)
-        case.above("   part of them with two bands or more", part, 0.25)
+        case.above("50 m/s, horizon 3 spacings: columns crossed, regression", columns, 200)
+        case.above("   part of them with two bands or more, regression", part, 0.25)
         case.above("   largest distance of a branch from the crack's line [m]", off, 2e-3)
         short = runs["short"] = case.run("fast_short_horizon.nml")
         part, off, columns = branched(short, CRACKED_SHORT)
