@@ -2,8 +2,8 @@
 !> brings the forces up to date. Integrators and relaxation work on this type alone.
 module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_numbers, only: inner
-  use pd_body_body, only: body_type
+  use pd_base_reduce, only: add_point, inner, new_running, running_type, total_of_running
+  use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
   use pd_force_forces, only: dilatation_pass, force_pass, energy_pass
@@ -135,6 +135,8 @@ contains
     if (late) call settle_account(system)
     associate (state => system%state, model => system%model)
       call impose(system%motions, t, state%u, state%v)
+      call share_halo(system%body, state%u)
+      if (model%breaking) call share_halo(system%body, state%v)
       call bring_temperature(system, t)
       if (model%dilatation) then
         call dilatation_pass(system%family, model, state%u, state%p, system%strained)
@@ -142,6 +144,7 @@ contains
           call break_marked(system, t, pair, slots)
           call renew_dilatation(system, slots)
         end if
+        call share_halo(system%body, state%p)
         call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
       else
         call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
@@ -150,6 +153,7 @@ contains
           call renew_force(system, slots)
         end if
       end if
+      call share_halo(system%body, state%force)
     end associate
     if (late) call break_marked(system, t, pair, slots)
   end subroutine evaluate
@@ -185,7 +189,7 @@ contains
     integer(i8) :: broken
 
     call strained_slots(system%strained, slots)
-    if (size(slots) == 0) return
+    if (size(slots) == 0 .and. .not. associated(system%body%order%ranks)) return
     if (abs(pairing%offset) > 0.0_wp .or. abs(pairing%held) > 0.0_wp) then
       call displacements_at(system, t, pairing, slots, others)
       allocate (products(size(others, 3)))
@@ -343,7 +347,8 @@ contains
     real(wp), intent(in) :: t
     logical, intent(in), optional :: at_rest
     real(wp), allocatable :: applied(:, :)
-    real(wp) :: force, acceleration, mass
+    type(running_type) :: running
+    real(wp) :: force, acceleration, mass, work, totals(6)
     logical :: first, moving
     integer :: m, l, c, i, k, n
 
@@ -364,6 +369,7 @@ contains
           acceleration = 0.0_wp
           if (moving .and. motion%kind(c) == moved_by_velocity) &
             & acceleration = motion%amplitude(c)*motion%curve%slope(t)
+          call new_running(system%body%order, running)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)
@@ -372,21 +378,31 @@ contains
             force = system%state%force(k, c)
             if (allocated(applied)) force = force + applied(k, c)
             force = -force*system%body%volume(k)
-            motion%reaction(c) = motion%reaction(c) + mass*acceleration + force
-            call add_work(system, n, first, system%state%u(k, c), force, mass, system%state%v(k, c))
+            call add_work(system, n, first, work, system%state%u(k, c), force, mass, &
+              & system%state%v(k, c))
+            call add_point(system%body%order, system%body%point(k), &
+              & [mass*acceleration + force, work], running)
           end do
+          totals = total_of_running(system%body%order, running)
+          motion%reaction(c) = totals(1)
+          system%external_work = system%external_work + totals(2)
         end do
       end associate
     end do
     do l = 1, size(system%loads)
       associate (load => system%loads(l))
         do c = 1, system%body%dim
-          if (all(abs(load%density(:, c)) <= 0.0_wp)) cycle
+          if (all(abs(load%density(:, c)) <= 0.0_wp) .and. &
+            & .not. associated(system%body%order%ranks)) cycle
+          call new_running(system%body%order, running)
           do i = 1, size(load%slots)
             k = load%slots(i)
-            call add_work(system, n, first, system%state%u(k, c), &
+            call add_work(system, n, first, work, system%state%u(k, c), &
               & load%density(i, c)*load%curve%value(t)*system%body%volume(k))
+            call add_point(system%body%order, system%body%point(k), [work], running)
           end do
+          totals = total_of_running(system%body%order, running)
+          system%external_work = system%external_work + totals(1)
         end do
       end associate
     end do
@@ -440,26 +456,26 @@ contains
 
     allocate (density(system%body%n_slots))
     call energy_pass(system%family, system%model, system%state%u, density)
-    energy = inner(density, system%body%volume)
+    energy = inner(system%body%order, density, system%body%volume)
   end function strain_energy
 
-  !> One component's share of the work since its last force and place; `n` counts the components.
-  !> With `mass` and the imposed velocity `v` its gain in kinetic energy comes on top.
-  pure subroutine add_work(system, n, first, u, force, mass, v)
+  !> One component's `work` since its last force and place; `n` counts the components. With `mass`
+  !> and the imposed velocity `v` its gain in kinetic energy comes on top.
+  pure subroutine add_work(system, n, first, work, u, force, mass, v)
     type(system_type), intent(inout) :: system
     integer, intent(inout) :: n
     logical, intent(in) :: first
+    real(wp), intent(out) :: work
     real(wp), intent(in) :: u, force
     real(wp), intent(in), optional :: mass, v
 
     n = n + 1
-    if (.not. first) system%external_work = system%external_work &
-      & + (system%last_force(n) + force)/2*(u - system%last_u(n))
+    work = 0.0_wp
+    if (.not. first) work = (system%last_force(n) + force)/2*(u - system%last_u(n))
     system%last_u(n) = u
     system%last_force(n) = force
     if (.not. present(v)) return
-    if (.not. first) system%external_work = system%external_work &
-      & + mass/2*(v - system%last_v(n))*(v + system%last_v(n))
+    if (.not. first) work = work + mass/2*(v - system%last_v(n))*(v + system%last_v(n))
     system%last_v(n) = v
   end subroutine add_work
 
@@ -518,7 +534,7 @@ contains
         density(k) = density(k) + v(k, c)**2
       end do
     end do
-    energies%kinetic = inner(mass, density)/2
+    energies%kinetic = inner(system%body%order, mass, density)/2
   end subroutine energies_of
 
 end module pd_motion_system

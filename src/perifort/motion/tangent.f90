@@ -2,6 +2,8 @@
 !> frequency (spectrum) and solvers that follow the tangent work on it, without a matrix.
 module pd_motion_tangent
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: largest_over, largest_of_ranks, least_over
+  use pd_body_body, only: share_halo
   use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_system, only: system_type
   implicit none (type, external)
@@ -37,14 +39,15 @@ contains
     real(wp) :: length, strain, spacing, step
     logical :: projected
 
-    length = largest(w)
+    length = largest_over(system%body%order, w)
     if (.not. length > 0.0_wp) then
       kw = 0.0_wp
       return
     end if
-    spacing = minval(system%body%spacing, mask=system%body%point > 0)
-    strain = largest(u)/spacing
-    if (system%model%thermal) strain = strain + maxval(abs(system%model%expansion))
+    spacing = least_over(system%body%order, system%body%spacing)
+    strain = largest_over(system%body%order, u)/spacing
+    if (system%model%thermal) strain = strain &
+      & + largest_of_ranks(system%body%order, maxval(abs(system%model%expansion)))
     allocate (moved(size(w, 1), size(w, 2)))
     if (.not. strain > 0.0_wp) then
       step = undeformed_step*spacing/length
@@ -74,13 +77,22 @@ contains
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: force(:, :)
-    real(wp), allocatable :: p(:)
+    real(wp), allocatable :: p(:), shared(:, :)
     integer(i1), allocatable :: strained(:)
 
     associate (n => system%body%n_slots, model => system%model)
       allocate (p(merge(n, 0, model%dilatation)), source=0.0_wp)
       allocate (strained(merge(n, 0, model%breaking)), source=0_i1)
       force = 0.0_wp  ! the passes leave out slots far from any point
+      if (associated(system%body%order%ranks)) then
+        allocate (shared, source=u)
+        call share_halo(system%body, shared)
+        if (model%dilatation) call dilatation_pass(system%family, model, shared, p, strained)
+        if (model%dilatation) call share_halo(system%body, p)
+        call force_pass(system%family, model, shared, p, force, strained)
+        call share_halo(system%body, force)
+        return
+      end if
       if (model%dilatation) call dilatation_pass(system%family, model, u, p, strained)
       call force_pass(system%family, model, u, p, force, strained)
     end associate
@@ -116,20 +128,5 @@ contains
       end do
     end do
   end subroutine difference
-
-  !> The largest size of a component.
-  real(wp) function largest(values)
-    real(wp), intent(in), contiguous :: values(:, :)
-    integer :: k, c
-
-    largest = 0.0_wp
-    do c = 1, size(values, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(values, c) private(k) &
-      !$omp reduction(max:largest)
-      do k = 1, size(values, 1)
-        largest = max(largest, abs(values(k, c)))
-      end do
-    end do
-  end function largest
 
 end module pd_motion_tangent

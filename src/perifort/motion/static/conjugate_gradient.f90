@@ -5,6 +5,7 @@
 !> so, dynamic relaxation goes on.
 module pd_motion_static_conjugate_gradient
   use pd_base_kinds, only: wp, i1
+  use pd_body_body, only: share_halo
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_force_forces, only: dilatation_pass, force_pass
@@ -407,9 +408,13 @@ contains
   subroutine renew_forces(system)
     type(system_type), intent(inout) :: system
     associate (state => system%state, model => system%model)
-      if (model%dilatation) &
-        & call dilatation_pass(system%family, model, state%u, state%p, system%strained)
+      call share_halo(system%body, state%u)
+      if (model%dilatation) then
+        call dilatation_pass(system%family, model, state%u, state%p, system%strained)
+        call share_halo(system%body, state%p)
+      end if
       call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
+      call share_halo(system%body, state%force)
     end associate
   end subroutine renew_forces
 

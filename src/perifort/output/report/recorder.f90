@@ -7,6 +7,8 @@ module pd_output_report_recorder
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
   use pd_base_numbers, only: pi
+  use pd_base_reduce, only: largest_over
+  use pd_body_body, only: gather
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: counted, newline, to_text
@@ -482,10 +484,11 @@ contains
   end subroutine energy_balance
 
   !> Greatest local damage of all points, 0 where nothing can be damaged.
-  pure real(wp) function greatest_damage(system)
+  real(wp) function greatest_damage(system)
     type(system_type), intent(in) :: system
     greatest_damage = 0.0_wp
-    if (size(system%state%damage) > 0) greatest_damage = maxval(system%state%damage)
+    if (size(system%state%damage) > 0) &
+      & greatest_damage = largest_over(system%body%order, system%state%damage)
   end function greatest_damage
 
   !> A field at one slot: the components the dimension has, or one value.
@@ -589,20 +592,19 @@ contains
     subroutine put_vectors(of_slots)
       real(wp), intent(in) :: of_slots(:, :)
       real(wp), allocatable :: of_points(:, :)
-      integer :: i, c
 
       allocate (of_points(system%body%n_points, 3), source=0.0_wp)
-      do c = 1, system%body%dim
-        do i = 1, system%body%n_points
-          of_points(i, c) = of_slots(system%body%slot(i), c)
-        end do
-      end do
+      call gather(system%body, of_slots, of_points)
       call recorder%results%put_field(f, of_points, error)
     end subroutine put_vectors
 
     subroutine put_scalars(of_slots)
       real(wp), intent(in) :: of_slots(:)
-      call recorder%results%put_field(f, of_slots(system%body%slot), error)
+      real(wp), allocatable :: of_points(:)
+
+      allocate (of_points(system%body%n_points))
+      call gather(system%body, of_slots, of_points)
+      call recorder%results%put_field(f, of_points, error)
     end subroutine put_scalars
   end subroutine write_output
 
