@@ -123,6 +123,7 @@ contains
   pure subroutine arrange(body, point)
     type(body_type), intent(inout) :: body
     integer(i4), intent(in) :: point(:)
+    integer(i8) :: before, n_global
     integer :: s
 
     call gather_all(body, point)
@@ -132,8 +133,9 @@ contains
     end do
     ! a dead slot needs a valid material, so that loops over rows need no test
     where (point == 0) body%material = 1_i2
-    call number_points(body%slot, body%order, body%first_owned, body%last_owned, &
-      & body%order%before, body%order%n_global)
+    before = body%order%before
+    n_global = body%order%n_global
+    call number_points(body%slot, body%order, body%first_owned, body%last_owned, before, n_global)
   end subroutine arrange
 
   !> The process owns all points.
