@@ -58,6 +58,10 @@ contains
         end do
       end associate
     end do
+    do p = 1, rigid%pieces%number
+      rigid%piece(p)%loaded = largest_of_ranks(system%body%order, &
+        & merge(1.0_wp, 0.0_wp, rigid%piece(p)%loaded)) > 0.0_wp
+    end do
   end subroutine find_free_motions
 
   !> Place, extent and free motions of the piece that consists of `slots`.

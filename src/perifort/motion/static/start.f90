@@ -126,6 +126,9 @@ contains
       if (.not. system%model%thermal) cycle
       if (abs(system%model%expansion(k)) > 0.0_wp) acted(rigid%pieces%of(k)) = .true.
     end do
+    do k = 1, size(acted)
+      acted(k) = largest_of_ranks(system%body%order, merge(1.0_wp, 0.0_wp, acted(k))) > 0.0_wp
+    end do
   end subroutine find_acted
 
   !> Sum of squares of what the constrained components miss [m2], or all of them.
