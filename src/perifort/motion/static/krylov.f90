@@ -299,6 +299,7 @@ contains
     sums%change = totals(3)
     sums%displacement = totals(4)
     sums%support = force_of_supports(system)
+    call share_halo(system%body, system%state%u)
   end subroutine go_along
 
   !> One component of points in consecutive slots; the terms of the sums are added to what other

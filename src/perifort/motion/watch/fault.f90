@@ -22,7 +22,8 @@ contains
 
   !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
   !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step. `squares`
-  !> gets the sum of the squares of all components, whose rounding depends on the number of threads.
+  !> gets the sum of the squares of all components, whose rounding depends on the number of threads:
+  !> it is a bound for those who watch, and no answer depends on its last digits.
   integer function faulty_slot(system, rate, dt, squares) result(slot)
     type(system_type), intent(in) :: system
     real(wp), intent(in), contiguous :: rate(:, :)
@@ -49,7 +50,8 @@ contains
     largest_sum = largest_of_ranks(system%body%order, largest_sum)
     if (present(squares)) squares = sum_of_all
     slot = 0
-    if (.not. stays_within(system, rate, dt, sum_of_all, largest_sum)) slot = fastest_slot(system, rate)
+    if (.not. stays_within(system, rate, dt, sum_of_all, largest_sum)) &
+      & slot = fastest_slot(system, rate)
   end function faulty_slot
 
   !> An explicit shape, so that the loop runs in vector registers.
