@@ -546,19 +546,50 @@ contains
     !$omp parallel do schedule(static) default(none) shared(order, weight, a, b, sums) &
     !$omp private(i, c, terms, one, other)
     do i = 1, order%blocks
-      terms = 0.0_wp
-      do c = 1, size(a, 2)
-        call take_block(order, i, a(:, c), one)
-        call take_block(order, i, b(:, c), other)
-        terms(:, 1) = terms(:, 1) + one*other
-      end do
-      call take_block(order, i, weight, one)
-      terms(:, 1) = terms(:, 1)*one
+      if (order%in_runs) then
+        call weigh_runs(order, i, weight, a, b, terms(:, 1))
+      else
+        terms = 0.0_wp
+        do c = 1, size(a, 2)
+          call take_block(order, i, a(:, c), one)
+          call take_block(order, i, b(:, c), other)
+          terms(:, 1) = terms(:, 1) + one*other
+        end do
+        call take_block(order, i, weight, one)
+        terms(:, 1) = terms(:, 1)*one
+      end if
       call add_block(order, i, terms, sums)
     end do
     sums_of_all = total_of(order, sums)
     total = sums_of_all(1)
   end function inner_weighted
+
+  !> The terms of a block whose points stand in runs: nothing is copied.
+  pure subroutine weigh_runs(order, block, weight, a, b, terms)
+    type(order_type), intent(in) :: order
+    integer, intent(in) :: block
+    real(wp), intent(in), contiguous :: weight(:), a(:, :), b(:, :)
+    real(wp), intent(out) :: terms(block_points)
+    integer :: r, c, i, at, from, n
+
+    n = sum(order%run_length(order%begin(block):order%begin(block + 1) - 1))
+    if (n < block_points) terms = 0.0_wp
+    do r = order%begin(block), order%begin(block + 1) - 1
+      at = order%run_at(r) - 1
+      from = order%run_slot(r) - 1
+      do i = 1, order%run_length(r)
+        terms(at + i) = a(from + i, 1)*b(from + i, 1)
+      end do
+      do c = 2, size(a, 2)
+        do i = 1, order%run_length(r)
+          terms(at + i) = terms(at + i) + a(from + i, c)*b(from + i, c)
+        end do
+      end do
+      do i = 1, order%run_length(r)
+        terms(at + i) = terms(at + i)*weight(from + i)
+      end do
+    end do
+  end subroutine weigh_runs
 
   !> Sum of the values of all points.
   function sum_over(order, values) result(total)

@@ -260,14 +260,18 @@ contains
     !$omp parallel do schedule(static) default(none) shared(parts, system, krylov, length) &
     !$omp private(block, c, r, first, last, at, terms, taken)
     do block = 1, system%body%order%blocks
-      terms = 0.0_wp
+      ! whole blocks in runs are filled by the first component
+      first = system%body%order%begin(block)
+      last = system%body%order%begin(block + 1) - 1
+      if (.not. system%body%order%in_runs) last = 0
+      if (sum(system%body%order%run_length(first:last)) < block_points) terms = 0.0_wp
       do c = 1, size(krylov%residual, 2)
         if (system%body%order%in_runs) then
           do r = system%body%order%begin(block), system%body%order%begin(block + 1) - 1
             first = system%body%order%run_slot(r)
             last = first + system%body%order%run_length(r) - 1
             at = system%body%order%run_at(r)
-            call go_run(last - first + 1, length, system%body%volume(first:last), &
+            call go_run(last - first + 1, c == 1, length, system%body%volume(first:last), &
               & krylov%direction(first:last, c), krylov%product(first:last, c), &
               & krylov%inverse(first:last, c), system%state%u(first:last, c), &
               & system%state%force(first:last, c), krylov%residual(first:last, c), &
@@ -283,7 +287,7 @@ contains
           call take_block(order, block, system%state%u(:, c), taken(:, 5))
           call take_block(order, block, system%state%force(:, c), taken(:, 6))
           call take_block(order, block, krylov%residual(:, c), taken(:, 7))
-          call go_run(block_points, length, taken(:, 1), taken(:, 2), taken(:, 3), taken(:, 4), &
+          call go_run(block_points, c == 1, length, taken(:, 1), taken(:, 2), taken(:, 3), taken(:, 4), &
             & taken(:, 5), taken(:, 6), taken(:, 7), terms(1, 1), terms(1, 2), terms(1, 3), &
             & terms(1, 4))
           call put_block(order, block, taken(:, 5), system%state%u(:, c))
@@ -303,10 +307,11 @@ contains
   end subroutine go_along
 
   !> One component of points in consecutive slots; the terms of the sums are added to what other
-  !> components have left.
-  pure subroutine go_run(n, length, volume, direction, product, inverse, u, force, residual, &
+  !> components have left, unless it is the `first`.
+  pure subroutine go_run(n, first, length, volume, direction, product, inverse, u, force, residual, &
     & squared, rho, change, displacement)
     integer, intent(in) :: n
+    logical, intent(in) :: first
     real(wp), intent(in) :: length
     real(wp), intent(in) :: volume(n), direction(n), product(n), inverse(n)
     real(wp), intent(inout) :: u(n), force(n), residual(n)
@@ -314,6 +319,21 @@ contains
     real(wp) :: free, left, now
     integer :: k
 
+    if (first) then
+      do k = 1, n
+        free = merge(1.0_wp, 0.0_wp, inverse(k) > 0.0_wp)
+        now = u(k) + length*direction(k)
+        u(k) = now
+        force(k) = force(k) - length*product(k)
+        left = residual(k) - free*length*product(k)
+        residual(k) = left
+        squared(k) = (left*volume(k))**2
+        rho(k) = volume(k)*left**2*inverse(k)
+        change(k) = free*(length*direction(k))**2
+        displacement(k) = free*now**2
+      end do
+      return
+    end if
     do k = 1, n
       free = merge(1.0_wp, 0.0_wp, inverse(k) > 0.0_wp)
       now = u(k) + length*direction(k)
