@@ -287,8 +287,8 @@ contains
           call take_block(order, block, system%state%u(:, c), taken(:, 5))
           call take_block(order, block, system%state%force(:, c), taken(:, 6))
           call take_block(order, block, krylov%residual(:, c), taken(:, 7))
-          call go_run(block_points, c == 1, length, taken(:, 1), taken(:, 2), taken(:, 3), taken(:, 4), &
-            & taken(:, 5), taken(:, 6), taken(:, 7), terms(1, 1), terms(1, 2), terms(1, 3), &
+          call go_run(block_points, c == 1, length, taken(:, 1), taken(:, 2), taken(:, 3), &
+            & taken(:, 4), taken(:, 5), taken(:, 6), taken(:, 7), terms(1, 1), terms(1, 2), terms(1, 3), &
             & terms(1, 4))
           call put_block(order, block, taken(:, 5), system%state%u(:, c))
           call put_block(order, block, taken(:, 6), system%state%force(:, c))
@@ -308,8 +308,8 @@ contains
 
   !> One component of points in consecutive slots; the terms of the sums are added to what other
   !> components have left, unless it is the `first`.
-  pure subroutine go_run(n, first, length, volume, direction, product, inverse, u, force, residual, &
-    & squared, rho, change, displacement)
+  pure subroutine go_run(n, first, length, volume, direction, product, inverse, u, force, &
+    & residual, squared, rho, change, displacement)
     integer, intent(in) :: n
     logical, intent(in) :: first
     real(wp), intent(in) :: length
