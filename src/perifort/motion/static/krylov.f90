@@ -288,8 +288,8 @@ contains
           call take_block(order, block, system%state%force(:, c), taken(:, 6))
           call take_block(order, block, krylov%residual(:, c), taken(:, 7))
           call go_run(block_points, c == 1, length, taken(:, 1), taken(:, 2), taken(:, 3), &
-            & taken(:, 4), taken(:, 5), taken(:, 6), taken(:, 7), terms(1, 1), terms(1, 2), terms(1, 3), &
-            & terms(1, 4))
+            & taken(:, 4), taken(:, 5), taken(:, 6), taken(:, 7), terms(1, 1), terms(1, 2), &
+            & terms(1, 3), terms(1, 4))
           call put_block(order, block, taken(:, 5), system%state%u(:, c))
           call put_block(order, block, taken(:, 6), system%state%force(:, c))
           call put_block(order, block, taken(:, 7), krylov%residual(:, c))
