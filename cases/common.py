@@ -44,11 +44,19 @@ class Results:
             self.outputs = int(steps.attrs["NSteps"])
             self.times = steps["Values"][:self.outputs]
             self.fields = sorted(root["PointData"])
+            self.field_units = {name: text(data.attrs.get("units", ""))
+                                for name, data in root["PointData"].items()}
+            # Names of the components; of scalars none
+            self.components = {name: text(data.attrs.get("components", "")).split()
+                               for name, data in root["PointData"].items()}
             self.volume = file["points/volume"][()]
             self.layer = file["points/layer"][()]
             self.history = {name: data[()] for name, data in file["history"].items()}
             self.units = {name: text(data.attrs.get("units", ""))
                           for name, data in file["history"].items()}
+            # 'run', 'boundary' or 'probe': what a column belongs to
+            self.origins = {name: text(data.attrs.get("origin", ""))
+                            for name, data in file["history"].items()}
             self.scene = text(file["scene/text"][()])
 
     def field(self, name, output=-1):

@@ -9,6 +9,7 @@ is the folder of the results or of the study, or the .vtkhdf or study.csv file.
 """
 import argparse
 import csv
+import re
 import sys
 from pathlib import Path
 
@@ -22,32 +23,35 @@ from matplotlib.ticker import MaxNLocator  # noqa: E402
 
 from common import Results  # noqa: E402
 
-UNITS = {"displacement": "m", "velocity": "m/s", "force_density": "N/m$^3$",
-         "energy_density": "J/m$^3$"}
-ENERGIES = ("kinetic_energy", "strain_energy", "dissipated_energy", "external_work")
-NOT_OF_PROBES = {"step", "time", "broken_bonds", "maximum_damage", "step_size", "residual",
-                 "load_step", *ENERGIES}
-
 
 def values_of(results, name, output=-1):
-    """Values (n) of a field, of a component of it ('displacement_x'), or a vector's magnitude; and
-    a label.
+    """Values (n) of a field, of a component of it ('displacement_x', 'NAME_xy'), or the magnitude
+    of a vector or tensor; and a label.
     """
+    base, _, component = name.rpartition("_")
     if name in results.fields:
+        base = name
         values = results.field(name, output)
         label = name.replace("_", " ")
         if values.ndim == 2:
-            values, label = np.linalg.norm(values, axis=1), f"|{label}|"
-        base = name
-    elif len(name) > 2 and name[-2] == "_" and name[-1] in "xyz" and name[:-2] in results.fields:
-        base = name[:-2]
-        values = results.field(base, output)[:, "xyz".index(name[-1])]
-        label = f"{base.replace('_', ' ')} {name[-1]}"
+            # A tensor's components off the diagonal stand for two each
+            twice = [len(set(c)) for c in results.components[name]]
+            values, label = np.sqrt((values**2) @ twice), f"|{label}|"
+    elif base in results.fields and component in results.components[base]:
+        values = results.field(base, output)[:, results.components[base].index(component)]
+        label = f"{base.replace('_', ' ')} {component}"
     else:
         raise KeyError(f"{results.path.name} has no field '{name}'; "
                        f"it has {', '.join(results.fields)} "
                        "(a vector's component: displacement_x)")
-    return values, label + (f" [{UNITS[base]}]" if base in UNITS else "")
+    return values, label + in_brackets(results.field_units[base])
+
+
+def in_brackets(unit):
+    """A unit as an axis shows it, with raised exponents; nothing for a number without one."""
+    if unit in ("", "1"):
+        return ""
+    return " [" + re.sub(r"(\d+)", r"$^\1$", unit) + "]"
 
 
 def dimension_of(points):
@@ -237,7 +241,9 @@ def history_pictures(results, folder):
     else:
         across, label, style = h["time"], "time [s]", {}
         figure, axes = plt.subplots(2, 1, figsize=(7.5, 6), sharex=True, height_ratios=(3, 1))
-    for name in ENERGIES:
+    energies = [name for name in h
+                if results.origins[name] == "run" and results.units[name] == "J"]
+    for name in energies:
         if not (relaxation and name == "kinetic_energy"):
             axes[0].plot(across, h[name], label=name.replace("_", " "), **style)
     axes[0].set(ylabel="energy [J]")
@@ -251,8 +257,8 @@ def history_pictures(results, folder):
     finish_history(axes[-1], label, relaxation)
     save(figure, folder / "energies.png")
 
-    reactions = [name for name in h if "_reaction_" in name]
-    probes = [name for name in h if name not in NOT_OF_PROBES and name not in reactions]
+    reactions = [name for name in h if results.origins[name] == "boundary"]
+    probes = [name for name in h if results.origins[name] == "probe"]
     units = {}
     for name in probes:
         units.setdefault(results.units.get(name, ""), []).append(name)
@@ -265,7 +271,7 @@ def history_pictures(results, folder):
         for axis, (unit, names) in zip(axes[:, 0], panels):
             for name in names:
                 axis.plot(across, h[name], linewidth=1, label=name.replace("_", " "), **style)
-            axis.set(ylabel=f"[{unit}]")
+            axis.set(ylabel=in_brackets(unit).strip() or "[-]")
             axis.grid(alpha=0.3)
             axis.legend(fontsize=8)
         finish_history(axes[-1, 0], label, relaxation)

@@ -13,7 +13,8 @@ module bodies
   use comparisons, only: expect => close_number, text_of
   use testdrive, only: error_type, test_failed
   use pd_output_report_before, only: foresee_output
-  use pd_output_report_recorder, only: probe_type
+  use pd_output_fields_table, only: all_fields
+  use pd_output_report_probes, only: probe_type
   implicit none (type, external)
   private
   public :: prepare_run, box_scene, ready, ready_alone, expect, expect_true, noise, shake, &
@@ -202,7 +203,7 @@ contains
     type(fault_type), allocatable, intent(out) :: error
     type(probe_type), allocatable :: probes(:)
     call prepare(scene, set_up, error)
-    if (.not. allocated(error)) call foresee_output(scene, set_up, probes, error)
+    if (.not. allocated(error)) call foresee_output(scene, all_fields(), set_up, probes, error)
   end subroutine prepare_run
 
 end module bodies

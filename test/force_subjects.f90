@@ -14,8 +14,8 @@ module force_subjects
   use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
     & volume_linear_extended, &
     & volume_exact
-  use pd_force_forces, only: dilatation_pass, force_pass
-  use pd_force_model, only: model_type, new_model
+  use pd_force_forces, only: internal_force
+  use pd_force_model, only: model_type, new_model, options_of
   use pd_force_weights, only: build_weights
   use pd_scene_content_types, only: crack_group
   use bodies, only: noise, youngs_modulus
@@ -24,8 +24,9 @@ module force_subjects
   public :: subject_type, kinds, tolerance, spacing, build, build_pair, subject_number, &
     & name_of, fast_force, some_gradient
 
-  !> The kinds of families that must keep the contract.
-  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'lattice', 'mixed']
+  !> The kinds of families that must keep the contract. `tables`: lists where every cluster has
+  !> tables, also those that no other shares.
+  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'tables', 'lattice', 'mixed']
 
   !> Of every body here [m]; a power of 2, so that positions are exact.
   real(wp), parameter :: spacing = 2.0_wp**(-10)
@@ -47,7 +48,9 @@ module force_subjects
     logical :: breaking = .false.
     logical :: cloud = .false.               !! lists: points off the lattice, spacings that differ
     integer :: rule = volume_linear
-    integer(i8) :: key_bits = not(0_i8)      !! lattices: bits of keys that count
+    integer(i8) :: key_bits = not(0_i8)      !! bits of keys that count
+    integer :: least_shared = 8              !! lists: clusters that share tables, at least
+    integer :: points(3) = 0                 !! along each direction, 0: few
     type(body_type) :: body
     class(family_type), allocatable :: family
     type(model_type) :: model
@@ -56,21 +59,24 @@ module force_subjects
 contains
 
   !> The one place that knows the kinds of families.
-  subroutine build_family(kind, body, rule, breakable, key_bits, family)
+  subroutine build_family(kind, body, rule, breakable, key_bits, least_shared, family)
     character(*), intent(in) :: kind
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
     logical, intent(in) :: breakable
     integer(i8), intent(in) :: key_bits
+    integer, intent(in) :: least_shared
     class(family_type), allocatable, intent(out) :: family
     type(list_family_type), allocatable :: list
     type(lattice_family_type), allocatable :: lattice
     type(fault_type), allocatable :: fault
 
     select case (kind)
-    case ('list')
+    case ('list', 'tables')
       allocate (list)
       call new_list_family(body, rule, list)
+      list%key_bits = key_bits
+      list%least_shared = merge(1, least_shared, kind == 'tables')
       call move_alloc(list, family)
     case default
       allocate (lattice)
@@ -113,6 +119,7 @@ contains
     case (2); count(:2) = [11, 9]
     case default; count = [8, 7, 6]
     end select
+    if (subject%points(1) > 0) count = subject%points
     call allocate_points(subject%body, subject%dim, product(count))
     associate (body => subject%body)
       n = 0
@@ -157,7 +164,8 @@ contains
         call keep_points(body, keep)
       end if
       call build_family(subject%kind, body, volume_rule_type(subject%rule, delta), &
-        & subject%crack .or. subject%breaking, subject%key_bits, subject%family)
+        & subject%crack .or. subject%breaking, subject%key_bits, subject%least_shared, &
+        & subject%family)
       allocate (temperature_change(body%n_slots), source=0.0_wp)
       if (subject%thermal) then
         do i = 1, body%n_slots
@@ -224,7 +232,7 @@ contains
     integer, parameter :: variants = 16
     integer :: extra
 
-    there = number <= 3*variants + merge(12, 2, kind == 'list')
+    there = number <= 3*variants + merge(12, 2, kind == 'list' .or. kind == 'tables')
     if (.not. there) return
     subject%kind = kind
     if (number > 3*variants + 2) then
@@ -320,9 +328,8 @@ contains
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
     allocate (strained(size(u, 1)), source=0_i1)
-    if (subject%model%dilatation) call dilatation_pass(subject%family, subject%model, u, p, &
-      & strained)
-    call force_pass(subject%family, subject%model, u, p, force, strained)
+    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), u, &
+      & p, force, strained)
   end subroutine fast_force
 
   !> A gradient with all components, also where the dimension has no use for them.
@@ -347,7 +354,7 @@ contains
     subject%body%grid = 1_i2
     subject%body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
     call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
-      & .false., subject%key_bits, subject%family)
+      & .false., subject%key_bits, subject%least_shared, subject%family)
     call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
       & depth(2), &
       & depth(1), 2*spacing, subject%bond_based)], subject%projected, &

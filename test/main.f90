@@ -39,6 +39,8 @@ program main
   use test_force_breaking, only: collect_force_breaking
   use test_force_contract, only: collect_force_contract
   use test_force_frame, only: collect_force_frame
+  use test_force_term, only: collect_force_term
+  use test_library, only: collect_library
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_static_conjugate_gradient, only: collect_motion_static_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
@@ -52,8 +54,9 @@ program main
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_explicit_time_step, only: collect_motion_explicit_time_step
   use test_orders, only: collect_orders
+  use test_output_fields_table, only: collect_output_fields_table
+  use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
-  use test_output_report_begin, only: collect_output_report_begin
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
   use test_output_report_contact, only: collect_output_report_contact
   use test_output_results_files, only: collect_output_results_files
@@ -67,6 +70,8 @@ program main
   use test_scene_hostile, only: collect_scene_hostile
   use test_motion_energy_watch, only: collect_motion_energy_watch
   use test_scene_content_compare, only: collect_scene_content_compare
+  use test_scene_content_defaults, only: collect_scene_content_defaults
+  use test_scene_content_groups, only: collect_scene_content_groups
   use test_scene_format_elements, only: collect_scene_format_elements
   use test_scene_format_file, only: collect_scene_format_file
   use test_scene_content_read, only: collect_scene_content_read
@@ -121,6 +126,8 @@ program main
   call register('force_breaking', collect_force_breaking)
   call register('force_contract', collect_force_contract)
   call register('force_frame', collect_force_frame)
+  call register('force_term', collect_force_term)
+  call register('library', collect_library)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_static_conjugate_gradient', collect_motion_static_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)
@@ -134,10 +141,11 @@ program main
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_explicit_time_step', collect_motion_explicit_time_step)
   call register('orders', collect_orders)
+  call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
-  call register('output_report_begin', collect_output_report_begin)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
   call register('output_report_contact', collect_output_report_contact)
+  call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)
   call register('output_results_layout', collect_output_results_layout)
   call register('output_report_overview', collect_output_report_overview)
@@ -149,6 +157,8 @@ program main
   call register('scene_hostile', collect_scene_hostile)
   call register('motion_energy_watch', collect_motion_energy_watch)
   call register('scene_content_compare', collect_scene_content_compare)
+  call register('scene_content_defaults', collect_scene_content_defaults)
+  call register('scene_content_groups', collect_scene_content_groups)
   call register('scene_format_elements', collect_scene_format_elements)
   call register('scene_format_file', collect_scene_format_file)
   call register('scene_content_read', collect_scene_content_read)

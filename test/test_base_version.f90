@@ -12,6 +12,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('the version is that of fpm.toml', test_version), &
+      & new_unittest('the citation is of this version', test_citation), &
       & new_unittest('compiler and flags are known', test_compiler)]
   end subroutine collect_base_version
 
@@ -31,6 +32,23 @@ contains
     close (unit)
     call check(error, trim(line), 'version = "'//program_version//'"')
   end subroutine test_version
+
+  subroutine test_citation(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(200) :: line
+    integer :: unit, io
+
+    open (newunit=unit, file='CITATION.cff', status='old', action='read', iostat=io)
+    call check(error, io, 0, 'CITATION.cff cannot be read')
+    if (allocated(error)) return
+    do
+      read (unit, '(a)', iostat=io) line
+      if (io /= 0) exit
+      if (index(line, 'version: ') == 1) exit
+    end do
+    close (unit)
+    call check(error, trim(line), 'version: '//program_version)
+  end subroutine test_citation
 
   subroutine test_compiler(error)
     type(error_type), allocatable, intent(out) :: error

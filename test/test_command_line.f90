@@ -6,6 +6,7 @@ module test_command_line
   use pd_command_line, only: command_line_type, command_names, parse_command_line, &
     & restart_command
   use pd_scene_format_file, only: read_text_file
+  use pd_output_fields_table, only: all_fields, field_table_type
   use pd_scene_content_template, only: template_names, template_text
   use testdrive, only: check, error_type, new_unittest, skip_test, test_failed, unittest_type
   implicit none (type, external)
@@ -23,6 +24,7 @@ contains
       & new_unittest('options may stand before the file and take =', test_order), &
       & new_unittest('defaults', test_defaults), &
       & new_unittest('going on with a run', test_restart), &
+      & new_unittest('keys that are set', test_set), &
       & new_unittest('commands as a shell needs them', test_quoted), &
       & new_unittest('the texts in doc/printed are up to date', test_printed), &
       & new_unittest('bench with all its options', test_bench), &
@@ -130,6 +132,51 @@ contains
     if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--max-minutes', 'ten'], "found 'ten'")
   end subroutine test_restart
+
+  !> `--set` may be repeated; the command that goes on with a run has them all.
+  subroutine test_set(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: commands(5) = [character(6) :: 'run', 'check', 'limits', 'study', &
+      & 'choose']
+    type(command_line_type) :: line
+    type(pd_error), allocatable :: fault
+    character(2*w) :: words(8)
+    integer :: i
+
+    words(:) = [character(2*w) :: '', '--set', 'horizon%ratio=4', 'a.nml', &
+      & '--set=body(1)%points=20, 10', '--set', "title=it's = me", '--error=1']
+    do i = 1, size(commands)
+      words(1) = commands(i)
+      call parse_command_line(words(:merge(8, 7, commands(i) == 'choose')), line, fault)
+      call check(error, .not. allocated(fault), 'a good command line was refused')
+      if (allocated(error)) return
+      call check(error, size(line%changes), 3)
+      if (allocated(error)) return
+      call check(error, line%changes(1)%text//'|'//line%changes(2)%text//'|'// &
+        & line%changes(3)%text, "horizon%ratio=4|body(1)%points=20, 10|title=it's = me")
+      if (allocated(error)) return
+    end do
+    words(1) = 'run'
+    words(8) = '--quiet'
+    call parse_command_line(words, line, fault)
+    call check(error, restart_command(line), "perifort run a.nml --set horizon%ratio=4 --set "// &
+      & "'body(1)%points=20, 10' --set 'title=it'\''s = me' --quiet --restart")
+    if (allocated(error)) return
+    call parse_command_line([character(w) :: 'run', 'a.nml'], line, fault)
+    call check(error, size(line%changes), 0)
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--set'], 'as in --set horizon%ratio=4')
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--set', 'ratio'], "found 'ratio'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--set', '=4'], "found '=4'")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--set', 'ratio='], "found 'ratio='")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'run', 'a', '--set', '--quiet'], "found ''")
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'bench', '--set', 'ratio=4'], "no option of 'bench'")
+  end subroutine test_set
 
   !> Several numbers may be parted by blanks or commas.
   subroutine test_bench(error)
@@ -253,9 +300,11 @@ contains
   subroutine test_printed(error)
     type(error_type), allocatable, intent(out) :: error
     type(pd_error), allocatable :: fault
+    type(field_table_type) :: fields
     character(:), allocatable :: text
     integer :: i
 
+    fields = all_fields()
     call read_text_file('doc/printed/help.txt', text, fault)
     if (allocated(fault)) then
       call skip_test(error, 'not run in the project''s folder')
@@ -266,7 +315,7 @@ contains
       call compare('help-'//trim(command_names(i))//'.txt', help_text(trim(command_names(i))))
     end do
     do i = 1, size(template_names)
-      call template_text(trim(template_names(i)), text, fault)
+      call template_text(trim(template_names(i)), text, fault, fields%names())
       call compare('template-'//trim(template_names(i))//'.nml', text)
       if (allocated(error)) return
       call check(error, index(help_text('template'), trim(template_names(i))) > 0, &

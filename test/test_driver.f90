@@ -4,7 +4,8 @@ module test_driver
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: to_text
-  use pd_driver, only: check_scene, run_scene
+  use pd_driver, only: run_scene
+  use pd_preview, only: preview_scene
   use pd_output_report_begin, only: run_options_type
   use pd_set_up_prepare, only: set_up_type
   use pd_output_results_datasets, only: get_shape, read_rows
@@ -430,7 +431,7 @@ contains
     integer :: n, tenths
 
     call flight('plate', scene)
-    scene%initial(1)%velocity = 0.0_wp
+    scene%initial(1)%velocity(:2) = 0.0_wp
     scene%initial(1)%velocity_gradient(1, 1) = 10.0_wp
     call prepare_run(scene, set_up, fault)
     call accept(error, fault)
@@ -565,7 +566,7 @@ contains
     scene%file = 'dissipation.nml'
     scene%bodies = [scene%bodies(1), scene%bodies(1)]
     scene%bodies%material = [character(5) :: 'steel', 'weak']
-    scene%bodies(2)%name = 'last column'
+    scene%bodies(2)%name = 'last_column'
     scene%bodies(2)%lower(1) = 12.0e-3_wp
     scene%bodies(2)%upper(1) = 13.0e-3_wp
     scene%bodies(2)%points(1) = 1
@@ -725,11 +726,11 @@ contains
     options%output_directory = here//'/check'
     options%quiet = .true.
     threads = omp_get_max_threads()
-    call check_scene(scene, options, fault)
+    call preview_scene(scene, options, fault)
     call accept(error, fault)
     call expect_true(error, .not. directory_exists(here//'/check'), 'a folder is left behind')
     scene%bodies = [scene%bodies(1), scene%bodies(1)]
-    call check_scene(scene, options, fault)
+    call preview_scene(scene, options, fault)
     call omp_set_num_threads(threads)
     call expect_true(error, allocated(fault), 'two bodies in one place')
   end subroutine test_check

@@ -2,9 +2,11 @@
 module test_family_slabs
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_lanes, only: lanes
   use pd_set_up_prepare, only: set_up_type
-  use pd_family_lattice, only: grid_at, lanes, lattice_family_type
-  use pd_force_forces, only: dilatation_pass, force_pass
+  use pd_family_lattice, only: grid_at, lattice_family_type
+  use pd_force_forces, only: internal_force
+  use pd_force_model, only: options_of
   use pd_force_reference, only: reference_force
   use pd_motion_system, only: system_type
   use pd_scene_content_types, only: scene_type
@@ -206,8 +208,8 @@ contains
   subroutine both_passes(system)
     type(system_type), intent(inout) :: system
     associate (state => system%state)
-      call dilatation_pass(system%family, system%model, state%u, state%p, system%strained)
-      call force_pass(system%family, system%model, state%u, state%p, state%force, system%strained)
+      call internal_force(system%body, system%family, system%model, options_of(system%model), &
+        & state%u, state%p, state%force, system%strained)
     end associate
   end subroutine both_passes
 

@@ -7,10 +7,11 @@ module test_force_contract
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_numbers, only: pi
   use pd_family_lattice, only: lattice_family_type
+  use pd_family_list, only: list_family_type
   use pd_family_volume, only: volume_none
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
-  use pd_force_forces, only: dilatation_pass, energy_pass, force_pass
-  use pd_force_model, only: model_type
+  use pd_force_forces, only: energy_pass, internal_force, up_to_marks
+  use pd_force_model, only: force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, fast_ranges, narrow, wide, single
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use comparisons, only: expect_close, max_abs
@@ -29,6 +30,7 @@ contains
     testsuite = [ &
       & new_unittest('fast loops agree with the theory point by point', test_reference), &
       & new_unittest('turned bodies agree with the theory, too', test_turned), &
+      & new_unittest('a heated body has forces without its thermal strain', test_unheated), &
       & new_unittest('net force and moment vanish', test_balance), &
       & new_unittest('rigid motions give no force', test_rigid), &
       & new_unittest('the force is the gradient of the energy', test_gradient), &
@@ -38,6 +40,7 @@ contains
       & new_unittest('breaking is the same from both ends', test_breaking), &
       & new_unittest('the same bits on 1, 2 and 4 threads', test_threads), &
       & new_unittest('keys that collide change nothing', test_collisions), &
+      & new_unittest('clusters of lists share tables', test_shared), &
       & new_unittest('any critical stretch leaves the fast formulas their range', test_critical)]
   end subroutine collect_force_contract
 
@@ -93,6 +96,50 @@ contains
       call expect_true(error, number > 50, 'too few subjects')
     end do
   end subroutine test_reference
+
+  !> Forces of a heated body that leave out its thermal strain, as tangents want them, after forces
+  !> that had it: those of the theory for the same body without temperatures. Tolerance as above.
+  subroutine test_unheated(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: strain = 1.0e-4_wp
+    type(subject_type) :: subject
+    type(model_type) :: cold
+    type(force_options_type) :: options
+    real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :)
+    integer(i1), allocatable :: strained(:)
+    integer :: kind, number, heated
+    logical :: there
+
+    do kind = 1, size(kinds)
+      number = 0
+      heated = 0
+      do
+        number = number + 1
+        call subject_number(kinds(kind), number, subject, there)
+        if (.not. there) exit
+        if (.not. subject%thermal) cycle
+        heated = heated + 1
+        associate (n => subject%body%n_slots)
+          if (allocated(u)) deallocate (u, f_ref, strained)
+          allocate (u(n, subject%dim), f_ref(n, subject%dim), source=0.0_wp)
+          allocate (strained(n), source=0_i1)
+        end associate
+        call shake(subject%body, some_gradient(strain), 0.5_wp*strain*spacing, 5 + number, u)
+        call fast_force(subject, u, force, p)
+        cold = subject%model
+        cold%thermal = .false.
+        call reference_force(subject%family, cold, u, f_ref)
+        options = options_of(subject%model)
+        options%thermal = .false.
+        call internal_force(subject%body, subject%family, subject%model, options, u, p, force, &
+          & strained)
+        call expect_close(error, force, f_ref, tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp) &
+          & *max_abs(f_ref), 'force, '//name_of(subject, number))
+        if (allocated(error)) return
+      end do
+      call expect_true(error, heated > 3, 'too few heated subjects')
+    end do
+  end subroutine test_unheated
 
   !> Bodies that are strained by 0.3 % and 3 % and turned by any angle, where eta is as long as the
   !> bond. Both ways lose what forming e loses, some roundings of |eta|/|xi| out of a strain of
@@ -503,11 +550,8 @@ contains
     real(wp), allocatable :: force(:, :), p(:)
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
-    if (subject%model%dilatation) then
-      call dilatation_pass(subject%family, subject%model, u, p, strained)
-    else
-      call force_pass(subject%family, subject%model, u, p, force, strained)
-    end if
+    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), u, &
+      & p, force, strained, up_to_marks)
   end subroutine mark
 
   !> Pairs within the horizon whose stretch |y|/|xi| - 1 is beyond the smaller of the ends' limits,
@@ -587,7 +631,7 @@ contains
     integer :: kind, dim, i
 
     do kind = 1, size(kinds)
-      if (kinds(kind) == 'list') cycle
+      if (kinds(kind) == 'list' .or. kinds(kind) == 'tables') cycle
       do dim = 1, 3
         subject = subject_type(kind=kinds(kind), dim=dim, surface=.true., two_materials=.true., &
           & hole=.true., crack=.true., dilatant=dim == 1)
@@ -616,6 +660,59 @@ contains
     end do
   end subroutine test_collisions
 
+  !> Clusters of lists share tables where points lie alike, also where their bonds are cut. Forces
+  !> are those of a list without shared tables, and those with one key for all clusters, or two.
+  subroutine test_shared(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: points(3, 3) = reshape([400, 1, 1, 150, 20, 1, 90, 6, 6], [3, 3])
+    integer(i8), parameter :: bits(*) = [not(0_i8), 0_i8, 1_i8]
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :), force(:, :), other(:, :), p(:), p_other(:)
+    integer(i8) :: weights, packs
+    integer :: dim, variant, i
+
+    do dim = 1, 3
+      do variant = 1, 3
+        call make(dim, variant, not(0_i8), huge(0), subject)
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, dim))
+        call shake(subject%body, some_gradient(0.004_wp), 0.004_wp*spacing, 71, u)
+        call fast_force(subject, u, force, p)
+        do i = 1, size(bits)
+          call make(dim, variant, bits(i), 8, subject)
+          call fast_force(subject, u, other, p_other)
+          select type (family => subject%family)
+          type is (list_family_type)
+            weights = size(family%weight_S, 2, kind=i8)
+            packs = size(family%bits, kind=i8)
+            if (i == 1) call expect_true(error, 2*weights < packs, 'few weights are shared, ' &
+              & //name_of(subject, 0))
+            if (i == 1) call expect_true(error, count(family%shape > 0_i8) &
+              & > size(family%shape)/2, 'few shapes are shared')
+          end select
+          call expect_close(error, other, force, 1.0e-13_wp*max_abs(force), 'force, ' &
+            & //name_of(subject, i))
+          call expect_close(error, p_other, p, 1.0e-13_wp*max_abs(p), 'dilatation, ' &
+            & //name_of(subject, i))
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+
+  contains
+
+    subroutine make(dim, variant, key_bits, least_shared, subject)
+      integer, intent(in) :: dim, variant, least_shared
+      integer(i8), intent(in) :: key_bits
+      type(subject_type), intent(out) :: subject
+
+      subject = subject_type(kind='list', dim=dim, bond_based=variant == 3, &
+        & projected=variant == 1, surface=.true., two_materials=variant == 2, hole=.true., &
+        & crack=.true., key_bits=key_bits, least_shared=least_shared, points=points(:, dim))
+      call build(subject)
+    end subroutine make
+  end subroutine test_shared
+
   !> Tables of weights that a lattice has.
   integer function tables_of(subject) result(tables)
     type(subject_type), intent(in) :: subject
@@ -642,7 +739,7 @@ contains
     do i = 1, size(critical)
       do r = 1, size(ranges)
         model%least_critical = critical(i)
-        associate (limit => fast_limit(model, ranges(r)))
+        associate (limit => fast_limit(model, options_of(model), ranges(r)))
           call expect_true(error, limit >= 0.0_wp .and. limit <= fast_ranges(ranges(r)), &
             & 'limit of e at a critical stretch of '//text_of(critical(i)))
           if (critical(i) < 1.0_wp) call expect_true(error, limit <= 1 - (1 - critical(i))**2, &

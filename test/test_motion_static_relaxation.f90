@@ -5,10 +5,10 @@ module test_motion_static_relaxation
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, add_loads, evaluate
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: scene_type, unset
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
-  use bodies, only: at_point, box_scene, diary_type, expect, expect_true, ready, &
+  use bodies, only: at_point, box_scene, diary_type, expect, expect_true, ready, ready_alone, &
     & youngs_modulus
   implicit none (type, external)
   private
@@ -31,7 +31,8 @@ contains
       & new_unittest('what has not converged is no answer', test_unconverged), &
       & new_unittest('a strained body without loads comes to rest', test_released), &
       & new_unittest('bonds break at rest alone', test_breaks_at_rest), &
-      & new_unittest('a bar torn in two rests again', test_torn)]
+      & new_unittest('a bar torn in two rests again', test_torn), &
+      & new_unittest('long way of a slender body: conjugate gradients go on', test_slender)]
   end subroutine collect_motion_static_relaxation
 
   !> Bodies held at x_min by a layer and pulled at x_max: thick and thin, one material and two, with
@@ -358,6 +359,68 @@ contains
     call expect_true(error, fault%status == status_no_answer, 'exit status')
     call expect_true(error, index(fault%message, 'not converged') == 1, 'message: '//fault%message)
   end subroutine test_unconverged
+
+  !> A cantilever of 60 x 3 points, its inner half 10^4 times softer, is bent by a pull across at
+  !> its end: 99,999 iterations of dynamic relaxation aren't enough, and with the default number the
+  !> conjugate gradient solver goes on. The reaction is that of statics, within the 10^-3 that every
+  !> accepted state obeys, and the deflection that of the other solver, within 10^-3 of it.
+  subroutine test_slender(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: density = 1.0e-3_wp  ! of the force at the end [N/m3]
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(diary_type) :: diary
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: u(:, :)
+    real(wp) :: load, reaction
+    integer :: i
+
+    call box_scene([30, 3], spacing, 0.3_wp, scene)
+    scene%bodies = [scene%bodies(1), scene%bodies(1)]
+    scene%bodies(2)%name = 'other'
+    scene%bodies(2)%lower(1) = 30*spacing
+    scene%bodies(2)%upper(1) = 60*spacing
+    scene%materials = [scene%materials(1), scene%materials(1)]
+    scene%materials(2)%name = 'other'
+    scene%materials(2)%youngs_modulus = youngs_modulus/1.0e4_wp
+    scene%bodies(1)%material = 'other'
+    scene%bodies(2)%material = 'steel'
+    call pull(scene)
+    scene%relaxation%tolerance = 1.0e-6_wp
+    deallocate (scene%regions)
+    allocate (scene%regions(1))
+    scene%regions(1)%name = 'end'
+    scene%regions(1)%shape = 'box'
+    scene%regions(1)%lower(1) = 57*spacing
+    scene%regions(1)%upper(1) = 61*spacing
+    scene%loads(1)%side = ''
+    scene%loads(1)%pressure = unset
+    scene%loads(1)%region = 'end'
+    scene%loads(1)%body_force(2) = density
+
+    scene%relaxation%maximum_iterations = 99999
+    call ready_alone(scene, set_up, error)
+    if (allocated(error)) return
+    diary%every = 0
+    call run_relaxation(set_up%system, set_up%plan%relaxation, diary, fault)
+    call expect_true(error, allocated(fault), 'dynamic relaxation needs no help')
+    if (allocated(error)) return
+
+    scene%relaxation%maximum_iterations = 100000
+    do i = 1, 2
+      call relax(scene, set_up, diary, error)
+      if (allocated(error)) return
+      associate (body => set_up%system%body)
+        load = density*sum(body%volume, body%x(:, 1) > 57*spacing)
+        reaction = sum(set_up%system%state%force(:, 2)*body%volume, &
+          & set_up%system%held(:, 2) == 1_i1)
+      end associate
+      call expect_close(error, reaction, load, 1.0e-3_wp*load, 'reaction')
+      if (i == 1) u = set_up%system%state%u
+      scene%relaxation%solver = 'conjugate_gradient'
+    end do
+    call expect_close(error, u, set_up%system%state%u, 1.0e-3_wp*max_abs(u), 'displacements')
+  end subroutine test_slender
 
   !> A stretched free plate shrinks back to no strain energy.
   subroutine test_released(error)

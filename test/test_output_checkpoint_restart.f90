@@ -60,6 +60,7 @@ contains
       & scene%loads(1))
     scene%regions(1)%name = 'all'
     scene%regions%shape = 'box'
+    scene%regions(1)%lower(1) = -1.0_wp
     scene%regions(2)%name = 'corner'
     scene%regions(2)%upper(:2) = 2*spacing
     scene%loads(1)%region = 'all'

@@ -3,7 +3,8 @@ module test_output_report_overview
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp
   use pd_set_up_prepare, only: set_up_type
-  use pd_output_report_begin, only: schedule_of
+  use pd_output_report_schedule, only: schedule_of
+  use pd_output_fields_table, only: all_fields
   use pd_output_report_estimate, only: estimate
   use pd_output_report_overview, only: overview
   use pd_scene_content_types, only: scene_type
@@ -93,7 +94,7 @@ contains
     scene%output%history_every = 7
     call ready(scene, set_up, error)
     if (allocated(error)) return
-    call estimate(scene, set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
+    call estimate(scene, all_fields(), set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
       & set_up%system%family%n_bonds), 0.0_wp, text)
     call expect_true(error, index(text, 'with history and output (predicted)') > 0 .and. &
       & index(text, '(measured); 1000 steps') > 0 .and. &
@@ -105,7 +106,7 @@ contains
     scene%initial(1)%displacement_gradient(1, 1) = 1.0e-3_wp
     call ready(scene, set_up, error)
     if (allocated(error)) return
-    call estimate(scene, set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
+    call estimate(scene, all_fields(), set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
       & set_up%system%family%n_bonds), 0.0_wp, text)
     call expect_true(error, index(text, 'depends on the number of iterations') > 0 .and. &
       & index(text, 'one after every load step') > 0, text)
@@ -130,7 +131,7 @@ contains
     scene%initial(1)%velocity_gradient(1, 1) = 1.0_wp
     call ready(scene, set_up, error)
     if (allocated(error)) return
-    call estimate(scene, set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
+    call estimate(scene, all_fields(), set_up%system, set_up%plan, schedule_of(scene, set_up%plan, &
       & set_up%system%family%n_bonds), 0.0_wp, text)
     call expect_true(error, index(text, 'not predicted, because the run fails: unstable') > 0, text)
   end subroutine test_failing

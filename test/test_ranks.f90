@@ -19,14 +19,15 @@ module test_ranks
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
   use pd_force_weights, only: build_weights
-  use pd_motion_conditions, only: load_type, motion_type
+  use pd_motion_conditions, only: add_loads_to, load_of, load_type, motion_type, &
+    & number_of_loads
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_static_relaxation, only: relaxation_type, run_relaxation
   use pd_motion_system, only: start_system, system_type
   use pd_set_up_prepare, only: set_up_type
   use pd_scene_content_types, only: crack_group, scene_type
   use bodies, only: box_scene, diary_type, expect, expect_true, ready
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   implicit none (type, external)
   private
@@ -522,8 +523,8 @@ contains
         call gather(whole%body, whole%state%damage, of_points(:, 1))
         call gather(part%system%body, part%system%state%damage, of_part(:, 1))
       end select
-      call expect_true(error, maxval(abs(of_points)) > 0.0_wp .or. f == 2, 'an empty field')
-      call expect(error, maxval(abs(of_part - of_points(first:last, :))), 0.0_wp, 0.0_wp, &
+      call expect_true(error, max_abs(of_points) > 0.0_wp .or. f == 2, 'an empty field')
+      call expect(error, max_abs(of_part - of_points(first:last, :)), 0.0_wp, 0.0_wp, &
         & 'a field of a rank')
     end do
   end subroutine same_fields
@@ -531,13 +532,14 @@ contains
   !> The part of a system that rank `r` has: the points after those of the ranks before up to
   !> `last(r)`, and a halo. It is built as a scene's is, from these points alone.
   subroutine take_part(set_up, cracks, last, r, part, error)
-    type(set_up_type), intent(in) :: set_up
+    type(set_up_type), intent(in), target :: set_up
     type(crack_group), intent(in) :: cracks(:)
     integer, intent(in) :: last(:), r
     type(part_type), intent(out) :: part
     type(error_type), allocatable, intent(inout) :: error
     type(lattice_family_type), allocatable :: family
     type(fault_type), allocatable :: fault
+    type(load_type), allocatable :: loads(:)
     type(body_type) :: body
     real(wp), allocatable :: mass(:, :)
     integer(i8) :: cut
@@ -584,13 +586,14 @@ contains
       end if
       allocate (system%state%u(system%body%n_slots, system%body%dim), source=0.0_wp)
       allocate (system%state%v, source=system%state%u)
-      allocate (system%motions(size(whole%motions)), system%loads(size(whole%loads)))
+      allocate (system%motions(size(whole%motions)), loads(number_of_loads(whole%terms)))
       do m = 1, size(whole%motions)
         call take_motion(whole%motions(m), system%motions(m))
       end do
-      do m = 1, size(whole%loads)
-        call take_load(whole%loads(m), system%loads(m))
+      do m = 1, size(loads)
+        call take_load(load_of(whole%terms, m), loads(m))
       end do
+      call add_loads_to(system%terms, loads)
       system%break_late = whole%break_late
       call start_system(system)
       if (.not. allocated(set_up%plan%relaxation%mass)) return

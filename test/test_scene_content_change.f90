@@ -3,12 +3,15 @@ module test_scene_content_change
   use pd_base_error, only: scene_error => error_type
   use pd_base_kinds, only: wp
   use pd_scene_content_change, only: change_key, find_target, full_name, target_type
-  use pd_scene_content_read, only: read_scene_source
+  use pd_scene_content_read, only: read_scene_source, read_scene_text
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_write, only: scene_text
+  use pd_scene_format_file, only: line_type
   use pd_scene_format_source, only: scan_source, source_type, token_type
   use pd_scene_content_types, only: is_set, scene_type
   use bodies, only: expect, expect_true
-  use test_scene_expect, only: expect_parts, line
-  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
+  use test_scene_expect, only: changes_of, expect_parts, line
+  use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
   public :: collect_scene_content_change
@@ -32,7 +35,10 @@ contains
       & new_unittest('other keys and groups stay', test_others), &
       & new_unittest('names in all their forms', test_names), &
       & new_unittest('names that mean nothing', test_bad_names), &
-      & new_unittest('a refused value has the place of its word', test_place)]
+      & new_unittest('a refused value has the place of its word', test_place), &
+      & new_unittest('options change what the file would change', test_options), &
+      & new_unittest('options that are refused', test_bad_options), &
+      & new_unittest('rules find what options change', test_places_of_options)]
   end subroutine collect_scene_content_change
 
   !> The scene with one key changed; what is wrong is in `found`.
@@ -207,5 +213,143 @@ contains
     call changed('time%integrator', "'euler'", scene, found)
     call expect_parts(error, found, "unknown value 'euler'|a.nml:6|allowed: forward_backward")
   end subroutine test_place
+
+  !> A scene changed by options is the one that a file with these words gives.
+  subroutine test_options(error)
+    type(error_type), allocatable, intent(out) :: error
+
+    call same('time%safety=0.25', 'safety = 0.5', 'safety = 0.25')
+    call same('time.safety=0.25|steps=77', 'steps = 5 safety = 0.5', &
+      & 'steps = 77 safety = 0.25')
+    call same('material(2)%break_in_compression=.true.', 'poissons_ratio = 0.2', &
+      & 'poissons_ratio = 0.2 break_in_compression = T')
+    call same('body%points=20, 10', 'points = 100, 50', 'points = 20, 10')
+    call same('body%points(1)=200|body%points(2)=100', &
+      & 'points = 100, 50', 'points = 200, 100')
+    call same('body%upper=2*0.5|points=2*10', &
+      & 'upper = 1, 0.5 points = 100, 50', 'upper = 2*0.5 points = 10 10')
+    call same('initial%displacement_gradient(2,1)=0.1', 'gradient(1,2) = 0.5', &
+      & 'gradient(1,2) = 0.5 displacement_gradient(2,1) = 0.1')
+    ! texts with quotes and without them
+    call same("time%integrator='runge_kutta'", 'steps = 5', &
+      & "steps = 5 integrator = 'runge_kutta'")
+    call same('time%integrator=Runge_Kutta', 'steps = 5', &
+      & "steps = 5 integrator = 'runge_kutta'")
+    call same('scene%title=It''s a / test, isn''t it? ! = 3', 'dimension = 2', &
+      & "dimension = 2 title = 'It''s a / test, isn''t it? ! = 3'")
+    ! groups that are not there, and lists
+    call same('output%fields=damage, velocity', '&time', &
+      & "&output fields = 'damage', 'velocity' /&time")
+    call same('output%fields="damage" ''velocity''', '&time', &
+      & "&output fields = 'damage', 'velocity' /&time")
+    call same('output%fields(1)=damage|output%every=3', '&time', &
+      & "&output fields = 'damage' every = 3 /&time")
+    call same('load(1)%values=0, 1|load%times=0, 2', '&time', &
+      & "&load side = 'x_max' pressure = 1 times = 0, 2 values = 0, 1 /&time", &
+      & "&load side = 'x_max' pressure = 1 /")
+
+  contains
+
+    !> `options`, given with the text and `more`, make the scene of the text with `new` in the place
+    !> of `old`.
+    subroutine same(options, old, new, more)
+      character(*), intent(in) :: options   !! `group%key=value|...`
+      character(*), intent(in) :: old, new
+      character(*), intent(in), optional :: more
+      type(scene_type) :: expected, scene
+      type(scene_error), allocatable :: found
+      type(line_type), allocatable :: list(:)
+      character(:), allocatable :: base
+      integer :: at
+
+      if (allocated(error)) return
+      base = text
+      if (present(more)) base = text//more
+      at = index(text, old)
+      call expect_true(error, at > 0, old)
+      if (allocated(error)) return
+      call read_scene_text(text(:at - 1)//new//text(at + len(old):), 'a.nml', expected, found)
+      call accept(error, found)
+      call changes_of(options, list)
+      call read_scene_text(base, 'a.nml', scene, found, list)
+      call accept(error, found)
+      if (allocated(error)) return
+      call check(error, scene_text(scene), scene_text(expected))
+      call expect_true(error, scene%text == base .and. size(scene%changes) == size(list), &
+        & 'the text stays, and the options are kept beside it')
+    end subroutine same
+  end subroutine test_options
+
+  subroutine test_bad_options(error)
+    type(error_type), allocatable, intent(out) :: error
+
+    call refused('horizn%ratio=3', "no group &horizn can be set|did you mean 'horizon'?")
+    call refused('horizon%ratoi=3', "&horizon has no key 'ratoi'|did you mean 'ratio'?")
+    call refused('horizon%ratio=0.5', "'ratio' is out of range|expected >= 1")
+    call refused('horizon%ratio=abc', "bad value 'abc' for key 'ratio'|expected a number")
+    call refused('horizon%ratio=2 3', "too many values for 'ratio'")
+    call refused('horizon%ratio(1)=2', "no element of 'ratio'|it is real")
+    call refused('horizon%ratio=2 /', "bad value '2 /' for key 'ratio'")
+    call refused('horizon%ratio=2 length = 3', "bad value '2 length = 3' for key 'ratio'")
+    call refused('horizon%ratio=2 ! rest', "bad value '2 ! rest'")
+    call refused('horizon%ratio=,', "bad value ','")
+    call refused("time%integrator='euler'", "unknown value 'euler'|allowed: forward_backward")
+    call refused('time%integrator=euler', "unknown value 'euler'|allowed: forward_backward")
+    call refused("time%integrator='euler", "bad value ''euler'")
+    call refused('body%points(1)=20, 30', "too many values for 'points(1)'|expected one")
+    call refused('material%density=1', '2 groups &material|say which: material(1)%density')
+    call refused('density=1', '2 groups &material')
+    call refused('crack%radius=1', 'the scene has no group &crack|there is nothing to set')
+    call refused('name=a', 'key of several groups|material%name|body%name')
+    call refused('horizon%ratio', 'expected group%key=value')
+    call refused('=3', 'expected group%key=value')
+    call refused('horizon%ratio=', 'expected group%key=value')
+    call refused('scene%title=a'//achar(27)//'b', 'a control character, byte 27')
+    call refused('horizon%ratio=3', "'horizon%ratio' is set twice", 'ratio=4')
+
+  contains
+
+    !> The option is refused, with its place. Carets stand below it.
+    subroutine refused(option, parts, second)
+      character(*), intent(in) :: option, parts
+      character(*), intent(in), optional :: second
+      type(line_type), allocatable :: list(:)
+      type(scene_type) :: scene
+      type(scene_error), allocatable :: found
+
+      if (allocated(error)) return
+      if (present(second)) then
+        call changes_of(option//'|'//second, list)
+      else
+        call changes_of(option, list)
+      end if
+      call read_scene_text(text, 'a.nml', scene, found, list)
+      call expect_parts(error, found, parts//'|--> the command line|--set |^')
+    end subroutine refused
+  end subroutine test_bad_options
+
+  !> What is wrong with a whole scene is shown where the option stands, and faults of its points,
+  !> which scan the text again, too.
+  subroutine test_places_of_options(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(scene_error), allocatable :: found
+    type(line_type), allocatable :: list(:)
+
+    call changes_of('time%duration=3', list)
+    call read_scene_text(text, 'a.nml', scene, found, list)
+    call expect_parts(error, found, "'steps' and 'duration' are both given|--> the "// &
+      & 'command line|--set time%duration=3|      ^^^^^^^^^^^^^')
+    if (allocated(error)) return
+    call changes_of('time%safety=0.1|body%upper=2, 1', list)
+    call read_scene_text(text, 'a.nml', scene, found, list)
+    call accept(error, found)
+    if (allocated(error)) return
+    call scene_fault(found, scene, 'body', 1, 'upper', 'too large', 'smaller')
+    call expect_parts(error, found, 'too large|--> the command line|--set body%upper=2, 1')
+    if (allocated(error)) return
+    call scene_fault(found, scene, 'body', 1, 'lower', 'too low', 'higher')
+    call expect_parts(error, found, 'too low|--> a.nml:4|lower = 2*0.0')
+  end subroutine test_places_of_options
 
 end module test_scene_content_change

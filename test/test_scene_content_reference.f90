@@ -2,7 +2,9 @@
 module test_scene_content_reference
   use pd_base_error, only: scene_error => error_type, status_usage
   use pd_scene_format_file, only: read_text_file
-  use pd_scene_content_groups, only: describe_group, group_names, group_purpose
+  use pd_output_fields_table, only: all_fields, field_table_type
+  use pd_scene_content_groups, only: list_groups
+  use pd_scene_content_types, only: group_table
   use pd_scene_format_keys, only: keys_type
   use pd_scene_content_reference, only: write_reference
   use test_scene_expect, only: expect_parts
@@ -30,9 +32,11 @@ contains
     type(scene_error), allocatable, intent(out) :: found
     integer :: unit, status
     character(1000) :: row
+    type(field_table_type) :: table
 
     open (newunit=unit, status='scratch', action='readwrite')
-    call write_reference(unit, group, found)
+    table = all_fields()
+    call write_reference(unit, group, found, table%names())
     rewind (unit)
     text = ''
     do
@@ -46,6 +50,7 @@ contains
   subroutine test_complete(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_error), allocatable :: found
+    type(group_table) :: table
     type(keys_type) :: keys
     character(:), allocatable :: text
     integer :: g, k
@@ -53,11 +58,13 @@ contains
     call reference_of('', text, found)
     call check(error,.not. allocated(found))
     if (allocated(error)) return
-    do g = 1, size(group_names)
-      call check(error, index(text, '## &'//trim(group_names(g))) > 0, trim(group_names(g)))
+    call list_groups(table)
+    do g = 1, table%count
+      call check(error, index(text, '## &'//trim(table%entries(g)%name)) > 0, &
+        & trim(table%entries(g)%name))
       if (allocated(error)) return
-      call describe_group(keys, trim(group_names(g)))
-      call check(error, keys%count > 0, trim(group_names(g)))
+      call table%describe(trim(table%entries(g)%name), keys)
+      call check(error, keys%count > 0, trim(table%entries(g)%name))
       if (allocated(error)) return
       do k = 1, keys%count
         call check(error, index(text, '| `'//keys%known(k)%name//'`') > 0, keys%known(k)%name)
@@ -94,13 +101,16 @@ contains
 
   subroutine test_meaning(error)
     type(error_type), allocatable, intent(out) :: error
+    type(group_table) :: table
     type(keys_type) :: keys
     integer :: g, k
 
-    do g = 1, size(group_names)
-      call check(error, len(group_purpose(trim(group_names(g)))) > 20, trim(group_names(g)))
+    call list_groups(table)
+    do g = 1, table%count
+      call check(error, len(table%entries(g)%purpose) > 20, &
+        & trim(table%entries(g)%name))
       if (allocated(error)) return
-      call describe_group(keys, trim(group_names(g)))
+      call table%describe(trim(table%entries(g)%name), keys)
       do k = 1, keys%count
         call check(error, len(keys%known(k)%meaning) > 5 .and. len(keys%known(k)%default) > 0, &
           & keys%known(k)%name)

@@ -1,9 +1,9 @@
 !> Templates: each one is a valid scene that says what it is.
 module test_scene_content_template
   use pd_base_error, only: scene_error => error_type, status_usage
-  use pd_scene_content_groups, only: group_names
+  use pd_scene_content_groups, only: list_groups
   use pd_scene_content_template, only: template_names, template_text, write_template
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: group_table, scene_type
   use test_scene_expect, only: expect_parts, expect_scene, line
   use testdrive, only: check, error_type, new_unittest, unittest_type
   implicit none (type, external)
@@ -44,6 +44,7 @@ contains
 
   subroutine test_comments(error)
     type(error_type), allocatable, intent(out) :: error
+    type(group_table) :: table
     type(scene_error), allocatable :: found
     character(:), allocatable :: text
     integer :: i
@@ -54,7 +55,8 @@ contains
         & index(text, '  ! ratio = 3.015 ') > 0 .and. index(text, '! horizon over the') > 0, text)
       if (allocated(error)) return
     end do
-    call check(error, size(group_names) == 16)
+    call list_groups(table)
+    call check(error, table%count, 16)
   end subroutine test_comments
 
   subroutine test_default(error)

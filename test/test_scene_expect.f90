@@ -3,10 +3,11 @@ module test_scene_expect
   use pd_base_error, only: scene_error => error_type
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
+  use pd_scene_format_file, only: line_type
   use testdrive, only: error_type, test_failed
   implicit none (type, external)
   private
-  public :: expect_parts, expect_fault, expect_scene, good_head, line
+  public :: expect_parts, expect_fault, expect_scene, good_head, line, changes_of
 
   character(*), parameter :: line = new_line('a')
   !> Three lines that make a valid scene together with a `&time` group.
@@ -63,5 +64,20 @@ contains
     call read_scene_text(text, 'a/b.nml', scene, found)
     if (allocated(found)) call test_failed(error, found%message)
   end subroutine expect_scene
+
+  !> The changes `group%key=value` that are parted by `|`.
+  subroutine changes_of(text, changes)
+    character(*), intent(in) :: text
+    type(line_type), allocatable, intent(out) :: changes(:)
+    integer :: i, first, next
+
+    allocate (changes(1 + count([(text(i:i) == '|', i=1, len(text))])))
+    first = 1
+    do i = 1, size(changes)
+      next = first + index(text(first:)//'|', '|') - 1
+      changes(i)%text = text(first:next - 1)
+      first = next + 1
+    end do
+  end subroutine changes_of
 
 end module test_scene_expect

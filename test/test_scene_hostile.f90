@@ -3,10 +3,10 @@
 module test_scene_hostile
   use pd_base_error, only: scene_error => error_type
   use pd_scene_format_file, only: line_type, read_text_file, split_lines
-  use pd_scene_content_groups, only: describe_group, group_names
+  use pd_scene_content_groups, only: list_groups
   use pd_scene_format_keys, only: keys_type
   use pd_scene_content_read, only: read_scene_text
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: group_table, scene_type
   use test_scene_expect, only: expect_fault, expect_parts, line
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
@@ -56,12 +56,14 @@ contains
 
   subroutine test_wrong_kind(error)
     type(error_type), allocatable, intent(out) :: error
+    type(group_table) :: table
     type(keys_type) :: keys
     integer :: g, k, tried
 
     tried = 0
-    do g = 1, size(group_names)
-      call describe_group(keys, trim(group_names(g)))
+    call list_groups(table)
+    do g = 1, table%count
+      call table%describe(trim(table%entries(g)%name), keys)
       do k = 1, keys%count
         associate (info => keys%known(k))
           call refuse_all(info%name, no_value)
@@ -93,22 +95,26 @@ contains
 
       tried = tried + 1
       do i = 1, size(values)
-        call refuse(error, trim(group_names(g)), key, trim(values(i)))
+        call refuse(error, trim(table%entries(g)%name), key, trim(values(i)))
       end do
     end subroutine refuse_all
   end subroutine test_wrong_kind
 
   subroutine test_too_long(error)
     type(error_type), allocatable, intent(out) :: error
+    type(group_table) :: table
     type(keys_type) :: keys
     integer :: g, k
 
-    do g = 1, size(group_names)
-      call describe_group(keys, trim(group_names(g)))
+    call list_groups(table)
+    do g = 1, table%count
+      call table%describe(trim(table%entries(g)%name), keys)
       do k = 1, keys%count
-        if (index(keys%known(k)%kind, 'text') == 1) call refuse(error, trim(group_names(g)), &
+        if (index(keys%known(k)%kind, 'text') == 1) call refuse(error, &
+          & trim(table%entries(g)%name), &
           & keys%known(k)%name, "'"//repeat('x', 2000)//"'")
-        if (index(keys%known(k)%kind, 'text') /= 1) call refuse(error, trim(group_names(g)), &
+        if (index(keys%known(k)%kind, 'text') /= 1) call refuse(error, &
+          & trim(table%entries(g)%name), &
           & keys%known(k)%name, repeat('9', 2000))
       end do
     end do
@@ -117,14 +123,16 @@ contains
   !> Millions by a repeat count, too, which must not take the time and memory that they ask for.
   subroutine test_too_many(error)
     type(error_type), allocatable, intent(out) :: error
+    type(group_table) :: table
     type(keys_type) :: keys
     integer :: g, k
 
-    do g = 1, size(group_names)
-      call describe_group(keys, trim(group_names(g)))
+    call list_groups(table)
+    do g = 1, table%count
+      call table%describe(trim(table%entries(g)%name), keys)
       do k = 1, keys%count
         if (index(keys%known(k)%kind, 'text') == 1) cycle
-        call refuse(error, trim(group_names(g)), keys%known(k)%name, '2147483647*1')
+        call refuse(error, trim(table%entries(g)%name), keys%known(k)%name, '2147483647*1')
       end do
     end do
   end subroutine test_too_many

@@ -151,6 +151,9 @@ contains
     call build(error, kernel, set_up)
     if (allocated(error)) return
     associate (system => set_up%system)
+      ! no eight clusters share tables
+      call expect(error, flops_of_bond(system%family, no_dilatation), 43.0_wp, 0.0_wp, &
+        & '2D bond-based list')
       ! a member of a cluster, six bytes, has at most eight bonds
       call expect_true(error, bytes_of_step(system) > 64*8*14.0_wp &
         & + 6*system%family%n_bonds/8.0_wp, 'a list moves its members, too')

@@ -2,6 +2,7 @@
 module test_study_trade_closed_form
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
+  use pd_output_fields_table, only: all_fields, field_table_type
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, field_at, form_chain, &
     & form_hole, form_linear, form_wave
   use bodies, only: expect, expect_true
@@ -24,13 +25,15 @@ contains
       & new_unittest('a chain turns with its frequency', test_chain)]
   end subroutine collect_study_trade_closed_form
 
-  pure real(wp) function value_of(form, field, x, t)
+  real(wp) function value_of(form, field, x, t)
     type(closed_form_type), intent(in) :: form
     character(*), intent(in) :: field
     real(wp), intent(in) :: x(:), t
     real(wp) :: values(1)
     logical :: known
-    call field_at(form, field, x, t, values, known)
+    type(field_table_type) :: table
+    table = all_fields()
+    call field_at(form, table%field(field), x, t, values, known)
     value_of = merge(values(1), huge(1.0_wp), known)
   end function value_of
 
@@ -113,22 +116,24 @@ contains
   end function plate
 
   !> Stress (xx, yy, xy) from differences of the displacement, plane stress.
-  pure function stress_at(form, x) result(stress)
+  function stress_at(form, x) result(stress)
     type(closed_form_type), intent(in) :: form
     real(wp), intent(in) :: x(2)
     real(wp) :: stress(3)
     real(wp), parameter :: step = 1.0e-5_wp
     real(wp) :: up(2), down(2), h(2, 2)
+    type(field_table_type) :: table
     logical :: known
     integer :: c
 
+    table = all_fields()
     do c = 1, 2
       up = x
       up(c) = up(c) + step
       down = x
       down(c) = down(c) - step
-      call field_at(form, 'displacement', up, 0.0_wp, h(:, c), known)
-      call field_at(form, 'displacement', down, 0.0_wp, stress(:2), known)
+      call field_at(form, table%field('displacement'), up, 0.0_wp, h(:, c), known)
+      call field_at(form, table%field('displacement'), down, 0.0_wp, stress(:2), known)
       h(:, c) = (h(:, c) - stress(:2))/(2*step)
     end do
     associate (e => form%modulus, nu => form%ratio)

@@ -2,11 +2,12 @@
 module test_study_trade_plan
   use pd_base_error, only: scene_error => error_type
   use pd_base_kinds, only: wp
+  use pd_scene_format_file, only: line_type
   use pd_study_trade_front, only: mark_front, observed_orders, on_front, order_type
   use pd_study_trade_plan, only: plan_from_text, plan_type
   use pd_study_trade_trial, only: outcome_type
   use bodies, only: expect, expect_true
-  use test_scene_expect, only: expect_parts, line
+  use test_scene_expect, only: changes_of, expect_parts, line
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -31,6 +32,7 @@ contains
       & new_unittest('vectors take several values', test_vectors), &
       & new_unittest('columns', test_columns), &
       & new_unittest('what cannot be planned', test_refused), &
+      & new_unittest('keys set on the command line', test_set), &
       & new_unittest('the Pareto front', test_front), &
       & new_unittest('observed orders', test_orders)]
   end subroutine collect_study_trade_plan
@@ -86,6 +88,37 @@ contains
     call expect_true(error, plan%trials(3)%scene%materials(1)%break_in_compression .and. &
       & .not. plan%trials(4)%scene%materials(1)%break_in_compression, 'the product with the third')
   end subroutine test_together
+
+  !> Every run has them; a key that is varied cannot be set.
+  subroutine test_set(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: text = head//"&study vary = 'horizon%ratio' values = 2.0, 3.0"//rest
+    type(plan_type) :: plan
+    type(scene_error), allocatable :: found
+    type(line_type), allocatable :: changes(:)
+    integer :: t
+
+    call changes_of('time%safety=0.3|study%values=2.5, 3.5, 4.5', changes)
+    call plan_from_text(text, 'a.nml', plan, found, changes)
+    if (allocated(found)) then
+      call test_failed(error, found%message)
+      return
+    end if
+    call expect_true(error, size(plan%trials) == 3, 'three runs')
+    if (allocated(error)) return
+    do t = 1, 3
+      call expect(error, plan%trials(t)%scene%horizon%ratio, t + 1.5_wp, 0.0_wp, 'ratio')
+      call expect(error, plan%trials(t)%scene%time%safety, 0.3_wp, 0.0_wp, 'safety')
+    end do
+    call changes_of('ratio=4', changes)
+    call plan_from_text(text, 'a.nml', plan, found, changes)
+    call expect_parts(error, found, "'horizon%ratio' is set here and varied|--> the "// &
+      & 'command line|--set ratio=4')
+    if (allocated(error)) return
+    call changes_of('study%values=0.5', changes)
+    call plan_from_text(text, 'a.nml', plan, found, changes)
+    call expect_parts(error, found, "'ratio' is out of range|--> the command line|^^^")
+  end subroutine test_set
 
   !> 20 x 10 and 10 x 10 points: both bodies follow, unless the body is named by its number.
   subroutine test_points(error)

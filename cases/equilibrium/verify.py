@@ -5,8 +5,8 @@ times as long as thick, with and without cracks, held at one end or at two, load
 and carried along by their supports by up to their length. Strains are small, so that the equations
 are linear to far below the tolerance. Every scene is solved with both solvers at the default
 tolerance. Reactions must be within 1e-3 of the largest net force, displacements (less those that the
-whole body has in common) within 1e-3 of the largest; a solver may end with status 3 instead, and how
-often it does is counted.
+whole body has in common) within 1e-3 of the largest. How often dynamic relaxation needs the conjugate
+gradient solver after its 100,000 iterations is counted.
 """
 import subprocess
 import sys
@@ -127,7 +127,7 @@ def main():
     case = Case(__file__, __doc__)
     case.out.mkdir(parents=True, exist_ok=True)
     scenes = range(10 if case.options.quick else 40)
-    worst, ends = {}, {}
+    worst, ends, helped = {}, {}, 0
     for solver in ("conjugate_gradient", "dynamic_relaxation"):
         ends[solver] = Counter()
         worst[solver] = [0.0, 0.0]
@@ -147,14 +147,16 @@ def main():
                 sys.exit(f"error: status {run.returncode} of scene {number}: {run.stderr}")
             results = Results(output)
             errors = scene.errors(results)
+            told = output / "warnings.txt"
+            helped += told.exists() and "goes on from there" in told.read_text(encoding="utf-8")
             worst[solver] = [max(pair) for pair in zip(worst[solver], errors)]
             print(f"  {number:2d} {solver}: {results.history['step'][-1]:.0f} iterations, reactions "
                   f"{errors[0]:.1e}, displacements {errors[1]:.1e} ({scene.about})", flush=True)
     for solver, (reaction, displacement) in worst.items():
         case.below(f"{solver}: error of reactions", reaction, 1e-3)
         case.below(f"{solver}: error of displacements", displacement, 1e-3)
-        case.show(f"{solver}: scenes without an answer", float(ends[solver][3]))
-    case.equal("conjugate_gradient: scenes without an answer", ends["conjugate_gradient"][3], 0)
+        case.equal(f"{solver}: scenes without an answer", ends[solver][3], 0)
+    case.show("dynamic_relaxation: scenes finished by conjugate gradients", float(helped))
     case.finish()
 
 

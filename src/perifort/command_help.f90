@@ -16,20 +16,23 @@ contains
     integer, parameter :: w = 90
     character(*), parameter :: threads = &
       & '  --threads N     number of threads (default: OMP_NUM_THREADS or all; small scenes: 1)'
-    character(w), parameter :: tables(4) = [character(w) :: &
-      & '  --output DIR    folder of the tables (default: out/ and the file''s name)', threads, &
+    character(*), parameter :: set = &
+      & '  --set KEY=VALUE change a key of the scene, as in horizon%ratio=4; may be repeated'
+    character(w), parameter :: tables(5) = [character(w) :: &
+      & '  --output DIR    folder of the tables (default: out/ and the file''s name)', set, &
+      & threads, &
       & '  --overwrite     replace an existing study', '  --quiet         print errors only']
 
     select case (command)
     case ('run')
       text = join([character(w) :: &
         & 'perifort run FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
-        & '                  [--restart [CHECKPOINT]] [--max-minutes M]', &
+        & '                  [--restart [CHECKPOINT]] [--max-minutes M] [--set KEY=VALUE] ...', &
         & '', &
         & 'Compute the scene in FILE and write the results.', &
         & '', &
         & '  --output DIR    folder of the results (default: out/ and the name of the file)', &
-        & threads, &
+        & set, threads, &
         & '  --overwrite     replace existing results', &
         & '  --restart [CHECKPOINT]', &
         & '                  continue from the last checkpoint of this run, or from CHECKPOINT;', &
@@ -38,16 +41,16 @@ contains
         & '  --quiet         print errors only'], newline)
     case ('check')
       text = join([character(w) :: &
-        & 'perifort check FILE [--threads N]', &
+        & 'perifort check FILE [--threads N] [--set KEY=VALUE] ...', &
         & '', &
         & 'Read and check the scene in FILE and build its points and bonds, without running it.', &
         & 'Prints points, bonds, memory, time step, the algorithms that were chosen and why, and', &
         & 'the predicted time of a run.', &
         & '', &
-        & threads], newline)
+        & set, threads], newline)
     case ('limits')
       text = join([character(w) :: &
-        & 'perifort limits FILE [--seconds S] [--threads N]', &
+        & 'perifort limits FILE [--seconds S] [--threads N] [--set KEY=VALUE] ...', &
         & '', &
         & 'Measure the numerical limits of the scene in FILE: the largest stable time step from', &
         & 'the largest frequency of its body, beside equation 7.25; the rounding error of a run,', &
@@ -55,10 +58,11 @@ contains
         & 'the energy drift of each integrator. No results are written.', &
         & '', &
         & '  --seconds S     time for all runs together [s] (default: 60)', &
-        & threads], newline)
+        & set, threads], newline)
     case ('study')
       text = join([character(w) :: &
-        & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', '', &
+        & 'perifort study FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
+        & '                    [--set KEY=VALUE] ...', '', &
         & 'Run the scene in FILE with all values in its groups &study. Prints for each run the', &
         & 'measured value, its error, time, size and energy drift (the largest error of the', &
         & 'energy balance over the largest energy); then the Pareto front and the observed', &

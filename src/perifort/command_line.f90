@@ -4,6 +4,7 @@ module pd_command_line
   use pd_base_kinds, only: wp
   use pd_base_shell, only: program_command, quoted
   use pd_base_text, only: join, nearest_name, newline, to_text
+  use pd_scene_format_file, only: line_type
   use pd_scene_format_values, only: parse_real
   use pd_study_bench_options, only: bench_options_type, check_options
   implicit none (type, external)
@@ -16,10 +17,10 @@ module pd_command_line
     & 'run', 'check', 'limits', 'study', 'choose', 'template', 'reference', 'bench', 'version', &
     & 'help']
   integer, parameter :: restart_option = 4  !! its place in `option_names`
-  character(word_length), parameter :: option_names(18) = [character(word_length) :: &
+  character(word_length), parameter :: option_names(19) = [character(word_length) :: &
     & '--output', '--threads', '--overwrite', '--restart', '--max-minutes', '--quiet', '--points', &
     & '--dimension', '--model', '--family', '--breaking', '--precision', '--surface', '--seconds', &
-    & '--csv', '--error', '--time', '--help']
+    & '--csv', '--error', '--time', '--set', '--help']
 
   !> A command line, understood and checked.
   type :: command_line_type
@@ -38,6 +39,7 @@ module pd_command_line
     real(wp) :: error = 0.0_wp                     !! `--error` of `choose`; 0 = not given
     real(wp) :: time = 0.0_wp                      !! `--time` of `choose` [s]; 0 = not given
     logical :: help = .false.                      !! `--help`: only the text is wanted
+    type(line_type), allocatable :: changes(:)     !! `--set`: `group%key=value`, in their order
     character(:), allocatable :: text              !! the command line as it was typed
   end type command_line_type
 
@@ -92,6 +94,7 @@ contains
     line%output_directory = ''
     line%checkpoint = ''
     line%text = ''
+    allocate (line%changes(0))
     seen = .false.
     only_names = .false.
     i = 0
@@ -123,7 +126,7 @@ contains
             & //newline//'  known: '//join(option_names, ', '))
           return
         end if
-        if (seen(option)) then
+        if (seen(option) .and. name /= '--set') then
           call usage(error, line, "'"//name//"' is given twice")
           return
         end if
@@ -284,6 +287,11 @@ contains
       if (name == '--time') call read_positive(value, line%time, status)
       if (status /= 0) call usage(error, line, "'"//name//"' needs a number above 0, as in "// &
         & trim(merge('--error 1e-3', '--time 60   ', name == '--error'))//", found '"//value//"'")
+    case ('--set')
+      call add_change(line, value)
+      if (index(value, '=') > 1 .and. index(value, '=') < len(value)) return
+      call usage(error, line, "'--set' needs a key and its value, as in --set horizon%ratio=4, "// &
+        & "found '"//value//"'")
     case ('--overwrite')
       line%overwrite = .true.
     case ('--restart')
@@ -301,6 +309,21 @@ contains
       call internal_fault('set_option does not know an option of option_names')
     end select
   end subroutine set_option
+
+  !> One more change of a key.
+  subroutine add_change(line, text)
+    type(command_line_type), intent(inout) :: line
+    character(*), intent(in) :: text     !! `group%key=value`
+    type(line_type), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(line%changes) + 1))
+    do i = 1, size(line%changes)
+      call move_alloc(line%changes(i)%text, longer(i)%text)
+    end do
+    longer(size(longer))%text = text
+    call move_alloc(longer, line%changes)
+  end subroutine add_change
 
   !> A number above 0; `status` is not 0 if there is none.
   subroutine read_positive(text, value, status)
@@ -362,6 +385,8 @@ contains
     case ('--threads')
       belongs = any(command == [character(6) :: 'run', 'check', 'limits', 'bench', 'study', &
         & 'choose'])
+    case ('--set')
+      belongs = any(command == [character(6) :: 'run', 'check', 'limits', 'study', 'choose'])
     case ('--seconds')
       belongs = command == 'limits' .or. command == 'bench'
     case ('--error', '--time')
@@ -402,10 +427,16 @@ contains
   pure function restart_command(line) result(text)
     type(command_line_type), intent(in) :: line   !! of the command `run`
     character(:), allocatable :: text
+    integer :: i
 
     text = line%program//' run '
     if (index(line%argument, '-') == 1) text = text//'./'  ! a file's name, not an option
     text = text//quoted(line%argument)
+    if (allocated(line%changes)) then
+      do i = 1, size(line%changes)
+        text = text//' --set '//quoted(line%changes(i)%text)
+      end do
+    end if
     if (len(line%output_directory) > 0) text = text//' --output '//quoted(line%output_directory)
     if (line%threads > 0) text = text//' --threads '//to_text(line%threads)
     if (line%max_minutes > 0.0_wp) text = text//' --max-minutes '//to_text(line%max_minutes)

@@ -7,13 +7,15 @@ module pd_commands
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
-  use pd_driver, only: check_scene, run_scene
+  use pd_driver, only: run_scene
+  use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_report_begin, only: run_options_type
   use pd_output_results_hdf5, only: hdf5_version
+  use pd_preview, only: preview_scene
   use pd_scene_content_read, only: read_scene
   use pd_scene_content_reference, only: write_reference
   use pd_scene_content_template, only: write_template
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: name_length, scene_type
   use pd_study_bench_bench, only: run_bench
   use pd_study_trade_choose, only: run_choose
   use pd_study_limits_limits, only: run_limits
@@ -31,6 +33,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(run_options_type) :: options
     type(scene_type) :: scene
+    type(field_table_type) :: fields
+    character(name_length), allocatable :: names(:)
 
     if (line%help) then
       write (output_unit, '(a)', advance='no') help_text(line%command)
@@ -38,6 +42,8 @@ contains
     end if
 
     call omp_set_num_threads(default_threads())
+    fields = all_fields()
+    names = fields%names()
     select case (line%command)
     case ('run', 'check', 'limits', 'study', 'choose')
       options%output_directory = line%output_directory
@@ -50,28 +56,28 @@ contains
       options%max_minutes = line%max_minutes
       options%restart_command = restart_command(line)
       if (line%command == 'study') then
-        call run_study(line%argument, options, error)
+        call run_study(line%argument, options, error, line%changes)
         return
       else if (line%command == 'choose') then
-        call run_choose(line%argument, options, line%error, line%time, error)
+        call run_choose(line%argument, options, line%error, line%time, error, line%changes)
         return
       end if
-      call read_scene(line%argument, scene, error)
+      call read_scene(line%argument, scene, error, line%changes)
       if (allocated(error)) return
       select case (line%command)
       case ('run')
         call run_scene(scene, options, error)
       case ('check')
-        call check_scene(scene, options, error)
+        call preview_scene(scene, options, error)
       case ('limits')
         call run_limits(scene, options, line%seconds, error)
       case default
         call internal_fault('execute does not know a command that reads a scene')
       end select
     case ('template')
-      call write_template(output_unit, line%argument, error)
+      call write_template(output_unit, line%argument, error, names)
     case ('reference')
-      call write_reference(output_unit, line%argument, error)
+      call write_reference(output_unit, line%argument, error, names)
     case ('bench')
       call run_bench(line%bench, error)
     case ('version')

@@ -38,18 +38,23 @@ module pd_base_archive
     subroutine describe_interface(self, name, kind_name, extents)
       import :: archive_type, i8
       implicit none (type, external)
-      class(archive_type), intent(inout) :: self
-      character(*), intent(in) :: name, kind_name
-      integer(i8), intent(inout) :: extents(:)
+      class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if name, kind
+                                                  !! or rank differ from those kept
+      character(*), intent(in) :: name            !! what the archive calls the value
+      character(*), intent(in) :: kind_name       !! kind of its elements: `real8`, `integer1`,
+                                                  !! `integer8`
+      integer(i8), intent(inout) :: extents(:)    !! (rank) of the value; in reading those of the
+                                                  !! archive on return; -1: not allocated
     end subroutine describe_interface
 
     !> Take `bytes` bytes from `place`, or put them there.
     subroutine move_interface(self, place, bytes)
       import :: archive_type, c_ptr, i8
       implicit none (type, external)
-      class(archive_type), intent(inout) :: self
-      type(c_ptr), intent(in) :: place
-      integer(i8), intent(in) :: bytes
+      class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the bytes
+                                                  !! cannot be moved
+      type(c_ptr), intent(in) :: place            !! address of the value's first byte
+      integer(i8), intent(in) :: bytes            !! length of the value [bytes]
     end subroutine move_interface
   end interface
 
@@ -91,40 +96,48 @@ contains
     end do
   end function listed
 
+  !> A real number.
   subroutine keep_real(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
+    real(wp), intent(inout) :: value            !! taken in writing, set in reading
     real(wp), allocatable :: one(:)
     allocate (one(1), source=value)
     call self%keep(name, one)
     if (.not. allocated(self%error)) value = one(1)
   end subroutine keep_real
 
+  !> A long integer.
   subroutine keep_long(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i8), intent(inout) :: value
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
+    integer(i8), intent(inout) :: value         !! taken in writing, set in reading
     integer(i8), allocatable :: one(:, :)
     allocate (one(1, 1), source=value)
     call self%keep(name, one)
     if (.not. allocated(self%error)) value = one(1, 1)
   end subroutine keep_long
 
+  !> An integer, kept as a long one.
   subroutine keep_integer(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
+    integer, intent(inout) :: value             !! taken in writing, set in reading
     integer(i8) :: long
     long = value
     call self%keep(name, long)
     if (.not. allocated(self%error)) value = int(long)
   end subroutine keep_integer
 
+  !> A logical, kept as 1 or 0.
   subroutine keep_logical(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    logical, intent(inout) :: value
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
+    logical, intent(inout) :: value             !! taken in writing, set in reading
     integer(i8) :: long
     long = merge(1_i8, 0_i8, value)
     call self%keep(name, long)
@@ -133,9 +146,11 @@ contains
 
   !> A text; its length may change in reading.
   subroutine keep_text(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    character(:), allocatable, intent(inout) :: value
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
+    character(:), allocatable, intent(inout) :: value  !! any length; taken in writing, set in
+                                                       !! reading
     integer(i1), allocatable :: codes(:)
     integer :: i
 
@@ -153,10 +168,13 @@ contains
     end do
   end subroutine keep_text
 
+  !> A vector of real numbers; one that is not allocated is kept as such.
   subroutine keep_reals(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
     real(wp), allocatable, target, intent(inout) :: value(:)
+      !! (any length); taken in writing, set in reading and allocated if it is not
     integer(i8) :: extents(1)
     logical :: there, moves
 
@@ -168,10 +186,13 @@ contains
     if (moves) call self%move(c_loc(value), 8_i8*product(extents))
   end subroutine keep_reals
 
+  !> A table of real numbers; one that is not allocated is kept as such.
   subroutine keep_real_table(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
     real(wp), allocatable, target, intent(inout) :: value(:, :)
+      !! (any shape); taken in writing, set in reading and allocated if it is not
     integer(i8) :: extents(2)
     logical :: there, moves
 
@@ -183,10 +204,13 @@ contains
     if (moves) call self%move(c_loc(value), 8_i8*product(extents))
   end subroutine keep_real_table
 
+  !> Real numbers of rank 3; an array that is not allocated is kept as such.
   subroutine keep_real_block(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
     real(wp), allocatable, target, intent(inout) :: value(:, :, :)
+      !! (any shape); taken in writing, set in reading and allocated if it is not
     integer(i8) :: extents(3)
     logical :: there, moves
 
@@ -198,10 +222,13 @@ contains
     if (moves) call self%move(c_loc(value), 8_i8*product(extents))
   end subroutine keep_real_block
 
+  !> A vector of integers of one byte; one that is not allocated is kept as such.
   subroutine keep_flags(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
     integer(i1), allocatable, target, intent(inout) :: value(:)
+      !! (any length); taken in writing, set in reading and allocated if it is not
     integer(i8) :: extents(1)
     logical :: there, moves
 
@@ -213,10 +240,13 @@ contains
     if (moves) call self%move(c_loc(value), product(extents))
   end subroutine keep_flags
 
+  !> A table of long integers; one that is not allocated is kept as such.
   subroutine keep_long_table(self, name, value)
-    class(archive_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the value
+                                                !! cannot be kept
+    character(*), intent(in) :: name            !! what the archive calls the value
     integer(i8), allocatable, target, intent(inout) :: value(:, :)
+      !! (any shape); taken in writing, set in reading and allocated if it is not
     integer(i8) :: extents(2)
     logical :: there, moves
 

@@ -26,8 +26,10 @@ contains
 
   !> Take in more bytes.
   pure subroutine add(self, bytes)
-    class(checksum_type), intent(inout) :: self
-    integer(i1), contiguous, intent(in) :: bytes(:)
+    class(checksum_type), intent(inout) :: self      !! the checksum; that of the bytes so far and
+                                                     !! these on return
+    integer(i1), contiguous, intent(in) :: bytes(:)  !! (any length), in the order in which they are
+                                                     !! to be checked
     integer(i8) :: x, i, last
 
     if (.not. allocated(self%table)) call make_table(self)
@@ -49,7 +51,7 @@ contains
 
   !> The checksum of all bytes so far.
   pure integer(i8) function value(self)
-    class(checksum_type), intent(in) :: self
+    class(checksum_type), intent(in) :: self  !! the checksum, which may go on
     value = not(self%state)
   end function value
 

@@ -122,8 +122,8 @@ contains
 
   !> Begin an interval of the phase `name`; a phase that is already running goes on.
   subroutine start_phase(self, name)
-    class(phase_timer_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(phase_timer_type), intent(inout) :: self  !! the timer; notes the time
+    character(*), intent(in) :: name                !! of the phase; 32 characters count
     integer :: at
     real(wp) :: now
 
@@ -150,8 +150,9 @@ contains
 
   !> End the interval of the phase `name`; without a start this does nothing.
   subroutine stop_phase(self, name)
-    class(phase_timer_type), intent(inout) :: self
-    character(*), intent(in) :: name
+    class(phase_timer_type), intent(inout) :: self  !! the timer; adds the interval to the phase's
+                                                    !! time
+    character(*), intent(in) :: name                !! of the phase; 32 characters count
     integer :: at
 
     at = self%find(name)
@@ -163,8 +164,8 @@ contains
 
   !> Time spent in the phase `name` so far [s]; 0 for an unknown one.
   function seconds_of_phase(self, name) result(seconds)
-    class(phase_timer_type), intent(in) :: self
-    character(*), intent(in) :: name
+    class(phase_timer_type), intent(in) :: self  !! the timer
+    character(*), intent(in) :: name             !! of the phase; 32 characters count
     real(wp) :: seconds
     integer :: at
 
@@ -177,7 +178,7 @@ contains
 
   !> Time since the first start of any phase [s].
   function total_seconds(self) result(seconds)
-    class(phase_timer_type), intent(in) :: self
+    class(phase_timer_type), intent(in) :: self  !! the timer
     real(wp) :: seconds
     seconds = 0.0_wp
     if (self%origin >= 0.0_wp) seconds = wall_time() - self%origin
@@ -187,7 +188,7 @@ contains
   !> then the time that no phase covers and the total. Lines are parted by `new_line`; '' if no
   !> phase was ever started.
   function table_of_phases(self) result(text)
-    class(phase_timer_type), intent(in) :: self
+    class(phase_timer_type), intent(in) :: self  !! the timer
     character(:), allocatable :: text
     real(wp) :: total, other
     integer :: i
@@ -233,9 +234,11 @@ contains
 
   !> Begin. `is_terminal`: rewrite the line in place; `quiet`: show nothing at all.
   subroutine start_progress(self, total_steps, is_terminal, quiet, unit, first_step, load)
-    class(progress_type), intent(inout) :: self
-    integer(i8), intent(in) :: total_steps
-    logical, intent(in) :: is_terminal, quiet
+    class(progress_type), intent(inout) :: self       !! the progress line, set to its beginning
+    integer(i8), intent(in) :: total_steps  !! of the whole run, those done before included
+    logical, intent(in) :: is_terminal                !! rewrite the line in place; else write a new
+                                                      !! line now and then
+    logical, intent(in) :: quiet                      !! show nothing at all
     integer, intent(in), optional :: unit             !! default: standard output
     integer(i8), intent(in), optional :: first_step   !! steps that were done before, default 0
     logical, intent(in), optional :: load             !! the time told is the part of the load
@@ -259,11 +262,12 @@ contains
 
   !> Tell that `step` steps are complete. The last one is always shown. `note` is added.
   subroutine update_progress(self, step, time, bonds_broken, note)
-    class(progress_type), intent(inout) :: self
-    integer(i8), intent(in) :: step
+    class(progress_type), intent(inout) :: self  !! the progress line; notes when it looked at the
+                                                 !! clock and what it has shown
+    integer(i8), intent(in) :: step  !! steps that are complete, those done before the run included
     real(wp), intent(in) :: time               !! simulated [s]
     integer(i8), intent(in) :: bonds_broken    !! since the start of the run
-    character(*), intent(in), optional :: note
+    character(*), intent(in), optional :: note   !! text behind the line; absent: none
     real(wp) :: now, waited, interval
     character(:), allocatable :: line
 
@@ -298,7 +302,7 @@ contains
 
   !> Leave the line, so that what is written next begins a new one. May be called at any time.
   subroutine finish_progress(self)
-    class(progress_type), intent(inout) :: self
+    class(progress_type), intent(inout) :: self  !! the progress line; no longer open on return
     if (self%open_line) write (self%unit, '(a)') ''
     self%open_line = .false.
   end subroutine finish_progress
@@ -306,7 +310,9 @@ contains
   !> The progress line: percent, step, simulated time, bonds broken, steps per second and time left,
   !> the last two from the mean of the `elapsed` seconds.
   pure function progress_text(step, total, time, bonds_broken, elapsed, first, load) result(text)
-    integer(i8), intent(in) :: step, total, bonds_broken
+    integer(i8), intent(in) :: step  !! steps that are complete, those before `first` included
+    integer(i8), intent(in) :: total           !! steps of the whole run
+    integer(i8), intent(in) :: bonds_broken    !! since the start of the run
     real(wp), intent(in) :: time, elapsed      !! [s]
     integer(i8), intent(in), optional :: first !! step at which the clock was started, default 0
     logical, intent(in), optional :: load      !! `time` is the part of the load, 0 to 1

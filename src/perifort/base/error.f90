@@ -24,11 +24,14 @@ contains
   !> Allocate `error` with a message and an exit status (default: `status_input`). `group` and
   !> `number` say which group of a scene is to blame, for those who know its place in the file.
   pure subroutine fail(error, message, status, group, number)
-    type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in) :: message
-    integer, intent(in), optional :: status
-    character(*), intent(in), optional :: group
-    integer, intent(in), optional :: number
+    type(error_type), allocatable, intent(out) :: error  !! allocated on return, with what follows
+    character(*), intent(in) :: message  !! what was wrong, what was expected, what is allowed
+    integer, intent(in), optional :: status      !! exit status of the program, one of `status_*`;
+                                                 !! absent: `status_input`
+    character(*), intent(in), optional :: group  !! name of the scene's group that is to blame;
+                                                 !! absent: not known
+    integer, intent(in), optional :: number      !! which one of the groups of that name, from 1;
+                                                 !! absent: 0, not known
 
     allocate (error)
     error%message = message

@@ -5,12 +5,20 @@ module pd_base_interrupt
   use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int, c_null_funptr
   implicit none (type, external)
   private
-  public :: watch_for_interrupt, interrupted, let_writes_fail
+  public :: watch_for_interrupt, interrupted, let_writes_fail, handlers_type, signal_handlers, &
+    & put_back_handlers
 
   integer(c_int), parameter :: sigint = 2_c_int, sigterm = 15_c_int  ! POSIX
   integer(c_int), parameter :: sigusr1 = 10_c_int                    ! Linux
   integer(c_int), parameter :: sigxfsz = 25_c_int                    ! Linux on common processors
+  integer(c_int), parameter :: signals(4) = [sigint, sigterm, sigusr1, sigxfsz]
   logical, volatile :: noted = .false.
+
+  !> What a program does at the signals that a run takes for itself.
+  type :: handlers_type
+    private
+    type(c_funptr) :: of(size(signals)) = c_null_funptr
+  end type handlers_type
 
   interface
     !> POSIX: call `handler` at a signal; a null pointer is the default action.
@@ -33,6 +41,32 @@ contains
     before = posix_signal(sigterm, c_funloc(note))
     before = posix_signal(sigusr1, c_funloc(note))
   end subroutine watch_for_interrupt
+
+  !> What happens at the signals now, to be put back after a run: the run may be called by a program
+  !> that has handlers of its own.
+  function signal_handlers() result(handlers)
+    type(handlers_type) :: handlers
+    type(c_funptr) :: ours
+    integer :: i
+
+    ! there is no other way to ask than to set one
+    do i = 1, size(signals)
+      handlers%of(i) = posix_signal(signals(i), c_null_funptr)
+      ours = posix_signal(signals(i), handlers%of(i))
+    end do
+  end function signal_handlers
+
+  !> Put back what a program does at the signals. A request to end that was noted stays noted until
+  !> the next `watch_for_interrupt`.
+  subroutine put_back_handlers(handlers)
+    type(handlers_type), intent(in) :: handlers
+    type(c_funptr) :: ours
+    integer :: i
+
+    do i = 1, size(signals)
+      ours = posix_signal(signals(i), handlers%of(i))
+    end do
+  end subroutine put_back_handlers
 
   !> A file beyond the size that the system allows the user (`ulimit -f`) ends the program by a
   !> signal unless that is ignored; then the write fails, and can be told like a full disk.

@@ -23,7 +23,8 @@ contains
   !> overflow; products of 22 bits with a factor of 40 spread the value without overflow either.
   !> Turned by 22 bits each, one goes on where the one before ends: no bit stands for another.
   elemental integer(i8) function mix(key, value)
-    integer(i8), intent(in) :: key, value
+    integer(i8), intent(in) :: key    !! of the values mixed in so far; any number to begin with
+    integer(i8), intent(in) :: value  !! to be mixed in
     integer(i8), parameter :: spread = 679535556991_i8  ! 2^40 over the golden ratio, odd
     integer(i8), parameter :: low = 4194303_i8          ! 22 bits
 
@@ -35,10 +36,10 @@ contains
 
   !> The number of `key`; a new key gets the next one.
   subroutine number_of(table, key, number, is_new)
-    class(lookup_type), intent(inout) :: table
-    integer(i8), intent(in) :: key
-    integer, intent(out) :: number
-    logical, intent(out) :: is_new
+    class(lookup_type), intent(inout) :: table  !! a new key is added to it
+    integer(i8), intent(in) :: key              !! to be looked up
+    integer, intent(out) :: number  !! of the key: 1, 2, 3, ... in the order of first appearance
+    logical, intent(out) :: is_new              !! whether the key was not in the table before
     integer :: at
 
     if (.not. allocated(table%keys)) then
@@ -58,8 +59,8 @@ contains
 
   !> The next number, for values whose key belongs to others: no key leads to it.
   subroutine own_number(table, number)
-    class(lookup_type), intent(inout) :: table
-    integer, intent(out) :: number
+    class(lookup_type), intent(inout) :: table  !! counts one number more
+    integer, intent(out) :: number              !! the next one, which no key has
     table%count = table%count + 1
     number = table%count
   end subroutine own_number

@@ -11,7 +11,7 @@ contains
 
   !> The numbers of `values` in ascending order of value.
   pure function ascending(values) result(order)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)  !! (n), without NaN
     integer :: order(size(values))
     integer :: i, j, this
 
@@ -28,7 +28,7 @@ contains
 
   !> The middle value, of an even number the lower of the two.
   pure real(wp) function median(values)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)  !! (n), at least one, without NaN
     integer :: order(size(values))
     order = ascending(values)
     median = values(order((size(values) + 1)/2))

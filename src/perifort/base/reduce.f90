@@ -172,19 +172,19 @@ contains
 
   !> Whether the point with this number here (0: none) is one that the process owns.
   elemental logical function owns(order, point)
-    type(order_type), intent(in) :: order
-    integer(i4), intent(in) :: point
+    type(order_type), intent(in) :: order  !! the points that are owned
+    integer(i4), intent(in) :: point  !! its number here, or 0
     owns = point + order%before >= order%first .and. point + order%before <= order%last &
       & .and. point > 0_i4
   end function owns
 
   !> The slots of the owned points of a block: those of the places `at`, `at` + 1, ...
   pure subroutine slots_of_block(order, block, at, n, slots)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer, intent(in) :: block                !! 1 to `order%blocks`
     integer, intent(out) :: at                  !! place of the first one in the block
     integer, intent(out) :: n                   !! how many
-    integer, intent(out) :: slots(block_points)
+    integer, intent(out) :: slots(block_points)  !! the first `n` are set
     integer(i8) :: first, last
     integer :: r, i, m
 
@@ -207,10 +207,10 @@ contains
 
   !> The values of a block's owned points at their places in the block; 0 elsewhere.
   pure subroutine take_block(order, block, values, taken)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer, intent(in) :: block                      !! 1 to `order%blocks`
     real(wp), intent(in), contiguous :: values(:)     !! (n_slots)
-    real(wp), intent(out) :: taken(block_points)
+    real(wp), intent(out) :: taken(block_points)  !! by place in the block
     integer(i8) :: first, last
     integer :: r, i, at, from
 
@@ -232,9 +232,9 @@ contains
 
   !> The other way round.
   pure subroutine put_block(order, block, taken, values)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer, intent(in) :: block                        !! 1 to `order%blocks`
-    real(wp), intent(in) :: taken(block_points)
+    real(wp), intent(in) :: taken(block_points)  !! by place in the block
     real(wp), intent(inout), contiguous :: values(:)    !! (n_slots); others stay
     integer(i8) :: first, last
     integer :: r, i, at, from
@@ -281,9 +281,9 @@ contains
 
   !> Room for `number` sums.
   pure subroutine new_sums(order, number, sums)
-    type(order_type), intent(in) :: order
-    integer, intent(in) :: number
-    type(sums_type), intent(out) :: sums
+    type(order_type), intent(in) :: order  !! which points are owned
+    integer, intent(in) :: number  !! how many sums
+    type(sums_type), intent(out) :: sums  !! nothing is added yet
 
     sums%number = number
     allocate (sums%block(number, order%blocks))
@@ -293,10 +293,10 @@ contains
 
   !> Take the terms of a block, which are 0 at places without an owned point.
   pure subroutine add_block(order, block, terms, sums)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! which points are owned
     integer, intent(in) :: block                  !! 1 to `order%blocks`, each once
     real(wp), intent(in) :: terms(:, :)           !! (block_points, number)
-    type(sums_type), intent(inout) :: sums
+    type(sums_type), intent(inout) :: sums  !! with the sums of the block on return
     integer :: s, i
 
     do s = 1, sums%number
@@ -311,8 +311,8 @@ contains
 
   !> The sums over all points, of all ranks.
   function total_of(order, sums) result(total)
-    type(order_type), intent(in) :: order
-    type(sums_type), intent(in) :: sums
+    type(order_type), intent(in) :: order  !! which points are owned
+    type(sums_type), intent(in) :: sums  !! every block has been added
     real(wp) :: total(sums%number)
     real(wp) :: group(sums%number)
     integer :: b, place
@@ -333,7 +333,7 @@ contains
 
   !> The sums of the blocks of a group, of which `first` is the first one here, at a place.
   pure subroutine sum_group(order, sums, first, at, values)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     type(sums_type), intent(in) :: sums
     integer, intent(in) :: first, at
     real(wp), intent(out) :: values(:)
@@ -352,7 +352,7 @@ contains
   !> The same where there are more ranks than one. Blocks and groups in which a rank begins are
   !> completed from the parts of all ranks.
   function total_of_ranks(order, sums) result(total)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     type(sums_type), intent(in) :: sums
     real(wp) :: total(sums%number)
     real(wp), allocatable :: group(:, :), parts(:, :, :), values(:)
@@ -407,8 +407,8 @@ contains
 
   !> Begin sums of points that come one after another.
   pure subroutine new_running(order, running)
-    type(order_type), intent(in) :: order
-    type(running_type), intent(out) :: running
+    type(order_type), intent(in) :: order  !! which points are owned
+    type(running_type), intent(out) :: running  !! nothing is added yet
 
     if (.not. associated(order%ranks)) return
     allocate (running%of_ranks)
@@ -419,10 +419,10 @@ contains
   !> Add the terms of a point; points come in ascending order, any of them may be left out. Points
   !> that the process does not own are left to those that do.
   pure subroutine add_point(order, point, terms, running)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! which points are owned
     integer(i4), intent(in) :: point           !! its number here
     real(wp), intent(in) :: terms(:)           !! at most `most_running`
-    type(running_type), intent(inout) :: running
+    type(running_type), intent(inout) :: running  !! with the terms of this point on return
     integer(i8) :: number
     integer :: l, n, c
 
@@ -440,7 +440,7 @@ contains
 
   !> The sum of the last block is complete; `next` is the one to come.
   pure subroutine end_block(order, next, running)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer(i8), intent(in) :: next
     type(running_type), intent(inout) :: running
     real(wp) :: value
@@ -471,7 +471,7 @@ contains
 
   !> The sums over all points that were added, on all ranks.
   function total_of_running(order, running) result(total)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! which points are owned
     type(running_type), intent(inout) :: running  !! nothing can be added any more
     real(wp) :: total(most_running)
 
@@ -487,7 +487,7 @@ contains
 
   !> Sum of a b.
   function inner_scalars(order, a, b) result(total)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: a(:), b(:)  !! (n_slots)
     real(wp) :: total, sums_of_all(1)
     type(sums_type) :: sums
@@ -509,7 +509,7 @@ contains
 
   !> Sum of a b over all components.
   function inner_vectors(order, a, b) result(total)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: a(:, :), b(:, :)  !! (n_slots, dim)
     real(wp) :: total, sums_of_all(1)
     type(sums_type) :: sums
@@ -534,7 +534,7 @@ contains
 
   !> Sum of weight a b over all components.
   function inner_weighted(order, weight, a, b) result(total)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: weight(:)         !! (n_slots)
     real(wp), intent(in), contiguous :: a(:, :), b(:, :)  !! (n_slots, dim)
     real(wp) :: total, sums_of_all(1)
@@ -566,7 +566,7 @@ contains
 
   !> The terms of a block whose points stand in runs: nothing is copied.
   pure subroutine weigh_runs(order, block, weight, a, b, terms)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer, intent(in) :: block
     real(wp), intent(in), contiguous :: weight(:), a(:, :), b(:, :)
     real(wp), intent(out) :: terms(block_points)
@@ -593,7 +593,7 @@ contains
 
   !> Sum of the values of all points.
   function sum_over(order, values) result(total)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:)  !! (n_slots)
     real(wp) :: total, sums_of_all(1)
     type(sums_type) :: sums
@@ -614,7 +614,7 @@ contains
 
   !> The largest value of a point; -huge where there is none.
   real(wp) function largest_scalar(order, values) result(largest)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:)  !! (n_slots)
     integer :: block, i, n, at, slots(block_points)
 
@@ -632,7 +632,7 @@ contains
 
   !> The largest size of a component of a point; 0 where there is none.
   real(wp) function largest_size(order, values) result(largest)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:, :)  !! (n_slots, dim)
     integer :: block, i, n, c, at, slots(block_points)
 
@@ -652,7 +652,7 @@ contains
 
   !> The least value of a point; huge where there is none.
   real(wp) function least_over(order, values) result(least)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:)  !! (n_slots)
     integer :: block, i, n, at, slots(block_points)
 
@@ -670,7 +670,7 @@ contains
 
   !> The number, among the points of all ranks, of the first point that is marked; 0: none is.
   integer(i8) function first_where(order, marked) result(first)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     logical, intent(in) :: marked(:)  !! (n_slots)
     integer :: block, i, n, at, slots(block_points)
 
@@ -692,7 +692,7 @@ contains
 
   !> The number, among the points of all ranks, of the first point with the largest value.
   integer(i8) function first_largest(order, values) result(first)
-    type(order_type), intent(in) :: order
+    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:)  !! (n_slots)
     real(wp) :: largest
     largest = largest_over(order, values)
@@ -701,8 +701,8 @@ contains
 
   !> The largest of what each rank has.
   real(wp) function largest_of_ranks(order, value) result(largest)
-    type(order_type), intent(in) :: order
-    real(wp), intent(in) :: value
+    type(order_type), intent(in) :: order  !! which ranks there are
+    real(wp), intent(in) :: value  !! what this rank has
     real(wp) :: values(1)
 
     largest = value
@@ -714,8 +714,8 @@ contains
 
   !> The sum of what each rank has. Its rounding depends on the ranks: it is for what only watches.
   real(wp) function sum_of_ranks(order, value) result(total)
-    type(order_type), intent(in) :: order
-    real(wp), intent(in) :: value
+    type(order_type), intent(in) :: order  !! which ranks there are
+    real(wp), intent(in) :: value  !! what this rank has
     real(wp) :: values(1)
 
     total = value
@@ -727,18 +727,19 @@ contains
 
   !> The number that all ranks have counted together, up to 2^53.
   integer(i8) function count_of_ranks(order, number) result(total)
-    type(order_type), intent(in) :: order
-    integer(i8), intent(in) :: number
+    type(order_type), intent(in) :: order  !! which ranks there are
+    integer(i8), intent(in) :: number  !! what this rank has counted
     total = number
     if (associated(order%ranks)) total = nint(sum_of_ranks(order, real(number, wp)), i8)
   end function count_of_ranks
 
   ! ---------------------------------------------------------------- random numbers and orders
 
-  !> The next number in (-1, 1) of a sequence that is the same on every machine. `state` starts it,
-  !> from 1 to 2147483646, and is changed.
+  !> The next number in (-1, 1) of a sequence that is the same on every machine: the multiplicative
+  !> generator of Park and Miller (1988), 16807 modulo 2^31 - 1. `state` starts it, from 1 to
+  !> 2147483646, and is changed.
   real(wp) function noise(state)
-    integer, intent(inout) :: state
+    integer, intent(inout) :: state  !! of the sequence, 1 to 2147483646; the next one on return
     ! Schrage's way to keep 16807*state mod 2^31-1 within 32 bits
     state = 16807*mod(state, 127773) - 2836*(state/127773)
     if (state <= 0) state = state + 2147483647
@@ -747,8 +748,8 @@ contains
 
   !> The state of `noise` after so many numbers: a rank begins with its own points.
   pure integer function noise_after(seed, drawn) result(state)
-    integer, intent(in) :: seed
-    integer(i8), intent(in) :: drawn
+    integer, intent(in) :: seed  !! the state at the beginning, 1 to 2147483646
+    integer(i8), intent(in) :: drawn  !! how many numbers
     integer(i8), parameter :: modulus = 2147483647_i8
     integer(i8) :: factor, power, left
 
@@ -765,7 +766,7 @@ contains
 
   !> The places of `values` in ascending order of value; equal ones stay as they stand.
   pure function ascending_order(values) result(order)
-    integer(i4), intent(in) :: values(:)
+    integer(i4), intent(in) :: values(:)  !! (n) in any order
     integer, allocatable :: order(:)
     integer, allocatable :: other(:)
     integer :: width, i, middle, last, n

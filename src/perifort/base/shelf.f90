@@ -30,8 +30,9 @@ contains
 
   !> Begin anew, to read or to write.
   subroutine rewind_shelf(self, reading)
-    class(shelf_type), intent(inout) :: self
-    logical, intent(in) :: reading
+    class(shelf_type), intent(inout) :: self  !! the archive, set to its first value and without an
+                                              !! error; values that it keeps stay
+    logical, intent(in) :: reading  !! whether values are to be put back; else they are taken
 
     self%reading = reading
     self%at = 0
@@ -39,10 +40,15 @@ contains
     if (.not. allocated(self%parcels)) allocate (self%parcels(32))
   end subroutine rewind_shelf
 
+  !> Go to the next value: note its extents, or in reading return them.
   subroutine describe(self, name, kind_name, extents)
-    class(shelf_type), intent(inout) :: self
-    character(*), intent(in) :: name, kind_name
-    integer(i8), intent(inout) :: extents(:)
+    class(shelf_type), intent(inout) :: self  !! the archive, at the next value on return; its
+                                              !! `error` is set if none of this rank is kept
+    character(*), intent(in) :: name          !! of the value, for the message; it is not compared
+    character(*), intent(in) :: kind_name     !! kind of its elements, for the message; it is not
+                                              !! compared
+    integer(i8), intent(inout) :: extents(:)  !! (rank) of the value; in reading those that were
+                                              !! kept on return
     type(parcel_type), allocatable :: more(:)
     integer :: i
 
@@ -70,10 +76,11 @@ contains
     self%parcels(self%at)%extents = extents
   end subroutine describe
 
+  !> Copy the bytes of the value that was described last, from `place` or back to it.
   subroutine move(self, place, bytes)
-    class(shelf_type), intent(inout) :: self
-    type(c_ptr), intent(in) :: place
-    integer(i8), intent(in) :: bytes
+    class(shelf_type), intent(inout) :: self  !! the archive, with the value described
+    type(c_ptr), intent(in) :: place          !! address of the value's first byte
+    integer(i8), intent(in) :: bytes          !! length of the value [bytes]
     integer(i1), pointer, contiguous :: there(:)
 
     call c_f_pointer(place, there, [bytes])

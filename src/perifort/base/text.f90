@@ -17,14 +17,14 @@ contains
 
   !> An integer without blanks.
   pure function integer_to_text(value) result(text)
-    integer, intent(in) :: value
+    integer, intent(in) :: value  !! any integer
     character(:), allocatable :: text
     text = long_to_text(int(value, i8))
   end function integer_to_text
 
   !> A long integer without blanks.
   pure function long_to_text(value) result(text)
-    integer(i8), intent(in) :: value
+    integer(i8), intent(in) :: value  !! any long integer
     character(:), allocatable :: text
     character(24) :: buffer
     write (buffer, '(i0)') value
@@ -33,8 +33,8 @@ contains
 
   !> A real with `digits` significant digits (default 6), trailing zeros cut.
   pure function real_to_text(value, digits) result(text)
-    real(wp), intent(in) :: value
-    integer, intent(in), optional :: digits
+    real(wp), intent(in) :: value            !! any real, NaN and infinity too
+    integer, intent(in), optional :: digits  !! significant ones, at least 1; absent: 6
     character(:), allocatable :: text
     character(40) :: buffer
     character(16) :: form
@@ -81,16 +81,16 @@ contains
 
   !> `true` or `false`.
   pure function logical_to_text(value) result(text)
-    logical, intent(in) :: value
+    logical, intent(in) :: value  !! to be named
     character(:), allocatable :: text
     text = trim(merge('true ', 'false', value))
   end function logical_to_text
 
   !> A value with an SI prefix and a unit: `with_unit(1.946e-7, 's')` is `194.6 ns`.
   pure function with_unit(value, unit, digits) result(text)
-    real(wp), intent(in) :: value
-    character(*), intent(in) :: unit
-    integer, intent(in), optional :: digits
+    real(wp), intent(in) :: value            !! in the unit without a prefix
+    character(*), intent(in) :: unit         !! its symbol, to which a prefix may be put
+    integer, intent(in), optional :: digits  !! significant ones, at least 1; absent: 6
     character(:), allocatable :: text
     character(*), parameter :: prefixes(-5:4) = ['f', 'p', 'n', 'u', 'm', ' ', 'k', 'M', 'G', 'T']
     integer :: step
@@ -103,7 +103,7 @@ contains
 
   !> A number of things: `1 point`, `12 points`.
   pure function counted(number, thing) result(text)
-    integer, intent(in) :: number
+    integer, intent(in) :: number      !! how many there are
     character(*), intent(in) :: thing  !! in the singular; the plural has an s more
     character(:), allocatable :: text
     text = to_text(number)//' '//thing
@@ -113,7 +113,7 @@ contains
   !> A line of a summary: a label, its content in a column of its own, a newline.
   pure function labelled_line(label, content) result(text)
     character(*), intent(in) :: label     !! at most 15 characters, which leave a blank
-    character(*), intent(in) :: content
+    character(*), intent(in) :: content   !! of any length, without a newline
     character(:), allocatable :: text
     character(18) :: column
     column = '  '//label
@@ -122,7 +122,7 @@ contains
 
   !> ASCII letters in lower case.
   pure function lower_case(text) result(lower)
-    character(*), intent(in) :: text
+    character(*), intent(in) :: text  !! any characters; those beyond ASCII stay
     character(len(text)) :: lower
     integer :: i, code
 
@@ -135,14 +135,14 @@ contains
 
   !> Whether a byte is a control character of ASCII.
   pure logical function is_control(byte)
-    character, intent(in) :: byte
+    character, intent(in) :: byte  !! one character of a text
     is_control = iachar(byte) < 32 .or. iachar(byte) == 127
   end function is_control
 
   !> A text as it may be shown on a terminal: control characters, by which a file name or a line of
   !> a file could move the cursor or worse, become question marks. Line ends and tabs stay.
   pure function printable(text) result(shown)
-    character(*), intent(in) :: text
+    character(*), intent(in) :: text  !! any characters, from a file or the command line
     character(len(text)) :: shown
     integer :: i
 
@@ -155,8 +155,8 @@ contains
 
   !> The one of `names` that `name` was probably meant to be; '' if none is near.
   pure function nearest_name(name, names) result(nearest)
-    character(*), intent(in) :: name
-    character(*), intent(in) :: names(:)
+    character(*), intent(in) :: name      !! as it was typed; case does not matter
+    character(*), intent(in) :: names(:)  !! (any number) that are allowed
     character(:), allocatable :: nearest
     integer :: i, distance, best
 
@@ -173,7 +173,8 @@ contains
 
   !> Least number of insertions, deletions, substitutions and swaps of neighbours from `a` to `b`.
   pure integer function edit_distance(a, b) result(distance)
-    character(*), intent(in) :: a, b
+    character(*), intent(in) :: a  !! one text; blanks and case count
+    character(*), intent(in) :: b  !! the other
     integer :: d(0:len(a), 0:len(b))
     integer :: i, j, k, l, cost
 
@@ -195,8 +196,8 @@ contains
 
   !> Names in one line, parted by `separator`.
   pure function join(names, separator) result(text)
-    character(*), intent(in) :: names(:)
-    character(*), intent(in) :: separator
+    character(*), intent(in) :: names(:)   !! (any number); blanks at their ends are cut
+    character(*), intent(in) :: separator  !! between two names, blanks included
     character(:), allocatable :: text
     integer :: i
 

@@ -79,8 +79,8 @@ contains
   !> Begin with `asked` threads, or, if that is 0, with the default number, which may then be
   !> lowered while other programs need the cores.
   subroutine begin_team(self, asked)
-    class(team_type), intent(out) :: self
-    integer, intent(in) :: asked
+    class(team_type), intent(out) :: self  !! the threads of a run; OpenMP is told their number
+    integer, intent(in) :: asked           !! number that the user asks for; 0: none
 
     self%passive = is_given('OMP_WAIT_POLICY') .or. is_given('GOMP_SPINCOUNT')
     self%watches = asked == 0 .and. .not. (is_given('OMP_NUM_THREADS') .or. self%passive)
@@ -91,7 +91,7 @@ contains
   !> Take one thread for a body that is not worth more, unless the user has asked for a number. For
   !> others see whether the cores are free: where they are not, begin with one thread.
   subroutine fit(self, bonds, asked)
-    class(team_type), intent(inout) :: self
+    class(team_type), intent(inout) :: self  !! the threads of a run; their number may be lowered
     integer(i8), intent(in) :: bonds  !! ordered pairs of the body
     integer, intent(in) :: asked      !! threads that the command line asks for, 0: none
 
@@ -106,7 +106,8 @@ contains
   !> An instant is over (a step or an iteration): measure, and change the number of threads if that
   !> is due. Cheap: the clock is looked at some hundred times a second.
   subroutine look(self)
-    class(team_type), intent(inout) :: self
+    class(team_type), intent(inout) :: self  !! the threads of a run; measures, and may change their
+                                             !! number
     real(wp) :: now, processor
 
     if (self%most == 1) return
@@ -131,7 +132,8 @@ contains
 
   !> What follows until the next `look` is not measured (outputs).
   subroutine pause(self)
-    class(team_type), intent(inout) :: self
+    class(team_type), intent(inout) :: self  !! the threads of a run; drops the measurement under
+                                             !! way
     self%wall_mark = -1.0_wp
     self%left = 0
     self%instants = 0
@@ -186,13 +188,13 @@ contains
 
   !> Threads that the run may use.
   pure integer function threads(self)
-    class(team_type), intent(in) :: self
+    class(team_type), intent(in) :: self  !! the threads of a run
     threads = self%most
   end function threads
 
   !> What the threads came to, where that is worth a line; else ''.
   pure function report(self) result(text)
-    class(team_type), intent(in) :: self
+    class(team_type), intent(in) :: self  !! the threads of a run, at its end
     character(:), allocatable :: text
     real(wp) :: share
 

@@ -5,7 +5,7 @@ module pd_base_version
   private
   public :: program_version, compiler_name, compiler_flags
 
-  character(*), parameter :: program_version = '0.1.0'  !! the same as in fpm.toml
+  character(*), parameter :: program_version = '0.2.0'  !! the same as in fpm.toml
 
 contains
 
@@ -54,7 +54,7 @@ contains
     case ('-O', '-f', '-s', '-g')
       tells = index(word, '-fpre-include') /= 1 .and. index(word, '-fmax-errors') /= 1
     case default
-      continue
+      continue  ! any other word says nothing of the code that is made
     end select
   end function tells
 

@@ -34,9 +34,11 @@ contains
   !> Note a warning. Another one of the same subject is counted, but its text is not kept. With
   !> `tell` the first of a subject is printed to standard error.
   subroutine add(self, subject, text, tell)
-    class(warnings_type), intent(inout) :: self
-    character(*), intent(in) :: subject, text
-    logical, intent(in) :: tell
+    class(warnings_type), intent(inout) :: self  !! the warnings; at most 100 subjects are kept
+    character(*), intent(in) :: subject          !! what makes it the same as another warning
+    character(*), intent(in) :: text             !! what the user reads
+    logical, intent(in) :: tell                  !! whether to print the text to standard error, if
+                                                 !! the subject is new
     integer :: i
 
     if (.not. allocated(self%list)) allocate (self%list(most))
@@ -53,8 +55,8 @@ contains
 
   !> Whether there is a warning of this subject.
   pure logical function has(self, subject)
-    class(warnings_type), intent(in) :: self
-    character(*), intent(in) :: subject
+    class(warnings_type), intent(in) :: self  !! the warnings
+    character(*), intent(in) :: subject       !! as given to `add`
     integer :: i
 
     has = .false.
@@ -65,14 +67,14 @@ contains
 
   !> Different warnings so far.
   pure integer function count_warnings(self)
-    class(warnings_type), intent(in) :: self
+    class(warnings_type), intent(in) :: self  !! the warnings
     count_warnings = self%number
   end function count_warnings
 
   !> The text of one of them.
   pure function line(self, i) result(text)
-    class(warnings_type), intent(in) :: self
-    integer, intent(in) :: i
+    class(warnings_type), intent(in) :: self  !! the warnings
+    integer, intent(in) :: i                  !! which one, 1 to `count()`
     character(:), allocatable :: text
     text = self%list(i)%text
   end function line
@@ -80,7 +82,7 @@ contains
   !> All as they are kept, a line for each: how many times, a blank, the text of the first. ''
   !> without any.
   pure function all_lines(self) result(text)
-    class(warnings_type), intent(in) :: self
+    class(warnings_type), intent(in) :: self  !! the warnings
     character(:), allocatable :: text
     integer :: i
 
@@ -92,8 +94,10 @@ contains
 
   !> Keep the warnings, or put them back.
   subroutine keep_warnings(self, archive)
-    class(warnings_type), intent(inout) :: self
-    class(archive_type), intent(inout) :: archive
+    class(warnings_type), intent(inout) :: self    !! the warnings; in reading those of the archive
+                                                   !! on return
+    class(archive_type), intent(inout) :: archive  !! to write to or to read from; its `error` is
+                                                   !! set if that fails
     integer :: i
 
     if (.not. allocated(self%list)) allocate (self%list(most))

@@ -63,8 +63,9 @@ contains
 
   !> An empty body with room for `n` points, slots in point order.
   pure subroutine allocate_points(body, dim, n)
-    type(body_type), intent(out) :: body
-    integer, intent(in) :: dim, n
+    type(body_type), intent(out) :: body  !! positions, volumes and numbers are 0, grids none
+    integer, intent(in) :: dim            !! of the scene: 1, 2 or 3
+    integer, intent(in) :: n              !! number of points
     integer :: k
 
     body%dim = dim
@@ -81,8 +82,8 @@ contains
   !> Put the points of `more` behind those of `body`; both in point order, grids are those of
   !> `body`.
   pure subroutine append_points(body, more)
-    type(body_type), intent(inout) :: body
-    type(body_type), intent(in) :: more
+    type(body_type), intent(inout) :: body  !! in point order; with the points of both on return
+    type(body_type), intent(in) :: more     !! in point order, of the same dimension
     real(wp), allocatable :: x(:, :)
     integer :: n, k
 
@@ -106,8 +107,8 @@ contains
 
   !> Drop the points where `keep` is false; the body is in point order before and after.
   pure subroutine keep_points(body, keep)
-    type(body_type), intent(inout) :: body
-    logical, intent(in) :: keep(:)
+    type(body_type), intent(inout) :: body  !! in point order; without the dropped points on return
+    logical, intent(in) :: keep(:)          !! (n_points), whether the point stays
     integer(i4), allocatable :: kept(:)
     integer :: k
 
@@ -121,8 +122,10 @@ contains
 
   !> Move every point into its slot. `point(slot)` is 0 for dead slots.
   pure subroutine arrange(body, point)
-    type(body_type), intent(inout) :: body
-    integer(i4), intent(in) :: point(:)
+    type(body_type), intent(inout) :: body  !! in point order; with its slots and their order on
+                                            !! return
+    integer(i4), intent(in) :: point(:)     !! (n_slots), the point that each slot takes; 0: a dead
+                                            !! slot
     integer(i8) :: before, n_global
     integer :: s
 
@@ -146,7 +149,7 @@ contains
 
   !> Note which points the process owns.
   pure subroutine own_points(body, first, last, before, n_global)
-    type(body_type), intent(inout) :: body
+    type(body_type), intent(inout) :: body  !! in point order or arranged in slots
     integer, intent(in) :: first, last     !! the first and the last one, by their numbers here
     integer(i8), intent(in) :: before      !! added to these it is that among all points
     integer(i8), intent(in) :: n_global    !! points of all processes
@@ -158,8 +161,8 @@ contains
 
   !> Whether the process owns the point of a slot; no process owns dead slots.
   elemental logical function owned(body, slot)
-    type(body_type), intent(in) :: body
-    integer, intent(in) :: slot
+    type(body_type), intent(in) :: body  !! with its owned points
+    integer, intent(in) :: slot          !! 1 to n_slots
     owned = owns(body%order, body%point(slot))
   end function owned
 

@@ -27,11 +27,12 @@ module pd_body_generate
 
 contains
 
-  !> All points of the scene, in point order. An error if bodies overlap, if no point is left, or if
-  !> a layer joins none.
+  !> All points of the scene, in point order. An error if a cloud cannot be read or has a point
+  !> without volume, if no point is left, if the horizon holds too many points, if a layer joins
+  !> none, or if bodies or layers overlap.
   subroutine generate_body(scene, body, delta, error, counts)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(out) :: body
+    type(scene_type), intent(in) :: scene  !! checked, with its files' names
+    type(body_type), intent(out) :: body   !! all points, layers last, in point order
     real(wp), intent(out) :: delta                          !! the horizon [m]
     type(error_type), allocatable, intent(out) :: error
     type(layer_count_type), allocatable, intent(out), optional :: counts(:)  !! what the columns
@@ -103,8 +104,8 @@ contains
 
   !> delta [m]: the length given, or the ratio times the largest spacing.
   pure real(wp) function horizon_of(scene, largest_spacing) result(delta)
-    type(scene_type), intent(in) :: scene
-    real(wp), intent(in) :: largest_spacing
+    type(scene_type), intent(in) :: scene    !! gives the length or the ratio
+    real(wp), intent(in) :: largest_spacing  !! of all points [m]
     delta = scene%horizon%ratio*largest_spacing
     if (is_set(scene%horizon%length)) delta = scene%horizon%length
   end function horizon_of

@@ -16,10 +16,11 @@ module pd_body_initial
 
 contains
 
-  !> The groups are applied in order, each setting what it names.
+  !> The groups are applied in order, each setting what it names. An error if a file of initial
+  !> values cannot be read or does not have a row for each point.
   subroutine initial_state(scene, body, u, v, temperature_change, heated_by, error)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
+    type(scene_type), intent(in) :: scene  !! gives the groups and their regions
+    type(body_type), intent(in) :: body                          !! arranged in slots
     real(wp), allocatable, intent(out) :: u(:, :)                !! displacement (n_slots, dim) [m]
     real(wp), allocatable, intent(out) :: v(:, :)                !! velocity (n_slots, dim) [m/s]
     real(wp), allocatable, intent(out) :: temperature_change(:)  !! of each slot [K]

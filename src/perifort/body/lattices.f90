@@ -11,10 +11,11 @@ contains
 
   !> Points of a lattice, x fastest.
   pure subroutine lattice_points(dim, group, depth, body)
-    integer, intent(in) :: dim
+    integer, intent(in) :: dim             !! of the scene: 1, 2 or 3
     type(body_group), intent(in) :: group  !! with lower, upper and points
     real(wp), intent(in) :: depth          !! what makes dx^dim a volume: thickness, area or 1
-    type(body_type), intent(out) :: body
+    type(body_type), intent(out) :: body   !! points with positions, volumes and spacings, in point
+                                           !! order
     type(grid_type) :: grid
     integer :: count(3)
 
@@ -26,19 +27,20 @@ contains
 
   !> The grid of a lattice body: its cell 1 begins at the body's lower corner.
   pure type(grid_type) function lattice_grid(group, dim) result(grid)
-    type(body_group), intent(in) :: group
-    integer, intent(in) :: dim
+    type(body_group), intent(in) :: group  !! with lower, upper and points
+    integer, intent(in) :: dim             !! of the scene: 1, 2 or 3
     grid%origin(:dim) = group%lower(:dim)
     grid%spacing = (group%upper(1) - group%lower(1))/group%points(1)
   end function lattice_grid
 
   !> Points at the centres of the cells first..last of a grid, x fastest.
   pure subroutine box_of_cells(dim, grid, first, last, depth, body)
-    integer, intent(in) :: dim
-    type(grid_type), intent(in) :: grid
+    integer, intent(in) :: dim                !! of the scene: 1, 2 or 3
+    type(grid_type), intent(in) :: grid       !! whose cells are meant
     integer, intent(in) :: first(3), last(3)  !! cell 1 begins at the grid's origin
     real(wp), intent(in) :: depth             !! what makes dx^dim a volume
-    type(body_type), intent(out) :: body
+    type(body_type), intent(out) :: body      !! points with positions, volumes and spacings, in
+                                              !! point order
     integer :: i, j, k, n
 
     call allocate_points(body, dim, product(max(0, last - first + 1)))
@@ -59,7 +61,7 @@ contains
 
   !> The cell (3) of a grid whose centre is nearest to `x`; 1 along axes that are not used.
   pure function cell_of(grid, x) result(cell)
-    type(grid_type), intent(in) :: grid
+    type(grid_type), intent(in) :: grid    !! whose cells are meant
     real(wp), intent(in) :: x(:)           !! position (dim) [m]
     integer :: cell(3)
     integer :: c

@@ -57,11 +57,12 @@ contains
   !> Add the layers of all `&boundary side`, in the order of the groups. An error, with its place,
   !> for a layer without a point.
   subroutine add_layers(scene, delta, depth, body, counts, error)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene  !! gives the boundaries and the bodies' lattices
     real(wp), intent(in) :: delta            !! horizon [m]
     real(wp), intent(in) :: depth            !! what makes dx^dim a volume: thickness, area or 1
     type(body_type), intent(inout) :: body   !! in point order, without layers
     type(layer_count_type), allocatable, intent(out) :: counts(:)
+      !! (layers), what their columns came to
     type(error_type), allocatable, intent(out) :: error
     type(lookup_type) :: claimed
     integer(i2), allocatable :: owner(:)
@@ -392,7 +393,7 @@ contains
 
   !> What the user reads of a layer that does not cover its side; '' if it does.
   function layer_count_text(scene, tally) result(text)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene        !! gives the side of the boundary
     type(layer_count_type), intent(in) :: tally  !! of one layer
     character(:), allocatable :: text
 

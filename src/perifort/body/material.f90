@@ -31,14 +31,19 @@ module pd_body_material
 contains
 
   !> Parameters for `dim` dimensions (2D: `plane_strain` or stress, thickness h; 1D: area A) and
-  !> horizon `delta` [m]. With `bond_based` the special Poisson's ratio is taken, so that a = 0.
+  !> horizon `delta` [m] (doc/theory.md, 1). With `bond_based` and in 1D the special Poisson's ratio
+  !> is taken, so that a = 0.
   pure function new_material(youngs_modulus, poissons_ratio, density, dim, plane_strain, &
     & thickness, area, delta, bond_based) result(m)
-    real(wp), intent(in) :: youngs_modulus, poissons_ratio, density
-    integer, intent(in) :: dim
-    logical, intent(in) :: plane_strain
-    real(wp), intent(in) :: thickness, area, delta
-    logical, intent(in) :: bond_based
+    real(wp), intent(in) :: youngs_modulus  !! E [Pa]
+    real(wp), intent(in) :: poissons_ratio  !! nu, not used in 1D or with `bond_based` [-]
+    real(wp), intent(in) :: density         !! rho [kg/m3]
+    integer, intent(in) :: dim              !! of the scene: 1, 2 or 3
+    logical, intent(in) :: plane_strain  !! 2D: plane strain, else plane stress; not used otherwise
+    real(wp), intent(in) :: thickness       !! 2D: h; not used otherwise [m]
+    real(wp), intent(in) :: area            !! 1D: cross section A; not used otherwise [m2]
+    real(wp), intent(in) :: delta           !! horizon [m]
+    logical, intent(in) :: bond_based       !! take the Poisson's ratio at which a = 0
     type(material_type) :: m
     real(wp) :: nu
 
@@ -80,20 +85,20 @@ contains
     m%p = 2*m%a*m%d*delta
   end function new_material
 
-  !> The Poisson's ratio at which a = 0 and the force is bond-based.
+  !> The Poisson's ratio at which a = 0 and the force is bond-based: 1/3 in plane stress, else 1/4.
   pure real(wp) function special_poissons_ratio(dim, plane_strain) result(nu)
-    integer, intent(in) :: dim
-    logical, intent(in) :: plane_strain
+    integer, intent(in) :: dim           !! of the scene: 1, 2 or 3
+    logical, intent(in) :: plane_strain  !! 2D: plane strain, else plane stress; not used otherwise
     nu = 0.25_wp
     if (dim == 2 .and. .not. plane_strain) nu = 1.0_wp/3.0_wp
   end function special_poissons_ratio
 
   !> Critical stretch from the critical energy release rate Gc [J/m2] (doc/theory.md, 8).
   pure real(wp) function critical_stretch_from_energy(m, Gc, dim, delta) result(s_c)
-    type(material_type), intent(in) :: m
-    real(wp), intent(in) :: Gc
-    integer, intent(in) :: dim
-    real(wp), intent(in) :: delta
+    type(material_type), intent(in) :: m  !! gives mu and kappa, in 1D E
+    real(wp), intent(in) :: Gc            !! critical energy release rate [J/m2]
+    integer, intent(in) :: dim            !! of the scene: 1, 2 or 3
+    real(wp), intent(in) :: delta         !! horizon [m]
 
     associate (mu => m%shear_modulus, kappa => m%bulk_modulus)
       select case (dim)
@@ -110,8 +115,8 @@ contains
   !> The critical energy release rate Gc [J/m2] of a material's critical stretch: the inverse of
   !> `critical_stretch_from_energy`, where s_c grows with the root of Gc.
   pure real(wp) function energy_from_critical_stretch(m, dim, delta) result(Gc)
-    type(material_type), intent(in) :: m
-    integer, intent(in) :: dim
+    type(material_type), intent(in) :: m  !! gives the moduli and s_c
+    integer, intent(in) :: dim            !! of the scene: 1, 2 or 3
     real(wp), intent(in) :: delta  !! horizon [m]
     Gc = (m%critical_stretch/critical_stretch_from_energy(m, 1.0_wp, dim, delta))**2
   end function energy_from_critical_stretch

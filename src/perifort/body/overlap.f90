@@ -31,7 +31,7 @@ contains
   !> a layer. A body is the union of the cells that are left of it: a point on the face between two
   !> of its cells lies in it, a point on its surface does not.
   subroutine check_lattices(scene, body, error)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene        !! gives the lattices and names of the bodies
     type(body_type), intent(in) :: body          !! in point order
     type(error_type), allocatable, intent(out) :: error
     type(cells_type), allocatable :: bodies(:)

@@ -11,9 +11,10 @@ contains
   !> Whether each of the points `x` (n, dim) lies in the shape. Points on its surface do:
   !> `tolerance` [m] keeps that from depending on rounding. Unset limits do not bound.
   pure function inside(shape, x, tolerance) result(is_inside)
-    type(shape_group), intent(in) :: shape
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: tolerance
+    class(shape_group), intent(in) :: shape !! box, sphere or cylinder with its measures
+    real(wp), intent(in) :: x(:, :)         !! positions (n, dim) [m]
+    real(wp), intent(in) :: tolerance       !! how far outside its surface a point still lies in the
+                                            !! shape [m]
     logical, allocatable :: is_inside(:)
     integer :: c, k, axis
     real(wp) :: distance

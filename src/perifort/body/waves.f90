@@ -12,13 +12,13 @@ contains
   !> strain or of a plate in plane stress, sqrt((kappa + mu)/rho), in 1D those of a bar,
   !> sqrt(E/rho).
   pure real(wp) function longitudinal_speed(m) result(speed)
-    type(material_type), intent(in) :: m
+    type(material_type), intent(in) :: m  !! gives W/zeta^2 at uniaxial strain and the density
     speed = sqrt(2*m%uniaxial_energy/m%density)
   end function longitudinal_speed
 
   !> Speed of shear (S) waves in 2D and 3D [m/s]: sqrt(mu/rho).
   pure real(wp) function shear_speed(m) result(speed)
-    type(material_type), intent(in) :: m
+    type(material_type), intent(in) :: m  !! gives mu and the density
     speed = sqrt(m%shear_modulus/m%density)
   end function shear_speed
 
@@ -26,7 +26,8 @@ contains
   !> x = (c/c_S)^2 and k = (c_S/c_P)^2 the root of x^3 - 8 x^2 + (24 - 16 k) x - 16 (1 - k) between
   !> 0 and 1 (Rayleigh 1885), where the polynomial rises from -16 (1 - k) to 1.
   pure real(wp) function rayleigh_speed(m) result(speed)
-    type(material_type), intent(in) :: m
+    type(material_type), intent(in) :: m  !! gives mu, W/zeta^2 at uniaxial strain and the density;
+                                          !! not for 1D
     real(wp) :: k, low, high, x
     integer :: i
 

@@ -18,11 +18,12 @@ module pd_family_cells
 
 contains
 
-  !> Sort the points `x` (n, dim) into cells at least `reach` [m] wide.
+  !> Sort the points `x` (n, dim) into cells at least `reach` [m] wide. Far-flung points get wider
+  !> cells, so that there are never many more cells than points.
   subroutine sort_into_cells(x, reach, cells)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: reach
-    type(cells_type), intent(out) :: cells
+    real(wp), intent(in) :: x(:, :)         !! (n, dim) positions [m]
+    real(wp), intent(in) :: reach           !! least width of a cell [m]
+    type(cells_type), intent(out) :: cells  !! the n points, each in its cell
     real(wp) :: extent
     integer(i4), allocatable :: place(:)
     integer :: c, k, n, n_cells, at, most
@@ -77,8 +78,8 @@ contains
   !> Where a position lies among the cells, from 0 along each direction; positions outside are taken
   !> to the nearest cell.
   pure function cell_of(cells, x) result(at)
-    type(cells_type), intent(in) :: cells
-    real(wp), intent(in) :: x(:)
+    type(cells_type), intent(in) :: cells  !! as `sort_into_cells` made them
+    real(wp), intent(in) :: x(:)           !! (dim) position [m]
     integer :: at(3)
     integer :: c
 
@@ -91,9 +92,10 @@ contains
 
   !> The points in the cell of a position and in those around it.
   pure subroutine cells_around(cells, x, points)
-    type(cells_type), intent(in) :: cells
-    real(wp), intent(in) :: x(:)
+    type(cells_type), intent(in) :: cells               !! as `sort_into_cells` made them
+    real(wp), intent(in) :: x(:)                        !! (dim) position [m]
     integer(i4), allocatable, intent(out) :: points(:)
+      !! (any number) all points within a cell's width of `x`, and some that are farther
     integer :: at(3), low(3), high(3), j, k, row
 
     at = cell_of(cells, x)
@@ -108,14 +110,16 @@ contains
     end do
   end subroutine cells_around
 
-  !> The neighbours of one point in `found(:number)`, which grows as needed.
+  !> The neighbours of one point in `found(:number)`, which grows as needed. Two points are
+  !> neighbours if they are no farther apart than the sum of their `half_reach`.
   pure subroutine neighbours_of(x, half_reach, cells, k, number, found)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: half_reach(:)
-    type(cells_type), intent(in) :: cells
-    integer, intent(in) :: k
-    integer(i4), intent(out) :: number
+    real(wp), intent(in) :: x(:, :)                      !! (n, dim) positions [m]
+    real(wp), intent(in) :: half_reach(:)                !! (n) half of the reach of each point [m]
+    type(cells_type), intent(in) :: cells  !! of these points, at least as wide as the largest reach
+    integer, intent(in) :: k  !! the point whose neighbours are found, itself not among them
+    integer(i4), intent(out) :: number                   !! of neighbours
     integer(i4), allocatable, intent(inout) :: found(:)
+      !! (>= number) the neighbours, cell by cell; allocated and enlarged as needed
 
     if (.not. allocated(found)) allocate (found(256))
     call visit(x, half_reach, cells, k, number, found)
@@ -127,10 +131,10 @@ contains
 
   !> Whether two points with different labels are neighbours.
   logical function joins_labels(x, half_reach, cells, label) result(joins)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: half_reach(:)
-    type(cells_type), intent(in) :: cells
-    integer(i2), intent(in) :: label(:)
+    real(wp), intent(in) :: x(:, :)        !! (n, dim) positions [m]
+    real(wp), intent(in) :: half_reach(:)  !! (n) half of the reach of each point [m]
+    type(cells_type), intent(in) :: cells  !! of these points, at least as wide as the largest reach
+    integer(i2), intent(in) :: label(:)    !! (n) of each point, such as the number of its grid
     integer(i4), allocatable :: found(:)
     integer(i4) :: number
     integer :: k
@@ -188,10 +192,10 @@ contains
 
   !> The same by comparing every pair: the check of the search above.
   pure subroutine brute_force_neighbours(x, half_reach, k, neighbour)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: half_reach(:)
-    integer, intent(in) :: k
-    integer(i4), allocatable, intent(out) :: neighbour(:)
+    real(wp), intent(in) :: x(:, :)                        !! (n, dim) positions [m]
+    real(wp), intent(in) :: half_reach(:)  !! (n) half of the reach of each point [m]
+    integer, intent(in) :: k                               !! the point whose neighbours are found
+    integer(i4), allocatable, intent(out) :: neighbour(:)  !! (any number) its neighbours, ascending
     integer :: j
 
     allocate (neighbour(0))

@@ -2,8 +2,9 @@
 !> once for each class of them.
 module pd_family_classes
   use pd_base_kinds, only: i1, i2, i4, i8
+  use pd_base_lanes, only: word_bits
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_offsets, only: offsets_type, word_bits
+  use pd_family_offsets, only: offsets_type
   implicit none (type, external)
   private
   public :: find_classes
@@ -15,7 +16,7 @@ contains
   !> Number the kinds of surroundings: slots of the same grid and material with the same members are
   !> of one class. A key finds the class, the members themselves decide.
   subroutine find_classes(grids, alive, material, words, key_bits, class_of, first_of, n_bonds)
-    type(offsets_type), intent(in) :: grids(:)
+    type(offsets_type), intent(in) :: grids(:)  !! (any number) with shifts set
     integer(i1), intent(in) :: alive(:)     !! 1 where a slot holds a point
     integer(i2), intent(in) :: material(:)  !! of each slot
     integer, intent(in) :: words            !! of 64-bit words that hold a bit for each offset

@@ -3,8 +3,8 @@
 !> family members. Loops then work on eight bonds at a time, all with the same other end.
 module pd_family_clusters
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_family_cells, only: cells_type, sort_into_cells
-  use pd_family_offsets, only: lanes
   implicit none (type, external)
   private
   public :: rows_type, order_in_rows, collect_members, pair_members, lane_bit
@@ -26,10 +26,10 @@ contains
   !> Sort the points `x` (n, dim) into rows of cells about `edge` [m] wide, along the rows by their
   !> x. `order(i)` is the number of the point that becomes the i-th.
   subroutine order_in_rows(x, edge, rows, order)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: edge
-    type(rows_type), intent(out) :: rows
-    integer(i4), allocatable, intent(out) :: order(:)
+    real(wp), intent(in) :: x(:, :)                    !! (n, dim) positions [m]
+    real(wp), intent(in) :: edge                       !! least width of a cell [m]
+    type(rows_type), intent(out) :: rows  !! of cells that hold the points in their new order
+    integer(i4), allocatable, intent(out) :: order(:)  !! (n) a permutation of 1 to n
     type(cells_type) :: cells
     integer :: row, i, nx, at, n, length
     logical :: backwards
@@ -86,12 +86,14 @@ contains
   !> lanes whose family it is in. Two points are neighbours if they are no further
   !> apart than the sum of their `half_reach` [m].
   subroutine collect_members(x, half_reach, rows, start, member, bits)
-    real(wp), intent(in), contiguous :: x(:, :)
-    real(wp), intent(in), contiguous :: half_reach(:)
-    type(rows_type), intent(in) :: rows
+    real(wp), intent(in), contiguous :: x(:, :)  !! (n, dim) positions in the order of `rows` [m]
+    real(wp), intent(in), contiguous :: half_reach(:)   !! (n) half of the reach of each point [m]
+    type(rows_type), intent(in) :: rows                 !! as `order_in_rows` made them
     integer(i8), allocatable, intent(out) :: start(:)
-    integer(i4), allocatable, intent(out) :: member(:)
+      !! (clusters + 1) first member of each cluster
+    integer(i4), allocatable, intent(out) :: member(:)  !! (members of all clusters) their points
     integer(i1), allocatable, intent(out) :: bits(:)
+      !! (as `member`) the lanes whose family it is in
     integer(i4) :: no_member(0)
     integer(i1) :: no_bits(0)
     real(wp) :: most
@@ -126,10 +128,14 @@ contains
   !> bond goes to `pair(1, :)`.
   subroutine pair_members(start, member, bits, pair, first)
     integer(i8), intent(inout) :: start(:)
-    integer(i4), intent(in) :: member(:)
+      !! (clusters + 1) first member of each cluster; its first pack on return
+    integer(i4), intent(in) :: member(:)  !! (members) their points, which are their slots
     integer(i1), allocatable, intent(inout) :: bits(:)
+      !! (members) the lanes of each; (packs) those of both members of a pack on return
     integer(i4), allocatable, intent(out) :: pair(:, :)
+      !! (2, packs) slots of the members of each pack
     integer(i1), allocatable, intent(out) :: first(:)
+      !! (packs) the lanes whose bond goes to the first of the two
     integer(i8), allocatable :: begin(:)
     integer(i4), allocatable :: partner(:)
     integer(i1), allocatable :: both(:)

@@ -29,8 +29,8 @@ contains
 
   !> A crack as the scene describes it. In 2D the normal is `to - from` turned left.
   pure type(crack_type) function new_crack(group, dim) result(crack)
-    type(crack_group), intent(in) :: group
-    integer, intent(in) :: dim
+    type(crack_group), intent(in) :: group  !! the crack in the scene, checked
+    integer, intent(in) :: dim              !! of the scene: 2 or 3
 
     if (dim == 2) then
       crack%kind = segment
@@ -54,10 +54,10 @@ contains
 
   !> Break every bond that a crack of the scene cuts; `cut` is their number (unordered).
   subroutine cut_bonds(cracks, body, family, cut)
-    type(crack_group), intent(in) :: cracks(:)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(inout) :: family
-    integer(i8), intent(out) :: cut
+    type(crack_group), intent(in) :: cracks(:)   !! (any number) those of the scene
+    type(body_type), intent(in) :: body          !! arranged in the slots of the family
+    class(family_type), intent(inout) :: family  !! with the cut bonds broken at both ends on return
+    integer(i8), intent(out) :: cut              !! bonds that were intact before, each counted once
     type(bonds_type) :: bonds
     type(crack_type) :: crack
     integer :: c, k, i
@@ -100,9 +100,10 @@ contains
 
   !> Whether the bond between `a` and `b` (positions, dim) is cut by the crack.
   pure logical function crosses(crack, a, b, tolerance)
-    type(crack_type), intent(in) :: crack
-    real(wp), intent(in) :: a(:), b(:)
+    type(crack_type), intent(in) :: crack  !! as `new_crack` made it
+    real(wp), intent(in) :: a(:), b(:)     !! (dim) positions of the bond's ends [m]
     real(wp), intent(in) :: tolerance
+      !! within which a point lies on the plane, and a bond meets the rim [m]
     real(wp) :: ra(3), rb(3), ha, hb, r(3)
 
     ra = -crack%origin
@@ -137,7 +138,7 @@ contains
   !> Number of the points of a body through which a crack runs.
   pure integer function points_on(group, body) result(number)
     type(crack_group), intent(in) :: group   !! the crack
-    type(body_type), intent(in) :: body
+    type(body_type), intent(in) :: body      !! whose points are looked at, in slots
     type(crack_type) :: crack
     real(wp) :: r(3)
     integer :: k

@@ -39,9 +39,10 @@ module pd_family_family
     pure subroutine bonds_of_interface(family, k, bonds)
       import :: family_type, bonds_type
       implicit none (type, external)
-      class(family_type), intent(in) :: family
-      integer, intent(in) :: k
+      class(family_type), intent(in) :: family  !! the family
+      integer, intent(in) :: k                  !! slot; a dead one has no bonds
       type(bonds_type), intent(inout) :: bonds
+        !! made by `allocate_bonds`; the first `bonds%n` entries are set
     end subroutine bonds_of_interface
 
     !> Break the `i`-th bond of `bonds_of(k)`; the other direction is another call. Bonds of
@@ -49,8 +50,9 @@ module pd_family_family
     pure subroutine break_interface(family, k, i)
       import :: family_type
       implicit none (type, external)
-      class(family_type), intent(inout) :: family
-      integer, intent(in) :: k, i
+      class(family_type), intent(inout) :: family  !! with this bond broken on return
+      integer, intent(in) :: k                     !! slot whose bond is broken
+      integer, intent(in) :: i                     !! number of the bond in `bonds_of(k)`, from 1
     end subroutine break_interface
 
     !> Keep which bonds are broken, or put it back.
@@ -58,21 +60,22 @@ module pd_family_family
       import :: family_type, archive_type
       implicit none (type, external)
       class(family_type), intent(inout) :: family
-      class(archive_type), intent(inout) :: archive
+        !! its broken bonds are set where the archive reads
+      class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
     end subroutine keep_interface
 
     !> Memory of the family [bytes].
     pure integer(i8) function memory_interface(family)
       import :: family_type, i8
       implicit none (type, external)
-      class(family_type), intent(in) :: family
+      class(family_type), intent(in) :: family  !! the family
     end function memory_interface
 
     !> What kind of family it is and why, in a line.
     function describe_interface(family) result(text)
       import :: family_type
       implicit none (type, external)
-      class(family_type), intent(in) :: family
+      class(family_type), intent(in) :: family  !! the family
       character(:), allocatable :: text
     end function describe_interface
   end interface
@@ -83,14 +86,15 @@ contains
   !> members at the same offsets), so that what follows from the family alone is computed once.
   pure integer function alike(family, k)
     class(family_type), intent(in) :: family
-    integer, intent(in) :: k
+      !! the family; this version knows of no slots that are alike
+    integer, intent(in) :: k                  !! slot
     alike = min(k, family%n_slots)
   end function alike
 
   !> Room for the bonds of any one point.
   pure subroutine allocate_bonds(family, bonds)
-    class(family_type), intent(in) :: family
-    type(bonds_type), intent(out) :: bonds
+    class(family_type), intent(in) :: family  !! whose largest number of bonds counts
+    type(bonds_type), intent(out) :: bonds    !! (most_bonds) without a bond
     allocate (bonds%j(family%most_bonds), bonds%xi(family%most_bonds, family%dim), &
       & bonds%length(family%most_bonds), bonds%weight(family%most_bonds), &
       & bonds%intact(family%most_bonds))

@@ -22,7 +22,7 @@ contains
   !> The pairs of bodies that intact bonds join, in the order of their numbers. Layers belong to
   !> their bodies.
   subroutine count_joints(body, family, joints)
-    type(body_type), intent(in) :: body
+    type(body_type), intent(in) :: body                      !! arranged in the slots of the family
     class(family_type), intent(in) :: family                 !! its families, cracks cut
     type(joint_type), allocatable, intent(out) :: joints(:)  !! none for a single body
     type(lookup_type) :: pairs

@@ -12,6 +12,7 @@
 module pd_family_lattice
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes, word_bits
   use pd_base_error, only: error_type, fail
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
@@ -20,13 +21,13 @@ module pd_family_lattice
   use pd_family_classes, only: find_classes
   use pd_family_family, only: family_type, bonds_type
   use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, first_cell, &
-    & whole_blocks, both_ends, lanes, word_bits
+    & whole_blocks, both_ends
   use pd_family_slabs, only: slabs_type, find_slabs
   use pd_family_volume, only: volume_rule_type, reach
   implicit none (type, external)
   private
   public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, &
-    & use_double, grid_at, both_ends, lanes, word_bits
+    & use_double, grid_at, both_ends
 
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers
@@ -88,10 +89,11 @@ contains
   !> Whether lattice families can serve a body in point order: every point on a grid, grids that no
   !> bond joins, and grids filled reasonably. Otherwise `reason` says why not.
   subroutine lattice_suits(body, rule, suits, reason)
-    type(body_type), intent(in) :: body
-    type(volume_rule_type), intent(in) :: rule
-    logical, intent(out) :: suits
+    type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
+    type(volume_rule_type), intent(in) :: rule        !! how far families reach
+    logical, intent(out) :: suits                     !! a lattice family can be made
     character(:), allocatable, intent(out) :: reason
+      !! why not, without a full stop; empty if it suits
     type(cells_type) :: cells
     real(wp), allocatable :: half_reach(:)
     real(wp) :: room
@@ -164,14 +166,18 @@ contains
   !> Families of a body that `lattice_suits`; the body is arranged in slots. `breakable`: bonds may
   !> break or be cut, so each gets a bit. `mixed`: bonds in single precision, which 1D has no loops
   !> for. `key_bits`: the bits of keys that count; with fewer, different surroundings get one key.
+  !> An error is set if the slots are too many for their numbers or for the memory, or if two points
+  !> are in one cell.
   subroutine new_lattice_family(body, rule, breakable, mixed, family, error, key_bits)
     type(body_type), intent(inout) :: body
-    type(volume_rule_type), intent(in) :: rule
-    logical, intent(in) :: breakable
-    logical, intent(in) :: mixed
+      !! in point order; arranged in the slots of the family on return
+    type(volume_rule_type), intent(in) :: rule        !! volume correction and horizon
+    logical, intent(in) :: breakable                  !! bonds may break or be cut
+    logical, intent(in) :: mixed  !! bonds in single precision, where there are loops for it
     type(lattice_family_type), intent(out) :: family
+      !! whole, all bonds intact, without weights (`build_weights`)
     type(error_type), allocatable, intent(out) :: error
-    integer(i8), intent(in), optional :: key_bits
+    integer(i8), intent(in), optional :: key_bits     !! all count if absent; for tests
     integer :: g
 
     if (present(key_bits)) family%key_bits = key_bits
@@ -196,6 +202,7 @@ contains
   !> Leave mixed precision: what a model needs has no loops for it.
   subroutine use_double(family)
     type(lattice_family_type), intent(inout) :: family
+      !! with blocks of `lanes` slots and without weights on return; unchanged if not mixed
 
     if (.not. family%mixed) return
     family%mixed = .false.
@@ -303,8 +310,8 @@ contains
 
   !> The number of the grid that holds slot `k`.
   pure integer function grid_at(family, k) result(g)
-    class(lattice_family_type), intent(in) :: family
-    integer(i8), intent(in) :: k
+    class(lattice_family_type), intent(in) :: family  !! the family
+    integer(i8), intent(in) :: k                      !! slot
     do g = 1, size(family%grids) - 1
       if (k <= family%grids(g)%last) exit
     end do
@@ -332,9 +339,10 @@ contains
       & family%block_length, family%block, family%slabs)
   end subroutine find_blocks
 
+  !> The first slot of the class of slot `k`; `k` itself if it is dead.
   pure integer function alike(family, k)
-    class(lattice_family_type), intent(in) :: family
-    integer, intent(in) :: k
+    class(lattice_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                          !! slot
     alike = k
     if (.not. allocated(family%class_of)) return
     if (family%class_of(k) > 0_i4) alike = family%first_of(family%class_of(k))
@@ -343,14 +351,17 @@ contains
   !> Give every bond its bit, all intact.
   subroutine allow_breaking(family)
     class(lattice_family_type), intent(inout) :: family
+      !! with `broken` allocated on return; unchanged if it is
     if (allocated(family%broken)) return
     allocate (family%broken(family%n_slots, family%words), source=0_i8)
   end subroutine allow_breaking
 
+  !> All bonds of slot `k` in the order of its grid's offsets, broken ones too.
   pure subroutine bonds_of(family, k, bonds)
-    class(lattice_family_type), intent(in) :: family
-    integer, intent(in) :: k
+    class(lattice_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                          !! slot; a dead one has no bonds
     type(bonds_type), intent(inout) :: bonds
+      !! made by `allocate_bonds`; the first `bonds%n` entries are set
     integer :: o, n
     integer(i8) :: j
 
@@ -374,9 +385,12 @@ contains
     bonds%n = n
   end subroutine bonds_of
 
+  !> Break the `i`-th bond of slot `k`; the other direction is another call.
   pure subroutine break_bond(family, k, i)
     class(lattice_family_type), intent(inout) :: family
-    integer, intent(in) :: k, i
+      !! that allows breaking; with this bond broken on return
+    integer, intent(in) :: k                             !! slot whose bond is broken
+    integer, intent(in) :: i  !! number of the bond in `bonds_of(k)`, from 1
     integer :: o, n, w
 
     n = 0
@@ -392,14 +406,17 @@ contains
     end associate
   end subroutine break_bond
 
+  !> Keep the bits of broken bonds, or put them back.
   subroutine keep_bonds(family, archive)
     class(lattice_family_type), intent(inout) :: family
-    class(archive_type), intent(inout) :: archive
+      !! its broken bonds are set where the archive reads
+    class(archive_type), intent(inout) :: archive        !! a checkpoint that is written or read
     call archive%keep('broken bonds of slots', family%broken)
   end subroutine keep_bonds
 
+  !> Memory of the slots, blocks, bits and tables of weights [bytes].
   pure integer(i8) function bytes(family)
-    class(lattice_family_type), intent(in) :: family
+    class(lattice_family_type), intent(in) :: family  !! the family
     integer :: t
 
     bytes = family%n_slots
@@ -416,8 +433,9 @@ contains
     end do
   end function bytes
 
+  !> Spacings of the grids and, once weights are made, the number of their tables, in a line.
   function describe(family) result(text)
-    class(lattice_family_type), intent(in) :: family
+    class(lattice_family_type), intent(in) :: family  !! the family
     character(:), allocatable :: text
     integer :: g
 

@@ -3,15 +3,17 @@
 !> are packs of each cluster's members: one, or two that no lane has both in its family, with a bit
 !> for every lane that has a bond. The loops take the eight lanes of one pack at a time.
 !>
-!> Nothing else is stored: xi, |xi| and v_c come from the points, but for exact volumes.
+!> Nothing else of the family is stored: xi, |xi| and v_c come from the points, but for exact
+!> volumes. Tables of what they and the model give are kept for the loops, where it helps them
+!> (`pd_force_list_tables`).
 module pd_family_list
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type, arrange
   use pd_family_clusters, only: rows_type, order_in_rows, collect_members, pair_members, lane_bit
   use pd_family_family, only: family_type, bonds_type
-  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact, &
     & volume_none
   implicit none (type, external)
@@ -37,11 +39,16 @@ module pd_family_list
                                                !! displacement and p of the pass (8, n_slots)
     real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
     integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike: set by
-                                               !! the first pass (`pd_force_list_points`)
-    integer(i8), allocatable :: stored(:)      !! place of the other clusters' first pack in
+                                               !! the first pass (`pd_force_list_points`), as are
+    integer(i8), allocatable :: stored(:)      !! the place of each cluster's first pack in
     real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
     real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
-                                               !! of all bonds, intact or not
+                                               !! of all bonds, intact or not; 0: has none; and
+    integer(i8), allocatable :: shape(:)       !! that of its first column in
+    real(wp), allocatable :: geometry(:, :)    !! xi and 2/|xi|^2 (lanes, columns of each pack)
+    integer :: least_shared = 8                !! clusters that tables are made for, if they share
+                                               !! them; tests take fewer or more
+    integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
@@ -58,8 +65,9 @@ contains
   !> clusters. Members are those within the rule's reach for the bond's mean spacing.
   subroutine new_list_family(body, rule, family)
     type(body_type), intent(inout) :: body
-    type(volume_rule_type), intent(in) :: rule
-    type(list_family_type), intent(out) :: family
+      !! in point order; arranged in the slots of the family on return
+    type(volume_rule_type), intent(in) :: rule     !! volume correction and horizon
+    type(list_family_type), intent(out) :: family  !! whole, all bonds intact
     type(rows_type) :: rows
     real(wp), allocatable :: half_reach(:)
     integer(i4), allocatable :: order(:), point(:), member(:)
@@ -156,10 +164,12 @@ contains
     j = family%member(merge(1, 2, iand(family%first(e), lane_bit(l)) /= 0_i1), e)
   end function other_end
 
+  !> All bonds of slot `k` in the order of its cluster's packs, broken ones too.
   pure subroutine bonds_of(family, k, bonds)
-    class(list_family_type), intent(in) :: family
-    integer, intent(in) :: k
+    class(list_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                       !! slot; a dead one has no bonds
     type(bonds_type), intent(inout) :: bonds
+      !! made by `allocate_bonds`; the first `bonds%n` entries are set
     real(wp) :: spacing
     integer(i8) :: e
     integer :: i, n, c, l, d
@@ -194,9 +204,11 @@ contains
     end do
   end subroutine bonds_of
 
+  !> Break the `i`-th bond of slot `k`; the other direction is another call.
   pure subroutine break_bond(family, k, i)
-    class(list_family_type), intent(inout) :: family
-    integer, intent(in) :: k, i
+    class(list_family_type), intent(inout) :: family  !! with this bond broken on return
+    integer, intent(in) :: k                          !! slot whose bond is broken
+    integer, intent(in) :: i                          !! number of the bond in `bonds_of(k)`, from 1
     integer(i8) :: e
     integer :: c, l, n
 
@@ -212,24 +224,29 @@ contains
     end do
   end subroutine break_bond
 
+  !> Keep the bits of intact bonds, or put them back.
   subroutine keep_bonds(family, archive)
     class(list_family_type), intent(inout) :: family
-    class(archive_type), intent(inout) :: archive
+      !! its intact bonds are set where the archive reads
+    class(archive_type), intent(inout) :: archive     !! a checkpoint that is written or read
     call archive%keep('intact bonds of clusters', family%intact)
   end subroutine keep_bonds
 
+  !> Memory of the packs, slots, fractions and stored weights [bytes].
   pure integer(i8) function bytes(family)
-    class(list_family_type), intent(in) :: family
+    class(list_family_type), intent(in) :: family  !! the family
     ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
     bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
-      & + 18_i8*size(family%large)
+      & + 26_i8*size(family%large)
     if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
     if (allocated(family%weight_D)) bytes = bytes + 8*size(family%weight_D, kind=i8)
     if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
+    if (allocated(family%geometry)) bytes = bytes + 8*size(family%geometry, kind=i8)
   end function bytes
 
+  !> How many bonds a pack has on average and why it is no lattice, in a line.
   function describe(family) result(text)
-    class(list_family_type), intent(in) :: family
+    class(list_family_type), intent(in) :: family  !! the family
     character(:), allocatable :: text
     text = 'list: packs of the neighbours of every eight points, each with '//to_text( &
       & real(family%n_bonds, wp)/max(1, size(family%bits)), 2)//' bonds'

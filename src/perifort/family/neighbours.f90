@@ -16,9 +16,9 @@ contains
   !> An error if two points coincide, of one body or of two; that lattices do not overlap has been
   !> seen before (`pd_body_overlap`). `isolated` is the number of points without any bond.
   subroutine check_overlap(body, family, isolated, error)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    integer, intent(out) :: isolated
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! whole or cut: broken bonds count as well
+    integer, intent(out) :: isolated          !! points that are in no family
     type(error_type), allocatable, intent(out) :: error
     type(bonds_type) :: bonds
     integer(i4), allocatable :: other(:)

@@ -2,14 +2,11 @@
 !> offsets.
 module pd_family_offsets
   use pd_base_kinds, only: wp, i8
+  use pd_base_lanes, only: lanes, word_bits
   use pd_family_volume, only: volume_rule_type, volume_correction, reach
   implicit none (type, external)
   private
-  public :: offsets_type, make_offsets, order_offsets, first_cell, whole_blocks, both_ends, &
-    & lanes, word_bits
-
-  integer, parameter :: lanes = 8        !! a 512-bit register of reals: a block or half of it
-  integer, parameter :: word_bits = 64   !! bonds in one word of bits
+  public :: offsets_type, make_offsets, order_offsets, first_cell, whole_blocks, both_ends
 
   !> One grid: its box of slots and its table of offsets.
   type :: offsets_type
@@ -36,10 +33,12 @@ contains
   !> its `cells`. The second matters for thin bodies and for horizons larger than the body, whose
   !> tables would be mostly empty and, in space, of any size.
   subroutine make_offsets(rule, dim, cells, grid)
-    type(volume_rule_type), intent(in) :: rule
-    integer, intent(in) :: dim
+    type(volume_rule_type), intent(in) :: rule  !! how far families reach
+    integer, intent(in) :: dim                  !! of the body: 1 to 3
     integer, intent(in) :: cells(3)
+      !! cells of the grid along x, y, z, 1 for axes that are not used
     type(offsets_type), intent(inout) :: grid
+      !! with a spacing; gets its offsets, x fastest, and room for their shifts
     real(wp) :: xi(3), farthest
     integer :: i, j, k, n, pass, high(3)
 
@@ -75,7 +74,7 @@ contains
   !> both ends of a bond takes these alone; and one of each row in turn, since what was just added
   !> to eight slots of a row cannot be loaded again at once, some slots on.
   pure subroutine order_offsets(grid)
-    type(offsets_type), intent(inout) :: grid
+    type(offsets_type), intent(inout) :: grid  !! with shifts; gets `order` and `forward_bits`
     integer :: in_row(grid%n), o, n, i
 
     in_row = 1
@@ -103,7 +102,7 @@ contains
   !> The slot of a grid's first cell, with as much room before it as the farthest offset reaches
   !> back.
   pure integer(i8) function first_cell(grid)
-    type(offsets_type), intent(in) :: grid
+    type(offsets_type), intent(in) :: grid  !! with its first slot, strides and reach
     first_cell = grid%first + whole_blocks(int(grid%reach_cells &
       & *sum(int(grid%stride, i8))), grid%alignment)
   end function first_cell
@@ -111,14 +110,15 @@ contains
   !> Whether loops in `dim` dimensions take forward offsets alone and add to both ends of a bond. In
   !> 1D the next offset would have to load again what was just added.
   pure logical function both_ends(dim, mixed)
-    integer, intent(in) :: dim
+    integer, intent(in) :: dim    !! of the body: 1 to 3
     logical, intent(in) :: mixed  !! bonds in single precision
     both_ends = dim > 2 .or. (dim == 2 .and. .not. mixed)
   end function both_ends
 
   !> The next multiple of the length of a block.
   pure integer function whole_blocks(slots, block_length)
-    integer, intent(in) :: slots, block_length
+    integer, intent(in) :: slots         !! number of slots, rounded up
+    integer, intent(in) :: block_length  !! slots of a block
     whole_blocks = (slots + block_length - 1)/block_length*block_length
   end function whole_blocks
 

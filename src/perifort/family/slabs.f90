@@ -28,11 +28,13 @@ contains
   !> blocks are `block_length` slots long. No bond joins two grids. Where loops do not add to `both`
   !> ends of a bond, there is nothing to keep apart.
   pure subroutine find_slabs(grids, dim, both, block_length, block, slabs)
-    type(offsets_type), intent(in) :: grids(:)
-    integer, intent(in) :: dim, block_length
-    logical, intent(in) :: both
+    type(offsets_type), intent(in) :: grids(:)  !! (any number) with their boxes
+    integer, intent(in) :: dim                  !! of the body: 1 to 3
+    integer, intent(in) :: block_length         !! slots of a block
+    logical, intent(in) :: both                 !! loops add to both ends of a bond
     integer(i8), intent(inout) :: block(:)
-    type(slabs_type), intent(out) :: slabs
+      !! (any number) first slot of each block; sorted by slab on return
+    type(slabs_type), intent(out) :: slabs      !! of the sorted blocks
     integer, allocatable :: slab(:), of_grid(:), order(:), layer(:, :)
     integer :: b, g, n, reach(dim)
 

@@ -15,10 +15,11 @@ contains
   !> unit uniaxial strain along each direction, with the linearised stretch. A point without bonds
   !> along a direction gets 1. Families must be whole: cracks are cut afterwards.
   subroutine surface_factors(body, family, materials, D, S)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    type(material_type), intent(in) :: materials(:)
+    type(body_type), intent(in) :: body                     !! arranged in the slots of the family
+    class(family_type), intent(in) :: family                !! whole: no bond cut
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
     real(wp), allocatable, intent(out) :: D(:, :), S(:, :)
+      !! (n_slots, dim) factors of the dilatation and of the bond part of the energy [-]
     type(bonds_type) :: bonds
     real(wp) :: strain, dilatation, energy, scale
     integer :: k, i, c
@@ -62,7 +63,8 @@ contains
 
   !> G of a bond along the unit vector `n` between points with factors `gk` and `gj`.
   pure real(wp) function bond_factor(n, gk, gj) result(G)
-    real(wp), intent(in) :: n(:), gk(:), gj(:)
+    real(wp), intent(in) :: n(:)          !! (dim) unit vector along the bond [-]
+    real(wp), intent(in) :: gk(:), gj(:)  !! (dim) D or S of the bond's two ends [-]
     G = 1.0_wp/sqrt(sum((2*n/(gk + gj))**2))
   end function bond_factor
 

@@ -22,22 +22,23 @@ contains
 
   !> The rule's number from its name in the scene.
   pure integer function volume_rule_number(name) result(number)
-    character(*), intent(in) :: name
+    character(*), intent(in) :: name  !! value of `volume_correction` in &horizon
     select case (name)
     case ('none'); number = volume_none
     case ('linear'); number = volume_linear
     case ('linear_extended'); number = volume_linear_extended
     case ('exact'); number = volume_exact
-    case default; call internal_fault('unknown volume correction')
+    case default
+      call internal_fault('unknown volume correction')
     end select
   end function volume_rule_number
 
   !> Largest |xi| of a family [m] for a spacing [m]: delta, or further where the rule counts
   !> members whose centres lie outside but whose cells don't.
   pure real(wp) function reach(rule, spacing, dim)
-    type(volume_rule_type), intent(in) :: rule
-    real(wp), intent(in) :: spacing
-    integer, intent(in) :: dim
+    type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
+    real(wp), intent(in) :: spacing             !! mean spacing of a bond's ends [m]
+    integer, intent(in) :: dim                  !! of the body: 1 to 3
 
     reach = rule%delta
     if (rule%kind == volume_linear_extended) reach = rule%delta + spacing/2
@@ -47,10 +48,10 @@ contains
 
   !> v_c of a bond `xi` [m] between points with mean spacing `spacing` [m].
   pure real(wp) function volume_correction(rule, xi, length, spacing) result(vc)
-    type(volume_rule_type), intent(in) :: rule
-    real(wp), intent(in) :: xi(:)
-    real(wp), intent(in) :: length
-    real(wp), intent(in) :: spacing
+    type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
+    real(wp), intent(in) :: xi(:)               !! (dim) bond vector, used by `exact` alone [m]
+    real(wp), intent(in) :: length              !! |xi| [m]
+    real(wp), intent(in) :: spacing             !! mean spacing of its ends [m]
 
     select case (rule%kind)
     case (volume_none)
@@ -67,9 +68,9 @@ contains
   !> Part of a cubic cell (edge `h`, centred at `xi`) inside the ball of radius `delta` at 0:
   !> closed form in 1D and 2D; in 3D Gauss quadrature over the discs that slice the ball.
   pure real(wp) function covered_fraction(xi, h, delta) result(fraction)
-    real(wp), intent(in) :: xi(:)
-    real(wp), intent(in) :: h
-    real(wp), intent(in) :: delta
+    real(wp), intent(in) :: xi(:)  !! (dim) centre of the cell [m]
+    real(wp), intent(in) :: h      !! its edge [m]
+    real(wp), intent(in) :: delta  !! radius of the ball [m]
     real(wp) :: c(size(xi))
 
     c = abs(xi)

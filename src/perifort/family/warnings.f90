@@ -28,9 +28,9 @@ contains
 
   !> Add the warnings about points, families and cracks of a scene.
   subroutine warn_of_points(scene, body, family, warnings)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
+    type(scene_type), intent(in) :: scene            !! whose bodies and cracks are looked at
+    type(body_type), intent(in) :: body  !! its points, arranged in the slots of the family
+    class(family_type), intent(in) :: family         !! cracks may be cut
     type(warnings_type), intent(inout) :: warnings   !! added to
     integer :: i
 

@@ -2,7 +2,8 @@
 !> from the bonds one by one, `lanes` slots at a time.
 module pd_force_bound
   use pd_base_kinds, only: wp, i8
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, lanes
+  use pd_base_lanes, only: lanes
+  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at
   use pd_force_model, only: model_type
   use pd_force_weights, only: allocate_weights, block_weights, half_of
   implicit none (type, external)
@@ -14,9 +15,9 @@ contains
   !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken. Weights of
   !> either sign count with their size.
   subroutine lattice_bound(family, model, bound)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(inout), contiguous :: bound(:)
+    type(lattice_family_type), intent(in) :: family  !! with its weights
+    type(model_type), intent(in) :: model            !! that the weights were made for
+    real(wp), intent(inout), contiguous :: bound(:)  !! (n_slots) M_k, 0 for dead slots [N/m4]
     type(weights_type) :: scratch, half
     real(wp), allocatable :: inverse(:)
     integer :: b, pass
@@ -99,9 +100,9 @@ contains
   !> The sum of 7.25 as printed for every slot [N/m4]: no surface factors, a with its sign, and
   !> everything of the slot's own material.
   subroutine lattice_printed_bound(family, model, printed)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(inout), contiguous :: printed(:)
+    type(lattice_family_type), intent(in) :: family    !! the family
+    type(model_type), intent(in) :: model              !! materials of the slots
+    real(wp), intent(inout), contiguous :: printed(:)  !! (n_slots) the sum of each slot [N/m4]
     real(wp), allocatable :: inverse(:)
     integer :: b, l, pass
 

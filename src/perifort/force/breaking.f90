@@ -4,9 +4,9 @@ module pd_force_breaking
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_reduce, only: add_point, ascending_order, count_of_ranks, new_running, owns, &
     & running_type, total_of_running
+  use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
-  use pd_family_offsets, only: lanes
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
     & energy_product, point_damage
@@ -19,7 +19,8 @@ contains
   !> The slots marked by a pass over the body.
   subroutine strained_slots(strained, slots)
     integer(i1), intent(in) :: strained(:)
-    integer(i4), allocatable, intent(out) :: slots(:)
+      !! (n_slots) 1 for marked slots, else 0; of size 0 if no bond can break
+    integer(i4), allocatable, intent(out) :: slots(:)  !! (any number) the marked ones, ascending
     integer :: k, n
 
     n = 0
@@ -43,9 +44,9 @@ contains
   !> (doc/theory.md, 9).
   subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated, others, &
     & products)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+    type(body_type), intent(in) :: body          !! its volumes [m3]
+    class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
+    type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
     real(wp), intent(in) :: u(:, :)       !! displacements (n_slots, dim) [m]
     integer(i4), allocatable, intent(inout) :: slots(:)  !! in: where to look, ascending;
                                                          !! out: those that lost a bond
@@ -164,9 +165,10 @@ contains
 
   !> Local damage of every slot [-].
   subroutine damage_of(body, family, damage)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! with its broken bonds, cut ones included
     real(wp), intent(out) :: damage(:)
+      !! (n_slots) lost part of each family's volume, 0 for dead slots [-]
     type(bonds_type) :: bonds
     integer :: k
 

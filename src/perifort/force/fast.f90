@@ -5,7 +5,7 @@
 module pd_force_fast
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i8
-  use pd_family_lattice, only: lanes
+  use pd_base_lanes, only: lanes
   use pd_force_general, only: crushed
   use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &
@@ -28,16 +28,22 @@ contains
   !> and below, since a call for few bonds would spend its time on describing arrays.
   subroutine fast_dilatation(dim, range, kind, n, m, weight, shift, geometry, first, u, limit, &
     & theta, left, missed)
-    integer, intent(in) :: dim
+    integer, intent(in) :: dim                !! number of dimensions
     integer, intent(in) :: range  !! `narrow` or `wide`
     integer, intent(in) :: kind   !! of the dilatation: `projected` or `unprojected`
-    integer, intent(in) :: n
+    integer, intent(in) :: n                  !! offsets whose bonds are taken
     integer, intent(in) :: m      !! number of slots
-    real(wp), intent(in) :: weight(lanes, n), geometry(4, n), u(m, dim)
-    integer(i8), intent(in) :: shift(n), first
-    real(wp), intent(in) :: limit
-    real(wp), intent(inout) :: theta(m), left(lanes, n)
-    logical, intent(out) :: missed
+    real(wp), intent(in) :: weight(lanes, n)  !! Gd vc V, 0 for bonds to be left out [m3]
+    real(wp), intent(in) :: geometry(4, n)
+      !! xi/|xi|^2 in rows 1 to 3 [1/m], 1/|xi|^2 in row 4 [1/m2]
+    real(wp), intent(in) :: u(m, dim)         !! displacements [m]
+    integer(i8), intent(in) :: shift(n)       !! from a slot to its member [slots]
+    integer(i8), intent(in) :: first          !! slot of the block's first lane
+    real(wp), intent(in) :: limit             !! of |e|, beyond which bonds are left out [-]
+    real(wp), intent(inout) :: theta(m)       !! sums of each slot, of both ends in 3D and 2D [m3]
+    real(wp), intent(inout) :: left(lanes, n)
+      !! gets the weights of bonds that were left out, 0 for the others; not used in 1D [m3]
+    logical, intent(out) :: missed            !! some bonds are strained beyond `limit`
 
     missed = .true.
     select case (choice(dim, range, kind))
@@ -86,15 +92,29 @@ contains
   !> `left` untouched.
   subroutine fast_force(dim, range, kind, n, m, weight, stretch, shift, geometry, first, u, p, &
     & limit, force, left, missed)
-    integer, intent(in) :: dim, range
+    integer, intent(in) :: dim           !! number of dimensions
+    integer, intent(in) :: range         !! `narrow` or `wide`
     integer, intent(in) :: kind  !! of the dilatation, `no_dilatation` included
-    integer, intent(in) :: n, m
-    real(wp), intent(in) :: weight(lanes, merge(n, 0, kind /= no_dilatation)), stretch(lanes, n)
-    real(wp), intent(in) :: geometry(4, n), u(m, dim), p(merge(m, 0, kind /= no_dilatation))
-    integer(i8), intent(in) :: shift(n), first
+    integer, intent(in) :: n             !! offsets whose bonds are taken
+    integer, intent(in) :: m             !! number of slots
+    real(wp), intent(in) :: weight(lanes, merge(n, 0, kind /= no_dilatation))
+      !! Gd vc V, of size 0 without a dilatation [m3]
+    real(wp), intent(in) :: stretch(lanes, n)
+      !! (q_k + q_j) Gb vc V |xi|, 0 for bonds to be left out [N/m2]
+    real(wp), intent(in) :: geometry(4, n)
+      !! xi/|xi|^2 in rows 1 to 3 [1/m], 1/|xi|^2 in row 4 [1/m2]
+    real(wp), intent(in) :: u(m, dim)    !! displacements [m]
+    real(wp), intent(in) :: p(merge(m, 0, kind /= no_dilatation))
+      !! 2 a d delta theta, of size 0 without a dilatation [N/m5]
+    integer(i8), intent(in) :: shift(n)  !! from a slot to its member [slots]
+    integer(i8), intent(in) :: first     !! slot of the block's first lane
     real(wp), intent(in) :: limit
-    real(wp), intent(inout) :: force(m, dim), left(lanes, n)
-    logical, intent(out) :: missed
+      !! of |e|, beyond which bonds are left out without a dilatation [-]
+    real(wp), intent(inout) :: force(m, dim)
+      !! force density, of both ends in 3D and 2D, in 1D set for the block [N/m3]
+    real(wp), intent(inout) :: left(lanes, n)
+      !! gets the `stretch` of bonds that were left out, 0 for the others; not used in 1D [N/m2]
+    logical, intent(out) :: missed       !! some bonds are strained beyond `limit`
 
     missed = .true.
     select case (choice(dim, range, kind))
@@ -167,11 +187,22 @@ contains
   !> and, with a dilatation of some `kind`, Gd s Lambda vc V. For any strain, without temperature.
   subroutine fast_energy(dim, kind, n, m, weight, stretch, shift, geometry, first, u, &
     & stretches, theta)
-    integer, intent(in) :: dim, kind, n, m
-    real(wp), intent(in) :: weight(lanes, merge(n, 0, kind /= no_dilatation)), stretch(lanes, n)
-    real(wp), intent(in) :: geometry(4, n), u(m, dim)
-    integer(i8), intent(in) :: shift(n), first
-    real(wp), intent(out) :: stretches(lanes), theta(lanes)
+    integer, intent(in) :: dim                 !! number of dimensions
+    integer, intent(in) :: kind                !! of the dilatation, `no_dilatation` included
+    integer, intent(in) :: n                   !! number of offsets
+    integer, intent(in) :: m                   !! number of slots
+    real(wp), intent(in) :: weight(lanes, merge(n, 0, kind /= no_dilatation))
+      !! Gd vc V, of size 0 without a dilatation [m3]
+    real(wp), intent(in) :: stretch(lanes, n)  !! (q_k + q_j) Gb vc V |xi| [N/m2]
+    real(wp), intent(in) :: geometry(4, n)
+      !! xi/|xi|^2 in rows 1 to 3 [1/m], 1/|xi|^2 in row 4 [1/m2]
+    real(wp), intent(in) :: u(m, dim)          !! displacements [m]
+    integer(i8), intent(in) :: shift(n)        !! from a slot to its member [slots]
+    integer(i8), intent(in) :: first           !! slot of the block's first lane
+    real(wp), intent(out) :: stretches(lanes)
+      !! sum of (q_k + q_j) Gb s^2 |xi| vc V of each lane [J/m3]
+    real(wp), intent(out) :: theta(lanes)
+      !! sum of Gd s Lambda vc V of each lane, 0 without a dilatation [m3]
 
     select case (dim)
     case (3)

@@ -1,42 +1,83 @@
-!> One call for the whole body, whatever its family: the class is looked at once per pass.
+!> The internal forces and energies of a whole body, whatever its family: the class is looked at
+!> once per pass.
 module pd_force_forces
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1
+  use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
   use pd_family_lattice, only: lattice_family_type
   use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
-  public :: dilatation_pass, force_pass, energy_pass
+  public :: internal_force, energy_pass
+  public :: whole, up_to_marks, after_marks
+
+  !> Parts of an evaluation. The first pass over the bonds marks what is strained to the limit; who
+  !> breaks bonds does so between the parts, and then renews what the first pass gave the points
+  !> that lost some: their dilatation or, where the forces have none, their force.
+  integer, parameter :: whole = 0, up_to_marks = 1, after_marks = 2
 
 contains
 
+  !> Internal force density of all slots at displacements `u`: the dilatation of all points first,
+  !> if the forces have one, then the forces. Whoever needs internal forces calls this. Values at
+  !> points that other processes own come from there: dilatation and forces here, displacements from
+  !> whoever calls.
+  subroutine internal_force(body, family, model, options, u, p, force, strained, part)
+    type(body_type), intent(in) :: body                 !! what the process owns of it
+    class(family_type), intent(inout) :: family         !! its loops keep their room there
+    type(model_type), intent(in) :: model               !! parameters of the slots
+    type(force_options_type), intent(in) :: options     !! what the forces take in
+    real(wp), intent(in), contiguous :: u(:, :)         !! displacements (n_slots, dim) [m]
+    real(wp), intent(inout), contiguous :: p(:)         !! 2 a d delta theta (n_slots), of size 0
+                                                        !! if there is no dilatation
+    real(wp), intent(inout), contiguous :: force(:, :)  !! force density (n_slots, dim) [N/m3]
+    integer(i1), intent(inout), contiguous :: strained(:)  !! becomes 1 for slots with a bond
+                                                        !! (nearly) beyond its limit, else 0
+                                                        !! (n_slots), of size 0 if none can break
+    integer, intent(in), optional :: part               !! `whole` by default
+    integer :: now
+
+    now = whole
+    if (present(part)) now = part
+    if (options%dilatation) then
+      if (now /= after_marks) call dilatation_pass(family, model, options, u, p, strained)
+      if (now /= up_to_marks) call share_halo(body, p)
+      if (now /= up_to_marks) call force_pass(family, model, options, u, p, force, strained)
+    else if (now /= after_marks) then
+      call force_pass(family, model, options, u, p, force, strained)
+    end if
+    if (now /= up_to_marks) call share_halo(body, force)
+  end subroutine internal_force
+
   !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds
   !> can break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.
-  subroutine dilatation_pass(family, model, u, p, strained)
+  subroutine dilatation_pass(family, model, options, u, p, strained)
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
 
     select type (family)
     type is (list_family_type)
-      call list_dilatation(family, model, u, p, strained)
+      call list_dilatation(family, model, options, u, p, strained)
     type is (lattice_family_type)
-      call lattice_dilatation(family, model, u, p, strained)
+      call lattice_dilatation(family, model, options, u, p, strained)
     class default
       call internal_fault('the dilatation of a family that has no loops')
     end select
   end subroutine dilatation_pass
 
   !> Internal force density of all slots (n_slots, dim) [N/m3]; `strained` as above.
-  subroutine force_pass(family, model, u, p, force, strained)
+  subroutine force_pass(family, model, options, u, p, force, strained)
     class(family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(inout), contiguous :: force(:, :)
@@ -44,9 +85,9 @@ contains
 
     select type (family)
     type is (list_family_type)
-      call list_force(family, model, u, p, force, strained)
+      call list_force(family, model, options, u, p, force, strained)
     type is (lattice_family_type)
-      call lattice_force(family, model, u, p, force, strained)
+      call lattice_force(family, model, options, u, p, force, strained)
     class default
       call internal_fault('the forces of a family that has no loops')
     end select
@@ -54,10 +95,10 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine energy_pass(family, model, u, energy)
-    class(family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: energy(:)
+    class(family_type), intent(inout) :: family       !! its loops keep their room there
+    type(model_type), intent(in) :: model             !! parameters of the slots
+    real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
+    real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
 
     select type (family)
     type is (list_family_type)

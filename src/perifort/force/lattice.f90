@@ -14,12 +14,12 @@
 !> precision; what they leave is computed in double, one half of a block after the other.
 module pd_force_lattice
   use pd_base_kinds, only: wp, sp, i1, i8
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends, lanes, &
-    & word_bits
+  use pd_base_lanes, only: lanes, word_bits
+  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends
   use pd_force_fast, only: fast_dilatation, fast_force, fast_energy
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_mixed, only: mixed_dilatation, mixed_force
-  use pd_force_model, only: dilatation_of, model_type
+  use pd_force_model, only: dilatation_of, force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, fast_terms, narrow, wide, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
   use pd_force_weights, only: weights_now, half_of
@@ -39,12 +39,16 @@ contains
 
   !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps
   !> in `family%served` which fast formulas serve each block.
-  subroutine lattice_dilatation(family, model, u, p, strained)
+  subroutine lattice_dilatation(family, model, options, u, p, strained)
     type(lattice_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! with its weights; `served` and what it keeps in single precision are set
+    type(model_type), intent(in) :: model            !! that the weights were made for
+    type(force_options_type), intent(in) :: options  !! what the forces take in
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
+      !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
@@ -52,8 +56,8 @@ contains
     integer :: b, s, k, colour
 
     both = both_ends(family%dim, family%mixed)
-    limit = fast_limits(family, model)
-    !$omp parallel default(none) shared(family, model, u, p, strained, both, limit) &
+    limit = fast_limits(family, model, options)
+    !$omp parallel default(none) shared(family, model, options, u, p, strained, both, limit) &
     !$omp private(scratch, own, b, s, k, colour)
     call allocate_scratch(family, scratch)
     if (family%mixed) call split_displacements(family, u)
@@ -70,11 +74,12 @@ contains
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
           if (shared_weights(family, b, both)) then
-            call dilatation_of_block(family, model, both, limit, b, &
+            call dilatation_of_block(family, model, options, both, limit, b, &
               & family%table(family%weights(b)), scratch, u, p, strained)
           else
             call weights_now(family, model, b, own)
-            call dilatation_of_block(family, model, both, limit, b, own, scratch, u, p, strained)
+            call dilatation_of_block(family, model, options, both, limit, b, own, scratch, u, p, &
+              & strained)
           end if
         end do
       end do
@@ -91,13 +96,18 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `lattice_dilatation` at the same displacements.
-  subroutine lattice_force(family, model, u, p, force, strained)
+  subroutine lattice_force(family, model, options, u, p, force, strained)
     type(lattice_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! with its weights; what it keeps in single precision is set
+    type(model_type), intent(in) :: model               !! that the weights were made for
+    type(force_options_type), intent(in) :: options
+      !! what the forces take in, as for `lattice_dilatation`
+    real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)
-    real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
+    real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
@@ -105,12 +115,13 @@ contains
     integer :: b, c, s, k, colour
 
     both = both_ends(family%dim, family%mixed)
-    limit = fast_limits(family, model)
-    !$omp parallel default(none) shared(family, model, u, p, force, strained, both, limit) &
+    limit = fast_limits(family, model, options)
+    !$omp parallel default(none) &
+    !$omp shared(family, model, options, u, p, force, strained, both, limit) &
     !$omp private(scratch, own, b, c, s, k, colour)
     call allocate_scratch(family, scratch)
-    if (family%mixed .and. .not. model%dilatation) call split_displacements(family, u)
-    if (family%mixed .and. model%dilatation) call round_dilatation(family, p)
+    if (family%mixed .and. .not. options%dilatation) call split_displacements(family, u)
+    if (family%mixed .and. options%dilatation) call round_dilatation(family, p)
     if (family%mixed .and. both) call clear_sums(family, size(force, 2))
     if (both) then
       do c = 1, size(force, 2)
@@ -127,11 +138,12 @@ contains
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
           if (shared_weights(family, b, both)) then
-            call force_of_block(family, model, both, limit, b, family%table(family%weights(b)), &
-              & scratch, u, p, force, strained)
+            call force_of_block(family, model, options, both, limit, b, &
+              & family%table(family%weights(b)), scratch, u, p, force, strained)
           else
             call weights_now(family, model, b, own)
-            call force_of_block(family, model, both, limit, b, own, scratch, u, p, force, strained)
+            call force_of_block(family, model, options, both, limit, b, own, scratch, u, p, force, &
+              & strained)
           end if
         end do
       end do
@@ -146,10 +158,11 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine lattice_energy(family, model, u, energy)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
+    type(lattice_family_type), intent(in) :: family  !! with its weights
+    type(model_type), intent(in) :: model            !! that the weights were made for
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(out), contiguous :: energy(:)
+      !! (n_slots) of each slot, 0 for dead ones [J/m3]
     type(weights_type) :: own, half
     integer :: b
 
@@ -169,19 +182,21 @@ contains
 
   !> The strains up to which the fast formulas serve: those that are tried first and, where these
   !> are left, the second; 0: none.
-  pure function fast_limits(family, model) result(limit)
+  pure function fast_limits(family, model, options) result(limit)
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     real(wp) :: limit(2)
 
     limit = 0.0_wp
     if (family%mixed) then
-      if (.not. model%for_differences) limit(1) = fast_limit(model, single)
+      if (.not. options%double) limit(1) = fast_limit(model, options, single)
       return
     end if
-    limit(1) = fast_limit(model, narrow)
+    limit(1) = fast_limit(model, options, narrow)
     ! where bonds break at strains so small that the first serve them all, there is no second
-    if (fast_limit(model, wide) > limit(1)) limit(2) = fast_limit(model, wide)
+    limit(2) = fast_limit(model, options, wide)
+    if (limit(2) <= limit(1)) limit(2) = 0.0_wp
   end function fast_limits
 
   !> Room of one thread for its blocks.
@@ -248,9 +263,11 @@ contains
   end function shared_weights
 
   !> p of one block; where loops add to both ends of a bond, theta of its bonds added to `p`.
-  subroutine dilatation_of_block(family, model, both, limit, b, weights, scratch, u, p, strained)
+  subroutine dilatation_of_block(family, model, options, both, limit, b, weights, scratch, u, p, &
+    & strained)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     logical, intent(in) :: both
     real(wp), intent(in) :: limit(:)
     integer, intent(in) :: b
@@ -263,7 +280,7 @@ contains
     integer :: n, l, served, kind
     logical :: missed
 
-    kind = dilatation_of(model)
+    kind = dilatation_of(options)
     first = family%block(b)
     last = first + family%block_length - 1
     n = weights%n
@@ -297,14 +314,15 @@ contains
           call half_of(family, weights, l, scratch%half)
           if (both) scratch%half%dilatation(:, :n) = family%singles%volume &
             & *scratch%single_left(l + 1:l + lanes, :n)
-          call general_dilatation(model, both, n, scratch%half, scratch%half%dilatation, &
+          call general_dilatation(model, options, both, n, scratch%half, scratch%half%dilatation, &
             & first + l, u, p, strained)
         end do
       else if (both .and. limit(1) > 0.0_wp) then
-        call general_dilatation(model, both, n, weights, scratch%left(:, :, served), first, u, p, &
-          & strained)
+        call general_dilatation(model, options, both, n, weights, scratch%left(:, :, served), &
+          & first, u, p, strained)
       else
-        call general_dilatation(model, both, n, weights, weights%dilatation, first, u, p, strained)
+        call general_dilatation(model, options, both, n, weights, weights%dilatation, first, u, p, &
+          & strained)
       end if
     end if
     if (both) return
@@ -314,9 +332,11 @@ contains
   end subroutine dilatation_of_block
 
   !> Forces of one block's bonds, added to `force`.
-  subroutine force_of_block(family, model, both, limit, b, weights, scratch, u, p, force, strained)
+  subroutine force_of_block(family, model, options, both, limit, b, weights, scratch, u, p, force, &
+    & strained)
     type(lattice_family_type), intent(inout) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     logical, intent(in) :: both
     real(wp), intent(in) :: limit(:)
     integer, intent(in) :: b
@@ -329,13 +349,13 @@ contains
     integer :: n, l, served, kind
     logical :: fast, missed
 
-    kind = dilatation_of(model)
+    kind = dilatation_of(options)
     first = family%block(b)
     n = weights%n
     if (both) n = weights%n_forward
     fast = limit(1) > 0.0_wp
     served = narrow
-    if (model%dilatation) then
+    if (options%dilatation) then
       fast = family%served(b) > 0_i1
       served = int(family%served(b))
     end if
@@ -365,14 +385,15 @@ contains
       do l = 0, family%block_length - lanes, lanes
         call half_of(family, weights, l, scratch%half)
         if (both .and. fast) scratch%half%stretch(:, :n) = scratch%single_left(l + 1:l + lanes, :n)
-        call general_force(model, both, n, scratch%half, scratch%half%stretch, first + l, u, p, &
-          & force, strained)
+        call general_force(model, options, both, n, scratch%half, scratch%half%stretch, first + l, &
+          & u, p, force, strained)
       end do
     else if (both .and. fast) then
-      call general_force(model, both, n, weights, scratch%left(:, :, served), first, u, p, force, &
-        & strained)
+      call general_force(model, options, both, n, weights, scratch%left(:, :, served), first, u, &
+        & p, force, strained)
     else
-      call general_force(model, both, n, weights, weights%stretch, first, u, p, force, strained)
+      call general_force(model, options, both, n, weights, weights%stretch, first, u, p, force, &
+        & strained)
     end if
   end subroutine force_of_block
 
@@ -404,13 +425,15 @@ contains
     integer(i8), intent(in) :: first
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
+    type(force_options_type) :: options
     real(wp) :: stretches(lanes), theta(lanes)
     integer :: l
 
-    if (size(model%materials) > 1 .or. .not. fast_terms(model)) then
-      call general_energy(model, weights, first, u, stretches, theta)
+    options = options_of(model)
+    if (size(model%materials) > 1 .or. .not. fast_terms(options)) then
+      call general_energy(model, options, weights, first, u, stretches, theta)
     else
-      call fast_energy(model%dim, dilatation_of(model), weights%n, size(u, 1), &
+      call fast_energy(model%dim, dilatation_of(options), weights%n, size(u, 1), &
         & weights%dilatation, weights%stretch, weights%shift, weights%geometry, first, u, &
         & stretches, theta)
     end if

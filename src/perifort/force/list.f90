@@ -3,14 +3,16 @@
 !> loop serves (strains beyond 5 % or near breaking, temperature) is done by general formulas.
 module pd_force_list
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_lanes, only: lanes
   use pd_family_list, only: list_family_type, at_moved, at_p
-  use pd_family_offsets, only: lanes
   use pd_force_general, only: mark_slot
-  use pd_force_list_fast, only: choose_loop, for_energy, for_force, for_theta, pass_loop, task_type
+  use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
+    & no_tables, pass_loop, task_type, weights_alone
   use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy, store_weights, take_up
+    & general_energy, take_given, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
-  use pd_force_model, only: model_type
+  use pd_force_list_tables, only: drop_tables, make_tables
+  use pd_force_model, only: early, force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
   implicit none (type, external)
   private
@@ -22,23 +24,25 @@ module pd_force_list
 
   !> The loops of a pass, and the strains that they serve.
   type :: loops_type
-    procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters of points alike
-    procedure(pass_loop), pointer, nopass :: stored => null()  !! for those with stored weights
+    procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters without tables,
+    procedure(pass_loop), pointer, nopass :: stored => null()  !! with weights,
+    procedure(pass_loop), pointer, nopass :: shaped => null()  !! with weights and geometry
     type(task_type) :: task                                    !! what is the same for all
     real(wp) :: narrow = 0.0_wp, wide = 0.0_wp                 !! limits of |e|, 0: none
   end type loops_type
 
 contains
 
-  !> Make what the family keeps of the model: which clusters have points alike, and the weights of
-  !> the others. The first pass does it if nobody has; afterwards the model must not change.
+  !> Make what the family keeps of the model: which clusters have points alike, and tables. The
+  !> first pass does it if nobody has; afterwards the model must not change.
   subroutine prepare_list(family, model)
     type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+      !! gets `given`, `plain` and the stored weights; unchanged if it has them
+    type(model_type), intent(in) :: model  !! parameters of the slots
 
     if (allocated(family%given)) return
     call survey(family, model)
-    call store_weights(family, model)
+    call make_tables(family, model)
   end subroutine prepare_list
 
   !> Drop what the family keeps of the model, which is about to change or has changed: the next pass
@@ -48,19 +52,21 @@ contains
 
     if (.not. allocated(family%given)) return
     deallocate (family%given, family%plain)
-    if (allocated(family%stored)) deallocate (family%stored)
-    if (allocated(family%weight_D)) deallocate (family%weight_D)
-    if (allocated(family%weight_S)) deallocate (family%weight_S)
+    call drop_tables(family)
   end subroutine forget_model
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
   !> intact bond beyond its limit.
-  subroutine list_dilatation(family, model, u, p, strained)
+  subroutine list_dilatation(family, model, options, u, p, strained)
     type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
+      !! gets the displacements and how far its clusters are strained
+    type(model_type), intent(in) :: model            !! that the family has been prepared for
+    type(force_options_type), intent(in) :: options  !! what the forces take in
+    real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
+      !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
@@ -68,22 +74,22 @@ contains
     integer :: c, k, l
 
     call prepare_list(family, model)
-    call new_loops(family, model, for_theta, loops)
+    call new_loops(family, model, options, for_theta, loops)
     call gather_state(family, u)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, p, strained, loops) private(work, sums, strain, c, k, l)
+    !$omp shared(family, model, options, p, strained, loops) private(work, sums, strain, c, k, l)
     do c = 1, size(family%large)
       call take_up(family, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       strain = little
-      call sum_up(family, model, loops, work, strain, sums)
+      call sum_up(family, model, options, loops, work, strain, sums)
       family%large(c) = strain
       if (strain == beyond) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
-        call general_theta(family, model, work, sums(:, 1))
-        if (model%breaking) call mark(model, work, strained)
+        call general_theta(family, model, options, work, sums(:, 1))
+        if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do l = 1, lanes
         k = work%first + l - 1
@@ -96,13 +102,17 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `list_dilatation` at the same displacements.
-  subroutine list_force(family, model, u, p, force, strained)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
+  subroutine list_force(family, model, options, u, p, force, strained)
+    type(list_family_type), intent(inout) :: family     !! gets the displacements and `p`
+    type(model_type), intent(in) :: model               !! that the family has been prepared for
+    type(force_options_type), intent(in) :: options
+      !! what the forces take in, as for `list_dilatation`
+    real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)
-    real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
+    real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
+      !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
@@ -110,22 +120,27 @@ contains
     integer :: c, d
 
     call prepare_list(family, model)
-    call new_loops(family, model, for_force, loops)
-    call gather_state(family, u, p)
+    call new_loops(family, model, options, for_force, loops)
+    ! with a dilatation, the pass before has gathered the displacements
+    if (options%dilatation) then
+      call gather_p(family, p)
+    else
+      call gather_state(family, u)
+    end if
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, force, strained, loops) private(work, sums, strain, c, d)
+    !$omp shared(family, model, options, force, strained, loops) private(work, sums, strain, c, d)
     do c = 1, size(family%large)
       call take_up(family, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       ! the pass before has looked at the strain
-      strain = merge(family%large(c), little, model%dilatation)
-      call sum_up(family, model, loops, work, strain, sums)
+      strain = merge(family%large(c), little, options%dilatation)
+      call sum_up(family, model, options, loops, work, strain, sums)
       if (strain == beyond) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
-        call general_force(family, model, work, sums)
-        if (model%breaking) call mark(model, work, strained)
+        call general_force(family, model, options, work, sums)
+        if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do d = 1, model%dim
         force(work%first:work%first + lanes - 1, d) = sums(:, d)
@@ -135,10 +150,11 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine list_energy(family, model, u, energy)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: energy(:)
+    type(list_family_type), intent(inout) :: family   !! gets the displacements
+    type(model_type), intent(in) :: model             !! that the family has been prepared for
+    real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
+    real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
+    type(force_options_type) :: options
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
@@ -146,17 +162,19 @@ contains
     integer :: c, k, l
 
     call prepare_list(family, model)
-    call new_loops(family, model, for_energy, loops)
+    options = options_of(model)
+    call new_loops(family, model, options, for_energy, loops)
     call gather_state(family, u)
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model, energy, loops) &
-    !$omp private(work, sums, missed, c, k, l)
+    !$omp parallel do schedule(dynamic, 32) default(none) &
+    !$omp shared(family, model, options, energy, loops) private(work, sums, missed, c, k, l)
     do c = 1, size(family%large)
       call take_up(family, c, work)
-      if (model%thermal) then
+      call take_given(family, work)
+      if (options%thermal) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
         end associate
-        call general_energy(family, model, work, sums(:, 1), sums(:, 2))
+        call general_energy(family, model, options, work, sums(:, 1), sums(:, 2))
       else
         call run_loop(family, work, loops%stored, loops%task, sums, missed)
       end if
@@ -164,7 +182,7 @@ contains
         k = work%first + l - 1
         associate (m => model%materials(model%material(k)))
           energy(k) = sums(l, 1)
-          if (model%dilatation) energy(k) = energy(k) + m%a*(m%t*sums(l, 2))**2
+          if (options%dilatation) energy(k) = energy(k) + m%a*(m%t*sums(l, 2))**2
         end associate
       end do
     end do
@@ -173,26 +191,32 @@ contains
   ! ---------------------------------------------------------------- one cluster
 
   !> The loops of a pass.
-  subroutine new_loops(family, model, pass, loops)
+  subroutine new_loops(family, model, options, pass, loops)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     integer, intent(in) :: pass
     type(loops_type), intent(out) :: loops
 
-    call choose_loop(family%dim, pass, .false., model%dilatation, model%projected, loops%plain)
-    call choose_loop(family%dim, pass, .true., model%dilatation, model%projected, loops%stored)
+    call choose_loop(family%dim, pass, no_tables, options%dilatation, options%projected, &
+      & loops%plain)
+    call choose_loop(family%dim, pass, weights_alone, options%dilatation, options%projected, &
+      & loops%stored)
+    call choose_loop(family%dim, pass, all_tables, options%dilatation, options%projected, &
+      & loops%shaped)
     call new_task(family, model, loops%task)
-    loops%narrow = fast_limit(model, narrow)
-    loops%wide = fast_limit(model, wide)
+    loops%narrow = fast_limit(model, options, narrow)
+    loops%wide = fast_limit(model, options, wide)
     ! where bonds break early, it serves no more than the narrow one
     if (loops%wide <= loops%narrow) loops%wide = 0.0_wp
   end subroutine new_loops
 
   !> Sums of a cluster by the loops that serve its strain, which is at least `strain`; on return
   !> `strain` says which did, or that none does.
-  subroutine sum_up(family, model, loops, work, strain, sums)
+  subroutine sum_up(family, model, options, loops, work, strain, sums)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(loops_type), intent(in) :: loops
     type(work_type), intent(in) :: work
     integer(i1), intent(inout) :: strain
@@ -201,7 +225,8 @@ contains
     logical :: missed
 
     task = loops%task
-    if (family%plain(work%cluster) == 1_i1) call plain_task(family, model, work%cluster, task)
+    if (family%stored(work%cluster) == 0_i8) &
+      & call plain_task(family, model, options, work%cluster, task)
     if (strain == little .and. loops%narrow > 0.0_wp) then
       task%limit = loops%narrow
       call run_either(family, work, loops, task, sums, missed)
@@ -217,7 +242,7 @@ contains
     strain = beyond
   end subroutine sum_up
 
-  !> The loop that has the weights of the cluster.
+  !> The loop for the tables that the cluster has.
   subroutine run_either(family, work, loops, task, sums, missed)
     type(list_family_type), intent(in) :: family
     type(work_type), intent(in) :: work
@@ -226,10 +251,12 @@ contains
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
 
-    if (family%plain(work%cluster) == 1_i1) then
+    if (family%stored(work%cluster) == 0_i8) then
       call run_loop(family, work, loops%plain, task, sums, missed)
-    else
+    else if (family%shape(work%cluster) == 0_i8) then
       call run_loop(family, work, loops%stored, task, sums, missed)
+    else
+      call run_loop(family, work, loops%shaped, task, sums, missed)
     end if
   end subroutine run_either
 
@@ -241,42 +268,59 @@ contains
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
-    integer(i8) :: e, last, b, f, d
+    integer(i8) :: e, last, b, f, d, s
 
     ! tables that are not there have no second element; loops that need them are not called then
     e = family%start(work%cluster)
     last = e + work%n - 1
-    b = family%stored(work%cluster)
+    b = max(1_i8, family%stored(work%cluster))
+    s = max(1_i8, family%shape(work%cluster))
     f = merge(e, 1_i8, size(family%fraction) > 0)
     d = merge(b, 1_i8, size(family%weight_D) > 0)
     call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
-      & family%at, family%given, family%fraction(:, f:), family%weight_D(:, d:), &
-      & family%weight_S(:, b:), work%own, task, sums, missed)
+      & family%at, family%given, family%fraction(:, f:), family%geometry(:, s:), &
+      & family%weight_D(:, d:), family%weight_S(:, b:), work%own, task, sums, missed)
   end subroutine run_loop
 
-  !> Copy displacements, and p if there is one, point by point: what a bond needs of its other end
-  !> then stands in one place.
-  subroutine gather_state(family, u, p)
+  !> Copy displacements, point by point: what a bond needs of its other end then stands in one
+  !> place.
+  subroutine gather_state(family, u)
     type(list_family_type), intent(inout) :: family
     real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(in), contiguous, optional :: p(:)
-    integer :: k, c
+    integer :: k
 
-    !$omp parallel do schedule(static) default(none) shared(family, u, p) private(k, c)
-    do k = 1, family%n_slots
-      do c = 1, size(u, 2)
-        family%at(at_moved + c, k) = u(k, c)
+    select case (size(u, 2))
+    case (3)
+      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
+      do k = 1, family%n_slots
+        family%at(at_moved + 1:at_moved + 3, k) = u(k, :3)
       end do
-      if (.not. present(p)) cycle
-      if (size(p) > 0) family%at(at_p, k) = p(k)
-    end do
+    case (2)
+      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
+      do k = 1, family%n_slots
+        family%at(at_moved + 1:at_moved + 2, k) = u(k, :2)
+      end do
+    case default
+      family%at(at_moved + 1, :) = u(:, 1)
+    end select
   end subroutine gather_state
+
+  !> Copy the dilatation coefficients beside them.
+  subroutine gather_p(family, p)
+    type(list_family_type), intent(inout) :: family
+    real(wp), intent(in), contiguous :: p(:)
+    integer :: k
+
+    !$omp parallel do schedule(static) default(none) shared(family, p) private(k)
+    do k = 1, family%n_slots
+      family%at(at_p, k) = p(k)
+    end do
+  end subroutine gather_p
 
   ! ---------------------------------------------------------------- breaking
 
-  !> Mark the lanes with an intact bond within a relative 1e-9 of the smallest limit of all. The
-  !> margin covers rounding; `pd_force_breaking` evaluates the exact criterion for these slots only.
-  pure subroutine mark(model, work, strained)
+  !> Mark the lanes with an intact bond near the smallest critical stretch of all (`early`).
+  pure subroutine mark_cluster(model, work, strained)
     type(model_type), intent(in) :: model
     type(work_type), intent(in) :: work
     integer(i1), intent(inout), contiguous :: strained(:)
@@ -284,12 +328,12 @@ contains
     integer(i8) :: k
     integer :: l
 
-    limit = model%least_critical*(1 - 1.0e-9_wp)
+    limit = model%least_critical*early
     do l = 1, lanes
       k = work%first + l - 1
       if (work%tension(l) > limit) call mark_slot(model, k, work%tension(l), strained)
       if (work%compression(l) > limit) call mark_slot(model, k, -work%compression(l), strained)
     end do
-  end subroutine mark
+  end subroutine mark_cluster
 
 end module pd_force_list

@@ -3,7 +3,7 @@
 !> be constants where the loops are compiled. In 1D they work with a second component that is zero.
 module pd_force_list_fast
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_family_offsets, only: lanes
+  use pd_base_lanes, only: lanes
   use pd_force_general, only: crushed
   use pd_force_polynomial, only: g0, g1, g2, g3, g4, g5, g6, g7, &
     & h0_narrow => h0, h1_narrow => h1, h2_narrow => h2, h3_narrow => h3, h4_narrow => h4, &
@@ -18,9 +18,13 @@ module pd_force_list_fast
   private
   public :: pass_loop, task_type, choose_loop, for_theta, for_force, for_energy
   public :: no_correction, one_spacing, own_spacing, stored_fraction, least
+  public :: no_tables, weights_alone, all_tables
 
   !> What a pass sums up.
   integer, parameter :: for_theta = 1, for_force = 2, for_energy = 3
+
+  !> What is stored for the bonds of a cluster: nothing, weights, or weights, xi and 2/|xi|^2.
+  integer, parameter :: no_tables = 0, weights_alone = 1, all_tables = 2
 
   !> Where a loop has the volume correction from: nowhere, the spacing of all points, those of both
   !> ends, a table.
@@ -46,8 +50,8 @@ module pd_force_list_fast
 
   abstract interface
     !> Sums of one cluster's bonds, see bond_pass.inc.
-    subroutine pass_loop(n, member, first, intact, at, given, fraction, weight_D, weight_S, own, &
-      & task, sums, missed)
+    subroutine pass_loop(n, member, first, intact, at, given, fraction, geometry, weight_D, &
+      & weight_S, own, task, sums, missed)
       import :: wp, i1, i4, lanes, task_type
       implicit none (type, external)
       integer, intent(in) :: n                    !! packs
@@ -62,44 +66,54 @@ module pd_force_list_fast
       ! allow(C071): as above.
       real(wp), intent(in) :: fraction(lanes, *)  !! vc, if stored
       ! allow(C071): as above.
+      real(wp), intent(in) :: geometry(lanes, *)  !! xi and 2/|xi|^2, if stored
+      ! allow(C071): as above.
       real(wp), intent(in) :: weight_D(lanes, *)  !! Gd vc V of each lane, if stored
       ! allow(C071): as above.
       real(wp), intent(in) :: weight_S(lanes, *)  !! (q_k + q_j) Gb vc V |xi|, if stored
       real(wp), intent(in) :: own(lanes, 16)      !! `at` and `given` of the lanes
-      type(task_type), intent(in) :: task
+      type(task_type), intent(in) :: task         !! what all bonds of the cluster have in common
       real(wp), intent(inout) :: sums(lanes, 3)
+        !! of each lane: theta [m3]; components of the force density [N/m3]; or energy [J/m3] and
+        !! theta
       logical, intent(out) :: missed              !! some bond is strained beyond the limit
     end subroutine pass_loop
   end interface
 
 contains
 
-  !> The loop of a `pass` in `dim` dimensions. `stored`: of theta and force, with stored weights;
-  !> `state`: there is a dilatation, `projected` or not.
-  subroutine choose_loop(dim, pass, stored, state, projected, loop)
-    integer, intent(in) :: dim, pass
-    logical, intent(in) :: stored, state, projected
-    procedure(pass_loop), pointer, intent(out) :: loop
+  !> The loop of a `pass` in `dim` dimensions for clusters with `tables`. `state`: there is a
+  !> dilatation, `projected` or not. Energies have one for all clusters.
+  subroutine choose_loop(dim, pass, tables, state, projected, loop)
+    integer, intent(in) :: dim     !! number of dimensions; 1 takes the loops of 2
+    integer, intent(in) :: pass    !! `for_theta`, `for_force` or `for_energy`
+    integer, intent(in) :: tables  !! `no_tables`, `weights_alone` or `all_tables`
+    logical, intent(in) :: state   !! the force has a dilatation; counts for forces only
+    logical, intent(in) :: projected  !! with Lambda as printed, else Lambda = 1
+    procedure(pass_loop), pointer, intent(out) :: loop  !! the loop
 
     select case (pass)
     case (for_theta)
       if (projected) then
-        call choose_one(dim, stored, plain_projected_theta_2, plain_projected_theta_3, &
-          & stored_projected_theta_2, stored_projected_theta_3, loop)
+        call choose_one(dim, tables, plain_projected_theta_2, plain_projected_theta_3, &
+          & stored_projected_theta_2, stored_projected_theta_3, shaped_projected_theta_2, &
+          & shaped_projected_theta_3, loop)
       else
-        call choose_one(dim, stored, plain_theta_2, plain_theta_3, stored_theta_2, stored_theta_3, &
-          & loop)
+        call choose_one(dim, tables, plain_theta_2, plain_theta_3, stored_theta_2, &
+          & stored_theta_3, shaped_theta_2, shaped_theta_3, loop)
       end if
     case (for_force)
       if (.not. state) then
-        call choose_one(dim, stored, plain_bond_force_2, plain_bond_force_3, stored_bond_force_2, &
-          & stored_bond_force_3, loop)
-      else if (projected) then
-        call choose_one(dim, stored, plain_projected_force_2, plain_projected_force_3, &
-          & stored_projected_force_2, stored_projected_force_3, loop)
-      else
-        call choose_one(dim, stored, plain_force_2, plain_force_3, stored_force_2, stored_force_3, &
+        call choose_one(dim, tables, plain_bond_force_2, plain_bond_force_3, &
+          & stored_bond_force_2, stored_bond_force_3, shaped_bond_force_2, shaped_bond_force_3, &
           & loop)
+      else if (projected) then
+        call choose_one(dim, tables, plain_projected_force_2, plain_projected_force_3, &
+          & stored_projected_force_2, stored_projected_force_3, shaped_projected_force_2, &
+          & shaped_projected_force_3, loop)
+      else
+        call choose_one(dim, tables, plain_force_2, plain_force_3, stored_force_2, &
+          & stored_force_3, shaped_force_2, shaped_force_3, loop)
       end if
     case default
       ! for energies
@@ -113,186 +127,260 @@ contains
     end select
   end subroutine choose_loop
 
-  subroutine choose_one(dim, stored, plain_2, plain_3, stored_2, stored_3, loop)
-    integer, intent(in) :: dim
-    logical, intent(in) :: stored
-    procedure(pass_loop) :: plain_2, plain_3, stored_2, stored_3
+  subroutine choose_one(dim, tables, plain_2, plain_3, stored_2, stored_3, shaped_2, shaped_3, loop)
+    integer, intent(in) :: dim, tables
+    procedure(pass_loop) :: plain_2, plain_3, stored_2, stored_3, shaped_2, shaped_3
     procedure(pass_loop), pointer, intent(out) :: loop
 
-    if (stored) then
+    select case (tables)
+    case (all_tables)
+      loop => shaped_2
+      if (dim == 3) loop => shaped_3
+    case (weights_alone)
       loop => stored_2
       if (dim == 3) loop => stored_3
-    else
+    case default
+      ! no_tables
       loop => plain_2
       if (dim == 3) loop => plain_3
-    end if
+    end select
   end subroutine choose_one
 
-  subroutine plain_projected_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_projected_theta_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: stored = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_theta_2
 
-  subroutine plain_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_theta_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: stored = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_theta_2
 
-  subroutine plain_bond_force_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_bond_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: stored = .false., state = .false., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_bond_force_2
 
-  subroutine plain_projected_force_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_projected_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: stored = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_force_2
 
-  subroutine plain_force_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: stored = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_force_2
 
-  subroutine stored_projected_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine stored_projected_theta_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: stored = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_theta_2
 
-  subroutine stored_theta_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_projected_theta_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
-    logical, parameter :: stored = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine shaped_projected_theta_2
+
+  subroutine stored_theta_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_theta
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_theta_2
 
-  subroutine stored_bond_force_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_theta_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_theta
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine shaped_theta_2
+
+  subroutine stored_bond_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: stored = .true., state = .false., projected = .true.
+    logical, parameter :: stored = .true., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_bond_force_2
 
-  subroutine stored_projected_force_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_bond_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: stored = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., shaped = .true., state = .false., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine shaped_bond_force_2
+
+  subroutine stored_projected_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_force_2
 
-  subroutine stored_force_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_projected_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
-    logical, parameter :: stored = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine shaped_projected_force_2
+
+  subroutine stored_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_force_2
 
-  subroutine projected_energy_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_force_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 2, pass = for_force
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine shaped_force_2
+
+  subroutine projected_energy_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_energy
-    logical, parameter :: stored = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine projected_energy_2
 
-  subroutine energy_2(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine energy_2(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_energy
-    logical, parameter :: stored = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine energy_2
 
-  subroutine plain_projected_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_projected_theta_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: stored = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_theta_3
 
-  subroutine plain_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_theta_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: stored = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_theta_3
 
-  subroutine plain_bond_force_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_bond_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: stored = .false., state = .false., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_bond_force_3
 
-  subroutine plain_projected_force_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_projected_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: stored = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_force_3
 
-  subroutine plain_force_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine plain_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: stored = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_force_3
 
-  subroutine stored_projected_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine stored_projected_theta_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: stored = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_theta_3
 
-  subroutine stored_theta_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_projected_theta_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
-    logical, parameter :: stored = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine shaped_projected_theta_3
+
+  subroutine stored_theta_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_theta
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_theta_3
 
-  subroutine stored_bond_force_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_theta_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_theta
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine shaped_theta_3
+
+  subroutine stored_bond_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: stored = .true., state = .false., projected = .true.
+    logical, parameter :: stored = .true., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_bond_force_3
 
-  subroutine stored_projected_force_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_bond_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: stored = .true., state = .true., projected = .true.
+    logical, parameter :: stored = .true., shaped = .true., state = .false., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine shaped_bond_force_3
+
+  subroutine stored_projected_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_force_3
 
-  subroutine stored_force_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_projected_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
-    logical, parameter :: stored = .true., state = .true., projected = .false.
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
+    include 'bond_pass.inc'
+  end subroutine shaped_projected_force_3
+
+  subroutine stored_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_force_3
 
-  subroutine projected_energy_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine shaped_force_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
+    integer, parameter :: dim = 3, pass = for_force
+    logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
+    include 'bond_pass.inc'
+  end subroutine shaped_force_3
+
+  subroutine projected_energy_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_energy
-    logical, parameter :: stored = .false., state = .true., projected = .true.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine projected_energy_3
 
-  subroutine energy_3(n, member, first, intact, at, given, fraction, weight_D, &
-    & weight_S, own, task, sums, missed)
+  subroutine energy_3(n, member, first, intact, at, given, fraction, geometry, &
+    & weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_energy
-    logical, parameter :: stored = .false., state = .true., projected = .false.
+    logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine energy_3
 

@@ -3,17 +3,17 @@
 !> filled first, and always three components, those that a body does not have being zero.
 module pd_force_list_general
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type, at_volume, at_moved, at_p
-  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
-  public :: work_type, fill_tables, general_theta, general_force, general_energy, store_weights
-  public :: take_up
+  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up, &
+    & take_given
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
@@ -34,9 +34,10 @@ contains
 
   !> Turn to cluster `c`.
   pure subroutine take_up(family, c, work)
-    type(list_family_type), intent(in) :: family
-    integer, intent(in) :: c
+    type(list_family_type), intent(in) :: family  !! prepared for a model, with its state gathered
+    integer, intent(in) :: c                      !! cluster
     type(work_type), intent(inout) :: work
+      !! gets what its slots have; its tables stay those of another cluster
     integer :: d, l
 
     work%cluster = c
@@ -45,10 +46,22 @@ contains
     do d = 1, at_p
       do l = 1, lanes
         work%own(l, d) = family%at(d, work%first + l - 1)
-        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
       end do
     end do
   end subroutine take_up
+
+  !> Take what the model gives its slots, too.
+  pure subroutine take_given(family, work)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(inout) :: work
+    integer :: d, l
+
+    do d = 1, at_p
+      do l = 1, lanes
+        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
+      end do
+    end do
+  end subroutine take_given
 
   !> Room for the tables of any cluster.
   subroutine allocate_tables(family, work)
@@ -64,17 +77,19 @@ contains
   !> Weights of a cluster's bonds, for any rule, material and surface factor: of those that `bits`
   !> (packs of the cluster) has. `own`: with 2 q_k in place of q_k + q_j, as the energy needs them.
   subroutine fill_tables(family, model, bits, own, work)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    integer(i1), intent(in) :: bits(:)
-    logical, intent(in) :: own
+    type(list_family_type), intent(in) :: family  !! prepared for the model
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    integer(i1), intent(in) :: bits(:)  !! (packs) lanes whose bonds count, such as the intact ones
+    logical, intent(in) :: own          !! 2 q_k in place of q_k + q_j
     type(work_type), intent(inout) :: work
+      !! of the cluster it has taken up; gets the tables of its bonds
     real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c
     logical :: there(lanes), from(lanes)
     integer(i8) :: e
     integer :: i, j, m, f
 
     call allocate_tables(family, work)
+    call take_given(family, work)
     do i = 1, work%n
       e = family%start(work%cluster) + i - 1
       j = family%member(1, e)
@@ -122,71 +137,46 @@ contains
     end do
   end subroutine fill_tables
 
-  !> Store the weights of all clusters whose points are not alike.
-  subroutine store_weights(family, model)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
-    type(work_type) :: work
-    integer(i8) :: n, b
-    integer :: c
-
-    allocate (family%stored(size(family%plain)), source=1_i8)
-    n = 0_i8
-    do c = 1, size(family%plain)
-      if (family%plain(c) == 1_i1) cycle
-      family%stored(c) = n + 1
-      n = n + family%start(c + 1) - family%start(c)
-    end do
-    allocate (family%weight_S(lanes, n))
-    allocate (family%weight_D(lanes, merge(n, 0_i8, model%dilatation)))
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model) private(work, b, c)
-    do c = 1, size(family%plain)
-      if (family%plain(c) == 1_i1) cycle
-      call take_up(family, c, work)
-      call fill_tables(family, model, family%bits(family%start(c):family%start(c + 1) - 1), &
-        & .false., work)
-      b = family%stored(c)
-      associate (n => work%n)
-        family%weight_S(:, b:b + n - 1) = work%stretch(:, :n)/work%geometry(:, :n)
-        if (model%dilatation) family%weight_D(:, b:b + n - 1) = work%dilatation(:, :n)
-      end associate
-    end do
-  end subroutine store_weights
-
   !> theta of the lanes.
-  pure subroutine general_theta(family, model, work, theta)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
+  pure subroutine general_theta(family, model, options, work, theta)
+    type(list_family_type), intent(in) :: family     !! with displacements gathered
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the dilatation takes in
     type(work_type), intent(inout) :: work
-    real(wp), intent(out) :: theta(lanes)
+      !! with tables; gets the greatest tension and compression of each lane
+    real(wp), intent(out) :: theta(lanes)            !! sum of Gd s Lambda vc V of each lane [m3]
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
 
-    call begin(model, work)
+    call begin(model, options, work)
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, work, i, s, lambda, r, y, p)
+      call deform(family, model, options, work, i, s, lambda, r, y, p)
       theta = theta + work%dilatation(:, i)*s*lambda
     end do
   end subroutine general_theta
 
   !> Force density of the lanes (lanes, 3) [N/m3].
-  pure subroutine general_force(family, model, work, force)
+  pure subroutine general_force(family, model, options, work, force)
     type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
+      !! with displacements, and p if there is one, gathered
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the forces take in
     type(work_type), intent(inout) :: work
+      !! with tables; gets the greatest tension and compression of each lane
     real(wp), intent(out) :: force(lanes, 3)
+      !! force density; components that the body does not have are 0 [N/m3]
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i, c
 
-    call begin(model, work)
+    call begin(model, options, work)
     force = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, work, i, s, lambda, r, y, p)
+      call deform(family, model, options, work, i, s, lambda, r, y, p)
       s = work%stretch(:, i)*s
-      if (model%dilatation) &
+      if (options%dilatation) &
         & s = s + (work%own(:, at_p) + p)*work%dilatation(:, i)*work%geometry(:, i)*lambda
       do c = 1, 3
         force(:, c) = force(:, c) + s*r*y(:, c)
@@ -196,39 +186,45 @@ contains
 
   !> Strain energy density of the lanes' stretches [J/m3], from tables with each lane's own q twice,
   !> and theta.
-  pure subroutine general_energy(family, model, work, energy, theta)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
+  pure subroutine general_energy(family, model, options, work, energy, theta)
+    type(list_family_type), intent(in) :: family     !! with displacements gathered
+    type(model_type), intent(in) :: model            !! parameters of the slots
+    type(force_options_type), intent(in) :: options  !! what the energy takes in
     type(work_type), intent(inout) :: work
-    real(wp), intent(out) :: energy(lanes), theta(lanes)
+      !! with tables of each lane's own q; gets the greatest tension and compression
+    real(wp), intent(out) :: energy(lanes)           !! of the stretches alone [J/m3]
+    real(wp), intent(out) :: theta(lanes)
+      !! sum of Gd s Lambda vc V of each lane, 0 without a dilatation [m3]
     real(wp), dimension(lanes) :: s, lambda, r, p
     real(wp) :: y(lanes, 3)
     integer :: i
 
-    call begin(model, work)
+    call begin(model, options, work)
     energy = 0.0_wp
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, work, i, s, lambda, r, y, p)
+      call deform(family, model, options, work, i, s, lambda, r, y, p)
       energy = energy + 0.25_wp*work%stretch(:, i)*s**2/work%geometry(:, i)
-      if (model%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
+      if (options%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
     end do
   end subroutine general_energy
 
-  pure subroutine begin(model, work)
+  pure subroutine begin(model, options, work)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
 
     work%tension = 0.0_wp
     work%compression = 0.0_wp
-    if (model%thermal) work%heat = model%expansion(work%first:work%first + lanes - 1)/2
+    if (options%thermal) work%heat = model%expansion(work%first:work%first + lanes - 1)/2
   end subroutine begin
 
   !> State of a cluster's bonds in its `i`-th pack: mechanical stretch, Lambda, r = |xi|/|y|, the
   !> deformed bond y [m] and p of the other end.
-  pure subroutine deform(family, model, work, i, s, lambda, r, y, p)
+  pure subroutine deform(family, model, options, work, i, s, lambda, r, y, p)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(work_type), intent(inout) :: work
     integer, intent(in) :: i
     real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), y(lanes, 3), p(lanes)
@@ -249,9 +245,9 @@ contains
     end do
     p = merge(family%at(at_p, j), family%at(at_p, m), from)
     heat = 0.0_wp
-    if (model%thermal) heat = work%heat &
+    if (options%thermal) heat = work%heat &
       & + merge(model%expansion(j), model%expansion(m), from)/2
-    printed = merge(1.0_wp, 0.0_wp, model%projected)
+    printed = merge(1.0_wp, 0.0_wp, options%projected)
     plain = 1 - printed
     !$omp simd private(x, e, length)
     do l = 1, lanes

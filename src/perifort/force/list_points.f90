@@ -3,13 +3,13 @@
 module pd_force_list_points
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
-  use pd_family_offsets, only: lanes
   use pd_family_volume, only: volume_none, volume_linear, volume_linear_extended, volume_exact
   use pd_force_list_fast, only: task_type, no_correction, one_spacing, own_spacing, &
     & stored_fraction
-  use pd_force_model, only: model_type
+  use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
   public :: survey, new_task, plain_task
@@ -26,8 +26,8 @@ contains
 
   !> Put what the model gives into the family, and find the clusters whose points are alike.
   subroutine survey(family, model)
-    type(list_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+    type(list_family_type), intent(inout) :: family  !! gets `given` and `plain`
+    type(model_type), intent(in) :: model            !! parameters of the slots
     integer :: k, c, d
 
     ! without a factor the sum of both ends is 1, in directions that the body does not have, too
@@ -88,9 +88,9 @@ contains
 
   !> What the loops for energies must know, and what is the same for all clusters.
   subroutine new_task(family, model, task)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(task_type), intent(out) :: task
+    type(list_family_type), intent(in) :: family  !! with its volume rule
+    type(model_type), intent(in) :: model         !! whether there are surface factors
+    type(task_type), intent(out) :: task          !! without a limit of strain
 
     task%surface = model%surface
     select case (family%rule%kind)
@@ -123,11 +123,13 @@ contains
   end subroutine set_spacing
 
   !> What the loops of plain cluster `c` multiply with.
-  pure subroutine plain_task(family, model, c, task)
-    type(list_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: c
+  pure subroutine plain_task(family, model, options, c, task)
+    type(list_family_type), intent(in) :: family     !! surveyed
+    type(model_type), intent(in) :: model            !! whether there are surface factors
+    type(force_options_type), intent(in) :: options  !! whether the forces have a dilatation
+    integer, intent(in) :: c                         !! cluster whose points are alike
     type(task_type), intent(inout) :: task
+      !! gets the volume correction and the factors of this cluster
     real(wp) :: Gb
 
     associate (given => family%given(:, lanes*(c - 1) + 1))
@@ -139,7 +141,7 @@ contains
         task%factor = given(given_D)
       end if
       task%q = 2*given(given_q)*Gb/task%factor
-      if (.not. model%dilatation) task%factor = 2*given(given_q)*Gb
+      if (.not. options%dilatation) task%factor = 2*given(given_q)*Gb
     end associate
   end subroutine plain_task
 

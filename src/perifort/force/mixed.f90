@@ -8,7 +8,8 @@
 module pd_force_mixed
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, sp, i8
-  use pd_family_lattice, only: lattice_family_type, weights_type, lanes
+  use pd_base_lanes, only: lanes
+  use pd_family_lattice, only: lattice_family_type, weights_type
   use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &
     & w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, k0, k1, k2, k3, k4, k5, &
@@ -26,14 +27,17 @@ contains
   !> `fast_dilatation`; in 2D, what was set is wrong if some bonds were `missed`.
   subroutine mixed_dilatation(family, kind, n, limit, weights, first, theta, left, missed)
     type(lattice_family_type), intent(inout) :: family
+      !! in mixed precision, displacements split; its sums are added to in 3D
     integer, intent(in) :: kind  !! of the dilatation: `projected` or `unprojected`
-    integer, intent(in) :: n
-    real(wp), intent(in) :: limit
-    type(weights_type), intent(in) :: weights
-    integer(i8), intent(in) :: first
+    integer, intent(in) :: n                   !! offsets whose bonds are taken
+    real(wp), intent(in) :: limit              !! of |e|, beyond which bonds are left out [-]
+    type(weights_type), intent(in) :: weights  !! of the block
+    integer(i8), intent(in) :: first           !! slot of the block's first lane
     real(wp), intent(inout), contiguous :: theta(:)
+      !! (n_slots) in 2D set for the block, in 3D not used [m3]
     real(sp), intent(inout), contiguous :: left(:, :)
-    logical, intent(out) :: missed
+      !! (block_length, most bonds) in 3D weights of bonds that were left out, in 2D not used
+    logical, intent(out) :: missed             !! some bonds are strained beyond `limit`
     integer(i8) :: last
 
     missed = .true.
@@ -63,14 +67,18 @@ contains
   !> The same for forces: in 3D added to the sums, in 2D into `force` (n_slots, dim).
   subroutine mixed_force(family, kind, n, limit, weights, first, force, left, missed)
     type(lattice_family_type), intent(inout) :: family
+      !! in mixed precision, displacements split; its sums are added to in 3D
     integer, intent(in) :: kind  !! of the dilatation, `no_dilatation` included
-    integer, intent(in) :: n
+    integer, intent(in) :: n                   !! offsets whose bonds are taken
     real(wp), intent(in) :: limit
-    type(weights_type), intent(in) :: weights
-    integer(i8), intent(in) :: first
+      !! of |e|, beyond which bonds are left out without a dilatation [-]
+    type(weights_type), intent(in) :: weights  !! of the block
+    integer(i8), intent(in) :: first           !! slot of the block's first lane
     real(wp), intent(inout), contiguous :: force(:, :)
+      !! (n_slots, dim) in 2D set for the block, in 3D not used [N/m3]
     real(sp), intent(inout), contiguous :: left(:, :)
-    logical, intent(out) :: missed
+      !! (block_length, most bonds) in 3D weights of bonds that were left out, in 2D not used
+    logical, intent(out) :: missed             !! some bonds are strained beyond `limit`
 
     missed = .true.
     associate (w => weights, s => family%singles, slots => family%n_slots)

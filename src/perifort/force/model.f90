@@ -6,14 +6,26 @@ module pd_force_model
   use pd_body_material, only: material_type, never
   implicit none (type, external)
   private
-  public :: model_type, new_model, no_fail, bond_limit, dilatation_of, no_dilatation, projected, &
-    & unprojected
+  public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early
+  public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
+  !> Loops mark slots with a bond at this part of its critical stretch: the margin covers their
+  !> rounding, and `pd_force_breaking` evaluates the exact criterion for marked slots only.
+  real(wp), parameter :: early = 1 - 1.0e-9_wp
 
   !> Kinds of dilatation that loops are compiled for: the force has none; it has the factor Lambda
   !> as printed; Lambda = 1.
   integer, parameter :: no_dilatation = 1, projected = 2, unprojected = 3
+
+  !> What an evaluation of the forces takes in. It is given by value with each evaluation: whoever
+  !> needs other forces than the model's asks for them so, and the model stays as it is.
+  type :: force_options_type
+    logical :: dilatation = .false.   !! the dilatation's part of the force
+    logical :: projected = .true.     !! Lambda = yhat . xi/|xi| as printed, else Lambda = 1
+    logical :: thermal = .false.      !! thermal strain
+    logical :: double = .false.       !! bonds in double precision, whatever the family has
+  end type force_options_type
 
   type :: model_type
     integer :: dim = 0
@@ -22,8 +34,6 @@ module pd_force_model
     logical :: surface = .false.      !! factors Gd and Gb differ from 1
     logical :: thermal = .false.      !! some temperature change
     logical :: breaking = .false.     !! some bond can fail
-    logical :: for_differences = .false. !! forces are for the differences of a tangent: bonds in
-                                         !! double precision, whatever the family has
     logical :: compression = .false.  !! some bonds break in compression too
     type(material_type), allocatable :: materials(:)
     integer(i2), allocatable :: material(:)  !! of each slot
@@ -40,12 +50,12 @@ contains
   !> The model of a body. `zone` marks slots in no-fail zones, `temperature_change` [K] is per slot.
   !> Surface factors are set by whoever computes them.
   pure subroutine new_model(body, materials, with_lambda, zone, temperature_change, model)
-    type(body_type), intent(in) :: body
-    type(material_type), intent(in) :: materials(:)
+    type(body_type), intent(in) :: body              !! arranged in slots
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
     logical, intent(in) :: with_lambda  !! the dilatation is `projected`, as printed
-    logical, intent(in) :: zone(:)
-    real(wp), intent(in) :: temperature_change(:)
-    type(model_type), intent(out) :: model
+    logical, intent(in) :: zone(:)                   !! (n_slots) slots in no-fail zones
+    real(wp), intent(in) :: temperature_change(:)    !! (n_slots) of each slot [K]
+    type(model_type), intent(out) :: model           !! without surface factors
     logical :: used(size(materials))
     integer :: k
 
@@ -74,19 +84,29 @@ contains
     end if
   end subroutine new_model
 
-  !> The kind of dilatation of the model's force.
-  pure integer function dilatation_of(model) result(kind)
-    type(model_type), intent(in) :: model
+  !> What the forces of the model itself take in.
+  pure type(force_options_type) function options_of(model) result(options)
+    type(model_type), intent(in) :: model  !! the model
+
+    options%dilatation = model%dilatation
+    options%projected = model%projected
+    options%thermal = model%thermal
+  end function options_of
+
+  !> The kind of dilatation of a force.
+  pure integer function dilatation_of(options) result(kind)
+    type(force_options_type), intent(in) :: options  !! what a force takes in
 
     kind = no_dilatation
-    if (model%dilatation) kind = merge(projected, unprojected, model%projected)
+    if (options%dilatation) kind = merge(projected, unprojected, options%projected)
   end function dilatation_of
 
   !> Limits of the mechanical stretch of the bond k-j: it breaks above `upper` or below `lower`.
   pure subroutine bond_limit(model, k, j, lower, upper)
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: k, j
-    real(wp), intent(out) :: lower, upper
+    type(model_type), intent(in) :: model  !! with bonds that can break
+    integer, intent(in) :: k, j     !! slots of the bond's ends
+    real(wp), intent(out) :: lower  !! < 0; -`never` if the bond does not break in compression [-]
+    real(wp), intent(out) :: upper  !! > 0; `never` if one end is in a no-fail zone [-]
 
     upper = min(model%critical(k), model%critical(j))
     if (upper < 0.0_wp) upper = never

@@ -10,7 +10,7 @@
 !> solved with 60 digits.
 module pd_force_polynomial
   use pd_base_kinds, only: wp, sp
-  use pd_force_model, only: model_type
+  use pd_force_model, only: early, force_options_type, model_type
   implicit none (type, external)
   private
   public :: fast_limit, fast_terms, fast_ranges, narrow, wide, single
@@ -57,16 +57,18 @@ module pd_force_polynomial
 
 contains
 
-  !> Whether the fast formulas know every term of the model, so that they serve small strains:
+  !> Whether the fast formulas know every term that is asked for, so that they serve small strains:
   !> forces and energies both ask here.
-  pure logical function fast_terms(model)
-    type(model_type), intent(in) :: model
-    fast_terms = .not. model%thermal
+  pure logical function fast_terms(options)
+    type(force_options_type), intent(in) :: options  !! what a force or an energy takes in
+    fast_terms = .not. options%thermal
   end function fast_terms
 
-  !> Bonds with |e| below this are served by the fast formulas of a `range`; 0: none.
-  pure real(wp) function fast_limit(model, range) result(limit)
-    type(model_type), intent(in) :: model
+  !> Bonds with |e| below this are served by the fast formulas of a `range`; 0: none. Where bonds
+  !> can break it is no more than the |e| at which the first one might.
+  pure real(wp) function fast_limit(model, options, range) result(limit)
+    type(model_type), intent(in) :: model            !! with the smallest critical stretch
+    type(force_options_type), intent(in) :: options  !! what a force takes in
     integer, intent(in) :: range  !! `narrow`, `wide` or `single`
     ! what single precision may miss of e: some roundings of eta/|xi| and of its square, both at
     ! most 2 or so where the length hardly changes
@@ -74,13 +76,13 @@ contains
     real(wp) :: s
 
     limit = 0.0_wp
-    if (.not. fast_terms(model)) return
+    if (.not. fast_terms(options)) return
     limit = fast_ranges(range)
     if (.not. model%breaking) return
     ! with the limit s, |e| reaches (1 + s)^2 - 1 in tension and 1 - (1 - s)^2, which is less, in
     ! compression; from s = 1 on no bond breaks in compression
     s = min(model%least_critical, 1.0_wp)
-    limit = min(limit, s*(2 - s)*(1 - 1.0e-9_wp))
+    limit = min(limit, s*(2 - s)*early)
     if (range == single) limit = max(0.0_wp, limit - roundings)
   end function fast_limit
 

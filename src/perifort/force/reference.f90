@@ -24,11 +24,11 @@ contains
   !> State of the `i`-th bond of slot `k` under displacements `u` (n_slots, dim) [m].
   !> The stretch is formed without cancellation (doc/theory.md, 2).
   pure function state_of_bond(model, u, k, bonds, i) result(state)
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    integer, intent(in) :: k
-    type(bonds_type), intent(in) :: bonds
-    integer, intent(in) :: i
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)        !! (n_slots, dim) displacements [m]
+    integer, intent(in) :: k               !! slot
+    type(bonds_type), intent(in) :: bonds  !! of slot `k`
+    integer, intent(in) :: i               !! number of the bond, from 1
     type(bond_state_type) :: state
     real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length, y
     integer :: j
@@ -51,10 +51,10 @@ contains
 
   !> theta of slot `k` (7.39).
   pure real(wp) function point_dilatation(model, u, k, bonds) result(theta)
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    integer, intent(in) :: k
-    type(bonds_type), intent(in) :: bonds
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)        !! (n_slots, dim) displacements [m]
+    integer, intent(in) :: k               !! slot
+    type(bonds_type), intent(in) :: bonds  !! of slot `k`; broken ones count nothing
     type(bond_state_type) :: state
     integer :: i
 
@@ -69,11 +69,11 @@ contains
 
   !> Force density of slot `k` [N/m3] (7.37, 7.38) from the coefficients p_k = 2 a d delta theta_k.
   pure function point_force(model, u, p, k, bonds) result(force)
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(in) :: p(:)
-    integer, intent(in) :: k
-    type(bonds_type), intent(in) :: bonds
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)        !! (n_slots, dim) displacements [m]
+    real(wp), intent(in) :: p(:)           !! (n_slots) coefficients of the dilatation [N/m5]
+    integer, intent(in) :: k               !! slot
+    type(bonds_type), intent(in) :: bonds  !! of slot `k`; broken ones count nothing
     real(wp) :: force(size(u, 2))
     type(bond_state_type) :: state
     real(wp) :: magnitude
@@ -94,9 +94,9 @@ contains
 
   !> Strain energy density W of slot `k` [J/m3] (doc/theory.md, 9).
   pure real(wp) function point_energy(model, u, k, bonds) result(energy)
-    type(model_type), intent(in) :: model
+    type(model_type), intent(in) :: model     !! parameters of the slots
     real(wp), intent(in) :: u(:, :)           !! displacements (n_slots, dim) [m]
-    integer, intent(in) :: k
+    integer, intent(in) :: k                  !! slot
     type(bonds_type), intent(in) :: bonds     !! of slot `k`
     energy = energy_product(model, u, u, k, bonds)
   end function point_energy
@@ -104,10 +104,10 @@ contains
   !> The strain energy density W of slot `k` with the products of the stretches, and of the
   !> dilatations, of two instants in place of the squares [J/m3] (doc/theory.md, 9).
   pure real(wp) function energy_product(model, u, other, k, bonds) result(energy)
-    type(model_type), intent(in) :: model
+    type(model_type), intent(in) :: model     !! parameters of the slots
     real(wp), intent(in) :: u(:, :)           !! displacements of one instant (n_slots, dim) [m]
     real(wp), intent(in) :: other(:, :)       !! of the other; read at `k` and at its bonds' ends
-    integer, intent(in) :: k
+    integer, intent(in) :: k                  !! slot
     type(bonds_type), intent(in) :: bonds     !! of slot `k`
     type(bond_state_type) :: state, state_of_other
     integer :: i
@@ -127,9 +127,10 @@ contains
     end associate
   end function energy_product
 
-  !> Local damage phi of a point: the part of its family's volume behind broken bonds.
+  !> Local damage phi of a point [-]: the part of its family's volume behind broken bonds, 0 without
+  !> bonds.
   pure real(wp) function point_damage(bonds) result(damage)
-    type(bonds_type), intent(in) :: bonds
+    type(bonds_type), intent(in) :: bonds  !! of the point, broken ones included
     real(wp) :: whole, lost
     integer :: i
 
@@ -145,10 +146,10 @@ contains
 
   !> theta of all slots.
   subroutine reference_dilatation(family, model, u, theta)
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(out) :: theta(:)
+    class(family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model     !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)           !! (n_slots, dim) displacements [m]
+    real(wp), intent(out) :: theta(:)         !! (n_slots) dilatation [-]
     type(bonds_type) :: bonds
     integer :: k
 
@@ -164,10 +165,10 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3].
   subroutine reference_force(family, model, u, force)
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(out) :: force(:, :)
+    class(family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)       !! (n_slots, dim) displacements [m]
+    real(wp), intent(out) :: force(:, :)  !! (n_slots, dim) of the bonds alone, without terms [N/m3]
     type(bonds_type) :: bonds
     real(wp), allocatable :: p(:)
     integer :: k
@@ -189,10 +190,10 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine reference_energy(family, model, u, energy)
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)
-    real(wp), intent(out) :: energy(:)
+    class(family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model     !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)           !! (n_slots, dim) displacements [m]
+    real(wp), intent(out) :: energy(:)        !! (n_slots) strain energy density [J/m3]
     type(bonds_type) :: bonds
     integer :: k
 

@@ -19,8 +19,8 @@ contains
   !> u = unit*high + low, each in single precision, to 47 bits. The leading digits are cut out as
   !> bits: a compiler that may simplify takes a difference from a rounded value for zero.
   subroutine split_displacements(family, u)
-    type(lattice_family_type), intent(inout) :: family
-    real(wp), intent(in), contiguous :: u(:, :)
+    type(lattice_family_type), intent(inout) :: family  !! in mixed precision; gets `high` and `low`
+    real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp) :: high
     integer :: k, c
 
@@ -37,7 +37,8 @@ contains
   !> The dilatation's coefficients `p` (n_slots) in single precision.
   subroutine round_dilatation(family, p)
     type(lattice_family_type), intent(inout) :: family
-    real(wp), intent(in), contiguous :: p(:)
+      !! in mixed precision; gets `p`, times its unit of volume
+    real(wp), intent(in), contiguous :: p(:)  !! (n_slots) 2 a d delta theta [N/m5]
     integer :: k
 
     !$omp do simd schedule(static)
@@ -48,8 +49,8 @@ contains
 
   !> Set the first `n` sums to zero.
   subroutine clear_sums(family, n)
-    type(lattice_family_type), intent(inout) :: family
-    integer, intent(in) :: n
+    type(lattice_family_type), intent(inout) :: family  !! in mixed precision
+    integer, intent(in) :: n  !! number of sums: 1 for theta, dim for forces
     integer :: k, c
 
     do c = 1, n
@@ -62,10 +63,10 @@ contains
 
   !> Add the `c`-th sum, times `unit`, to `values` (n_slots).
   subroutine add_sums(family, c, unit, values)
-    type(lattice_family_type), intent(in) :: family
-    integer, intent(in) :: c
-    real(wp), intent(in) :: unit
-    real(wp), intent(inout), contiguous :: values(:)
+    type(lattice_family_type), intent(in) :: family   !! in mixed precision, with complete sums
+    integer, intent(in) :: c                          !! number of the sum
+    real(wp), intent(in) :: unit                      !! of the sum
+    real(wp), intent(inout), contiguous :: values(:)  !! (n_slots) added to
     integer :: k
 
     !$omp do simd schedule(static)

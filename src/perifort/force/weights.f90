@@ -3,11 +3,11 @@
 !> correction costs nothing in a step and next to no memory.
 module pd_force_weights
   use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes, word_bits
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, &
-    & both_ends, lanes, word_bits
+  use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, both_ends
   use pd_family_surface, only: bond_factor
-  use pd_force_model, only: model_type
+  use pd_force_model, only: model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, single
   implicit none (type, external)
   private
@@ -22,7 +22,8 @@ contains
   !> make theirs in every pass.
   subroutine build_weights(family, model)
     type(lattice_family_type), intent(inout) :: family
-    type(model_type), intent(in) :: model
+      !! whole; gets its tables, and loses mixed precision where the model has no such loops
+    type(model_type), intent(in) :: model  !! complete, with surface factors
     integer(i8), allocatable :: first(:), first_of_table(:)
     integer(i4), allocatable :: table_of(:)
     integer, allocatable :: uses(:), order(:)
@@ -30,7 +31,8 @@ contains
     integer(i8) :: bytes, most
     integer :: b, i, made
 
-    if (fast_limit(model, merge(single, narrow, family%mixed)) <= 0.0_wp) call use_double(family)
+    if (fast_limit(model, options_of(model), merge(single, narrow, family%mixed)) <= 0.0_wp) &
+      & call use_double(family)
     if (family%mixed) call allocate_singles(family, model)
     ! without surface factors, members farther away than a block's own do not count
     if (.not. model%surface) family%class_of = merge(int(model%material, i4), 0_i4, &
@@ -212,9 +214,9 @@ contains
 
   !> Room for the weights of any block.
   pure subroutine allocate_weights(family, model, weights)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    type(weights_type), intent(out) :: weights
+    type(lattice_family_type), intent(in) :: family  !! with its lengths of blocks and of families
+    type(model_type), intent(in) :: model            !! whether there is a dilatation
+    type(weights_type), intent(out) :: weights       !! of any block, not set
     integer :: n
 
     n = family%most_bonds
@@ -229,10 +231,11 @@ contains
   !> Weights of the block that begins at slot `first`, as if no bond were broken, in the grid's
   !> order of offsets. Offsets that no lane has are left out.
   pure subroutine block_weights(family, model, first, weights)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    integer(i8), intent(in) :: first
+    type(lattice_family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model            !! complete, with surface factors
+    integer(i8), intent(in) :: first                 !! slot of the block's first lane
     type(weights_type), intent(inout) :: weights
+      !! with room for any block; those of this one on return
     real(wp) :: weight, n(family%dim)
     integer(i8) :: k, j
     integer :: i, o, l, m, length
@@ -300,10 +303,11 @@ contains
 
   !> The weights of a block as its bonds are now, those of broken bonds 0.
   pure subroutine weights_now(family, model, b, weights)
-    type(lattice_family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: b
+    type(lattice_family_type), intent(in) :: family  !! with its tables
+    type(model_type), intent(in) :: model            !! that the tables were made for
+    integer, intent(in) :: b                         !! number of the block
     type(weights_type), intent(inout) :: weights
+      !! those of this block on return; gets room if it has none
     integer :: m, o, w, l, n
     integer(i8) :: first, bit
     real(wp) :: intact(family%block_length)
@@ -352,10 +356,11 @@ contains
   !> The weights in double precision of `lanes` slots of a block, `skipped` slots behind its first,
   !> from those in single precision.
   pure subroutine half_of(family, weights, skipped, half)
-    type(lattice_family_type), intent(in) :: family
-    type(weights_type), intent(in) :: weights
-    integer, intent(in) :: skipped
+    type(lattice_family_type), intent(in) :: family  !! in mixed precision
+    type(weights_type), intent(in) :: weights  !! of the whole block
+    integer, intent(in) :: skipped             !! slots of the block before this part: 0 or `lanes`
     type(weights_type), intent(inout) :: half
+      !! those of this part on return; gets room if it has none
     integer :: n
 
     n = weights%n

@@ -25,6 +25,7 @@ contains
   !> From 0 at t = 0 to 1 at `ramp_time` [s], then 1.
   pure type(curve_type) function ramp(ramp_time) result(curve)
     real(wp), intent(in) :: ramp_time
+      !! time at which the factor reaches 1; constant 1 if it is not above 0 [s]
     if (ramp_time > 0.0_wp) then
       curve = table_curve([0.0_wp, ramp_time], [0.0_wp, 1.0_wp])
     else
@@ -34,15 +35,16 @@ contains
 
   !> Linear between (times, values).
   pure type(curve_type) function table_curve(times, values) result(curve)
-    real(wp), intent(in) :: times(:), values(:)
+    real(wp), intent(in) :: times(:)   !! (n) increasing [s]
+    real(wp), intent(in) :: values(:)  !! (n) factors at these times [-]
     allocate (curve%times, source=times)
     allocate (curve%values, source=values)
   end function table_curve
 
   !> The factor at time `t` [s].
   pure real(wp) function value(curve, t)
-    class(curve_type), intent(in) :: curve
-    real(wp), intent(in) :: t
+    class(curve_type), intent(in) :: curve  !! constant outside of its times
+    real(wp), intent(in) :: t               !! time [s]
     integer :: i, n
 
     n = size(curve%times)
@@ -58,8 +60,8 @@ contains
 
   !> Its derivative at `t` [1/s]; at a kink that of the interval which begins there.
   pure real(wp) function slope(curve, t)
-    class(curve_type), intent(in) :: curve
-    real(wp), intent(in) :: t
+    class(curve_type), intent(in) :: curve  !! constant outside of its times
+    real(wp), intent(in) :: t               !! time [s]
     integer :: i
 
     slope = 0.0_wp
@@ -70,8 +72,8 @@ contains
 
   !> Its exact integral from 0 to `t` [s].
   pure real(wp) function integral(curve, t)
-    class(curve_type), intent(in) :: curve
-    real(wp), intent(in) :: t
+    class(curve_type), intent(in) :: curve  !! constant outside of its times
+    real(wp), intent(in) :: t               !! time [s]
     integral = from_first(curve, t) - from_first(curve, 0.0_wp)
   end function integral
 

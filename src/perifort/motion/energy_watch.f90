@@ -52,9 +52,12 @@ contains
 
   !> Look at all energies after `step` steps [J]. The first look takes them for what is there.
   pure subroutine look(self, step, kinetic, strain, dissipated, work)
-    class(watch_type), intent(inout) :: self
-    integer, intent(in) :: step
-    real(wp), intent(in) :: kinetic, strain, dissipated, work
+    class(watch_type), intent(inout) :: self  !! with the verdict in `doubtful` on return
+    integer, intent(in) :: step               !! complete steps
+    real(wp), intent(in) :: kinetic           !! kinetic energy [J]
+    real(wp), intent(in) :: strain            !! strain energy and what terms of the force store [J]
+    real(wp), intent(in) :: dissipated        !! energy lost since the start [J]
+    real(wp), intent(in) :: work              !! of loads and imposed motion since the start [J]
 
     self%energy = kinetic + strain + dissipated
     if (self%looked < 0) self%start = self%energy - work
@@ -65,17 +68,17 @@ contains
 
   !> Whether the energies must be looked at after `step` steps, since nobody has for long.
   pure logical function look_is_due(self, step)
-    class(watch_type), intent(in) :: self
-    integer, intent(in) :: step
+    class(watch_type), intent(in) :: self  !! the watch
+    integer, intent(in) :: step            !! complete steps
     look_is_due = self%looked < 0 .or. step - self%looked >= all_every
   end function look_is_due
 
   !> Whether the kinetic energy must be looked at after `step` steps: from time to time, if it may
   !> be too much, and before a state is kept. `bound` is what it does not exceed [J].
   pure logical function kinetic_is_due(self, step, bound)
-    class(watch_type), intent(in) :: self
-    integer, intent(in) :: step
-    real(wp), intent(in) :: bound
+    class(watch_type), intent(in) :: self  !! the watch
+    integer, intent(in) :: step            !! complete steps
+    real(wp), intent(in) :: bound          !! that the kinetic energy does not exceed [J]
     kinetic_is_due = mod(step, kinetic_every) == 0
     if (kinetic_is_due) kinetic_is_due = .not. bound <= self%most() .or. &
       & (self%looked < step .and. self%is_old(step))
@@ -85,8 +88,8 @@ contains
   !> energies agree: all of them, if they were just looked at, or the kinetic energy, which was
   !> then, if nobody has looked at all of them for long. The caller keeps it.
   logical function keeps(self, step)
-    class(watch_type), intent(inout) :: self
-    integer, intent(in) :: step
+    class(watch_type), intent(inout) :: self  !! notes the step if its state is to be kept
+    integer, intent(in) :: step               !! complete steps
 
     keeps = self%sound .and. self%is_old(step)
     if (.not. keeps) return
@@ -110,7 +113,7 @@ contains
 
   !> The energy beyond which a state is not a good one [J].
   pure real(wp) function most_of_good(self)
-    class(watch_type), intent(in) :: self
+    class(watch_type), intent(in) :: self  !! the watch
     most_of_good = good*self%supply
   end function most_of_good
 
@@ -125,7 +128,8 @@ contains
   !> found too much is judged then.
   pure subroutine supplied(self, work)
     class(watch_type), intent(inout) :: self
-    real(wp), intent(in) :: work
+      !! with the greatest energy that there can have been, and `sound` brought up to date
+    real(wp), intent(in) :: work  !! of loads and imposed motion since the start [J]
     if (self%looked < 0) return
     self%supply = max(self%supply, self%start + work, 0.0_wp)
     if (self%doubtful .and. .not. self%energy <= self%most()) self%sound = .false.
@@ -134,8 +138,8 @@ contains
 
   !> Look at the kinetic energy alone [J], at any step.
   pure subroutine look_at_kinetic(self, kinetic)
-    class(watch_type), intent(inout) :: self
-    real(wp), intent(in) :: kinetic
+    class(watch_type), intent(inout) :: self  !! not `sound` on return if this is too much
+    real(wp), intent(in) :: kinetic           !! kinetic energy [J]
     self%kinetic = kinetic
     if (self%supply < 0.0_wp .or. kinetic <= self%most()) return
     self%sound = .false.
@@ -150,8 +154,9 @@ contains
 
   !> The energy that was found and the greatest one that there can have been [J].
   pure subroutine found(self, energy, supply)
-    class(watch_type), intent(in) :: self
-    real(wp), intent(out) :: energy, supply
+    class(watch_type), intent(in) :: self  !! the watch
+    real(wp), intent(out) :: energy  !! at the last look, or the kinetic one that was too much [J]
+    real(wp), intent(out) :: supply  !! greatest energy that there can have been [J]
     energy = self%energy
     supply = self%supply
   end subroutine found

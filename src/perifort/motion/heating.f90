@@ -46,7 +46,7 @@ contains
 
   !> Bring the thermal strains to time `t`.
   pure subroutine heat(heating, t, expansion)
-    type(heating_type), intent(inout) :: heating
+    type(heating_type), intent(inout) :: heating  !! gets the factors of this time
     real(wp), intent(in) :: t                    !! [s]; in relaxation 0 to 1 over the load steps
     real(wp), intent(inout) :: expansion(:)      !! alpha dT of each slot [-]
     real(wp) :: factors(size(heating%curves))
@@ -62,7 +62,7 @@ contains
 
   !> Thermal strains under given factors of the courses.
   pure subroutine apply_factors(heating, factors, expansion)
-    type(heating_type), intent(in) :: heating
+    type(heating_type), intent(in) :: heating    !! with its full thermal strains
     real(wp), intent(in) :: factors(:)           !! of each course [-]
     real(wp), intent(inout) :: expansion(:)      !! alpha dT of each slot [-]
     integer :: k
@@ -74,7 +74,7 @@ contains
 
   !> Largest size of a thermal strain at any time [-]; `expansion` holds those of the present.
   pure real(wp) function largest_expansion(heating, expansion) result(largest)
-    type(heating_type), intent(in) :: heating
+    type(heating_type), intent(in) :: heating    !! empty if the temperature is constant
     real(wp), intent(in) :: expansion(:)         !! alpha dT of each slot now [-]
     real(wp) :: most
     integer :: i
@@ -90,8 +90,9 @@ contains
 
   !> What passes from one instant to the next.
   subroutine keep_heating(archive, heating, expansion)
-    class(archive_type), intent(inout) :: archive
+    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
     type(heating_type), intent(inout) :: heating
+      !! its factors and account are set where the archive reads
     real(wp), intent(inout) :: expansion(:)      !! alpha dT of each slot [-]
 
     call archive%keep('temperature factors', heating%factors)

@@ -18,8 +18,8 @@ contains
   !> from the same scene. Forces are kept, too, since those of points that just lost a bond come
   !> from another formula; `p` is not, since every evaluation begins with it.
   subroutine keep_system(archive, system)
-    class(archive_type), intent(inout) :: archive
-    type(system_type), intent(inout) :: system
+    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
+    type(system_type), intent(inout) :: system  !! set where the archive reads, else left as it is
     real(wp), allocatable :: reactions(:, :)
     integer :: m
 
@@ -48,13 +48,14 @@ contains
     end do
     if (allocated(system%heating%curves)) &
       & call keep_heating(archive, system%heating, system%model%expansion)
+    call system%terms%keep(archive)
     call keep_memory(archive, system%memory)
   end subroutine keep_system
 
   !> A checksum of points and initial state, which may come from files that the scene names, and of
   !> their order in memory. To be taken before the first step.
   integer(i8) function checksum_of_start(system) result(value)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! ready, before the first step
     type(checksum_type) :: checksum
     integer :: c
 

@@ -39,8 +39,8 @@ contains
 
   !> Keep all of it, or put it back.
   subroutine keep_memory(archive, memory)
-    class(archive_type), intent(inout) :: archive
-    type(memory_type), intent(inout) :: memory
+    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
+    type(memory_type), intent(inout) :: memory  !! set where the archive reads, else left as it is
     logical :: conjugate
 
     call archive%keep('step', memory%step)

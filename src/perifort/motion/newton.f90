@@ -70,8 +70,8 @@ contains
 
   !> Keep all that an iteration leaves to the next one, or put it back.
   subroutine keep_newton(archive, newton)
-    class(archive_type), intent(inout) :: archive
-    type(newton_type), intent(inout) :: newton
+    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
+    type(newton_type), intent(inout) :: newton  !! set where the archive reads, else left as it is
 
     associate (krylov => newton%krylov)
       call archive%keep('residual force', krylov%residual)

@@ -36,9 +36,9 @@ module pd_motion_observer
     subroutine observe_interface(observer, system, instant, error)
       import :: observer_type, system_type, instant_type, error_type
       implicit none (type, external)
-      class(observer_type), intent(inout) :: observer
-      type(system_type), intent(inout) :: system
-      type(instant_type), intent(in) :: instant
+      class(observer_type), intent(inout) :: observer  !! the one who looks
+      type(system_type), intent(inout) :: system       !! with its forces; its state must stay
+      type(instant_type), intent(in) :: instant        !! which one it is
       type(error_type), allocatable, intent(out) :: error
     end subroutine observe_interface
   end interface
@@ -47,7 +47,7 @@ contains
 
   !> Add to what the user is to be told at this instant.
   pure subroutine add_note(instant, text)
-    type(instant_type), intent(inout) :: instant
+    type(instant_type), intent(inout) :: instant  !! with this text behind what it had to tell
     character(*), intent(in) :: text   !! '' adds nothing
 
     if (text == '') return

@@ -6,24 +6,27 @@ module pd_motion_system
   use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
-  use pd_force_forces, only: dilatation_pass, force_pass, energy_pass
-  use pd_force_model, only: model_type
+  use pd_force_forces, only: internal_force, energy_pass, whole, up_to_marks, after_marks
+  use pd_force_model, only: model_type, options_of
   use pd_force_reference, only: point_dilatation, point_force
+  use pd_force_term, only: term_list_type, term_view_type
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
-    & moved_by_velocity
+    & moved_by_velocity, number_of_loads, load_of
   use pd_motion_heating, only: heating_type, heat, apply_factors
   use pd_motion_memory, only: memory_type
   use pd_motion_energy_watch, only: watch_type
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & break_now, account, energies_type, energies_of, add_loads, inverse_density, velocities_now
+    & renew_forces, break_now, account, energies_type, energies_of, add_loads, inverse_density, &
+    & velocities_now, view_of, stored_energy
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
     real(wp), allocatable :: u(:, :)       !! displacement (n_slots, dim) [m]
     real(wp), allocatable :: v(:, :)       !! velocity (n_slots, dim) [m/s]
-    real(wp), allocatable :: force(:, :)   !! internal force density (n_slots, dim) [N/m3]
+    real(wp), allocatable :: force(:, :)   !! internal force density (n_slots, dim) [N/m3]: of the
+                                           !! bonds and of the terms that are not external
     real(wp), allocatable :: p(:)          !! 2 a d delta theta, if the model needs it
     real(wp), allocatable :: damage(:)     !! local damage [-], of size 0 if nothing can be damaged
   end type state_type
@@ -34,7 +37,7 @@ module pd_motion_system
     type(model_type) :: model
     type(state_type) :: state
     type(motion_type), allocatable :: motions(:)
-    type(load_type), allocatable :: loads(:)
+    type(term_list_type) :: terms               !! what acts beside the bonds: loads first
     type(heating_type) :: heating               !! temperature changes that vary in time
     integer(i1), allocatable :: held(:, :)      !! 1 where a component is constrained (n_slots, dim)
     integer(i1), allocatable :: strained(:)     !! marks of the last pass
@@ -48,6 +51,7 @@ module pd_motion_system
     real(wp), allocatable :: last_v(:)          !! does work, at the last step
     type(memory_type) :: memory                 !! what the motion carries from instant to instant
     logical :: break_late = .false.             !! bonds break after the step's forces
+    real(wp) :: time = 0.0_wp                   !! of the present displacements [s]
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
     type(watch_type) :: watch                   !! over the energies
     real(wp) :: stable_step = 0.0_wp            !! the integrator's limit, 0: unknown [s]
@@ -72,12 +76,13 @@ contains
 
   !> Make a system ready at t = 0: `u` and `v` hold the initial state, conditions are in place.
   subroutine start_system(system)
-    type(system_type), intent(inout) :: system
+    type(system_type), intent(inout), target :: system
+      !! with body, family, model, conditions, `u` and `v`; gets room for forces and marks
+    type(term_view_type) :: view
     integer :: n
 
     n = system%body%n_slots
     if (.not. allocated(system%motions)) allocate (system%motions(0))
-    if (.not. allocated(system%loads)) allocate (system%loads(0))
     allocate (system%state%force(n, system%body%dim), source=0.0_wp)
     allocate (system%state%p(merge(n, 0, system%model%dilatation)), source=0.0_wp)
     allocate (system%strained(merge(n, 0, system%model%breaking)), source=0_i1)
@@ -86,7 +91,28 @@ contains
     call hold_components(system)
     call remember_start(system%motions, system%state%u)
     call impose(system%motions, 0.0_wp, system%state%u, system%state%v)
+    call view_of(system, 0.0_wp, view)
+    call system%terms%begin(view)
   end subroutine start_system
+
+  !> What the terms of the force see of a system at time `t` of its displacements, or of `u` in
+  !> their place. Valid as long as the system stays where it is in memory.
+  subroutine view_of(system, t, view, u)
+    type(system_type), intent(in), target :: system
+      !! must not move in memory while the view is used
+    real(wp), intent(in) :: t                                    !! [s]
+    type(term_view_type), intent(out) :: view                    !! points into the system
+    real(wp), intent(in), contiguous, target, optional :: u(:, :)  !! (n_slots, dim) [m]
+
+    view%body => system%body
+    view%family => system%family
+    view%materials => system%model%materials
+    view%u => system%state%u
+    if (present(u)) view%u => u
+    view%v => system%state%v
+    view%time = t
+    view%step = max(0, system%memory%step)
+  end subroutine view_of
 
   !> Note which components are constrained; where several motions claim one, the last holds it.
   pure subroutine hold_components(system)
@@ -122,6 +148,7 @@ contains
   !> to a step too long, an error of first order in the step; the other order errs both ways.
   subroutine evaluate(system, t, breaking, pairing)
     type(system_type), intent(inout) :: system
+      !! gets imposed motion, temperature, broken bonds and forces of this instant
     real(wp), intent(in) :: t                            !! of this instant [s]
     logical, intent(in) :: breaking                      !! whether bonds may break
     type(pairing_type), intent(in), optional :: pairing  !! for their energy; squares by default
@@ -133,34 +160,54 @@ contains
     early = breaking .and. system%model%breaking .and. .not. system%break_late
     late = breaking .and. system%model%breaking .and. system%break_late
     if (late) call settle_account(system)
-    associate (state => system%state, model => system%model)
-      call impose(system%motions, t, state%u, state%v)
-      call share_halo(system%body, state%u)
-      if (model%breaking) call share_halo(system%body, state%v)
-      call bring_temperature(system, t)
-      if (model%dilatation) then
-        call dilatation_pass(system%family, model, state%u, state%p, system%strained)
-        if (early) then
-          call break_marked(system, t, pair, slots)
-          call renew_dilatation(system, slots)
-        end if
-        call share_halo(system%body, state%p)
-        call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
+    call impose(system%motions, t, system%state%u, system%state%v)
+    if (system%model%breaking) call share_halo(system%body, system%state%v)
+    call bring_temperature(system, t)
+    if (early) then
+      call renew_forces(system, t, up_to_marks)
+      call break_marked(system, t, pair, slots)
+      if (system%model%dilatation) then
+        call renew_dilatation(system, slots)
       else
-        call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
-        if (early) then
-          call break_marked(system, t, pair, slots)
-          call renew_force(system, slots)
-        end if
+        call renew_force(system, slots)
       end if
-      call share_halo(system%body, state%force)
-    end associate
+      call renew_forces(system, t, after_marks)
+    else
+      call renew_forces(system, t)
+    end if
     if (late) call break_marked(system, t, pair, slots)
   end subroutine evaluate
+
+  !> The internal forces at the present displacements and time `t` into the system's state: those of
+  !> the bonds, as the model has them, and of the terms that are not external. Nothing is imposed
+  !> and no bond breaks. Of an evaluation's `part`s (`pd_force_forces`) it makes the whole by
+  !> default; terms come last.
+  subroutine renew_forces(system, t, part)
+    type(system_type), intent(inout), target :: system
+      !! its displacements stay as they are; forces, dilatation and marks change
+    real(wp), intent(in) :: t  !! [s]
+    integer, intent(in), optional :: part  !! `whole`, `up_to_marks` or `after_marks`
+    type(term_view_type) :: view
+    integer :: now
+
+    system%time = t
+    now = whole
+    if (present(part)) now = part
+    if (now /= after_marks) call share_halo(system%body, system%state%u)
+    associate (state => system%state)
+      call internal_force(system%body, system%family, system%model, options_of(system%model), &
+        & state%u, state%p, state%force, system%strained, now)
+    end associate
+    if (system%terms%inside == 0 .or. now == up_to_marks) return
+    call view_of(system, t, view)
+    call system%terms%add_force(view, system%state%force)
+    call share_halo(system%body, system%state%force)
+  end subroutine renew_forces
 
   !> Bring the thermal strains to time `t`.
   subroutine bring_temperature(system, t)
     type(system_type), intent(inout) :: system
+      !! its thermal strains change if the temperature varies
     real(wp), intent(in) :: t  !! [s]; in relaxation 0 to 1 over the load steps
     if (allocated(system%heating%curves)) call heat(system%heating, t, system%model%expansion)
   end subroutine bring_temperature
@@ -170,7 +217,8 @@ contains
   !> its energy at fixed displacements.
   subroutine break_now(system, number)
     type(system_type), intent(inout) :: system
-    integer(i8), intent(out) :: number
+      !! with bonds broken, damage and dissipated energy up to date on return
+    integer(i8), intent(out) :: number  !! bonds broken by this call, each counted once
     integer(i4), allocatable :: slots(:)
 
     number = system%broken
@@ -235,7 +283,7 @@ contains
 
     two = size(system%motions) > 0 .and. abs(pairing%offset - pairing%held) > 0.0_wp
     allocate (others(size(system%state%u, 1), size(system%state%u, 2), merge(2, 1, two)))
-    if (abs(pairing%kick) > 0.0_wp .and. size(system%loads) > 0) then
+    if (abs(pairing%kick) > 0.0_wp .and. system%terms%outside > 0) then
       allocate (loads(size(others, 1), size(others, 2)), source=0.0_wp)
       call add_loads(system, t, 1.0_wp, .false., loads)
     end if
@@ -307,33 +355,63 @@ contains
     end do
   end subroutine renew_force
 
-  !> Add `scale` times the loads at time `t` to `values` (n_slots, dim); `per_density` divides by
-  !> the point's density, which turns force density into acceleration.
+  !> Add `scale` times the force density of loads and other external terms at time `t` to `values`
+  !> (n_slots, dim); `per_density` divides by the point's density, which turns force density into
+  !> acceleration.
   subroutine add_loads(system, t, scale, per_density, values)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t, scale
-    logical, intent(in) :: per_density
-    real(wp), intent(inout) :: values(:, :)
-    real(wp) :: factor, by
-    integer :: l, i, c, k
+    type(system_type), intent(in), target :: system  !! its external terms
+    real(wp), intent(in) :: t                        !! time of the loads [s]
+    real(wp), intent(in) :: scale                    !! factor
+    logical, intent(in) :: per_density               !! divide by the density of each point
+    real(wp), intent(inout) :: values(:, :)          !! (n_slots, dim) added to
+    real(wp), allocatable :: force(:, :)
+    type(load_type), pointer :: load
+    type(term_view_type) :: view
+    integer :: l, c, k, loads
 
-    do l = 1, size(system%loads)
-      factor = scale*system%loads(l)%curve%value(t)
-      do c = 1, system%body%dim
-        do i = 1, size(system%loads(l)%slots)
-          k = system%loads(l)%slots(i)
-          by = factor
-          if (per_density) by = factor*inverse_density(system%model, k)
-          values(k, c) = values(k, c) + by*system%loads(l)%density(i, c)
-        end do
+    if (system%terms%outside == 0) return
+    loads = number_of_loads(system%terms)
+    do l = 1, loads
+      load => load_of(system%terms, l)
+      call add_load(system%model, load, t, scale, per_density, values)
+    end do
+    if (system%terms%outside == loads) return
+    call view_of(system, t, view)
+    allocate (force(size(values, 1), size(values, 2)), source=0.0_wp)
+    call system%terms%add_external(view, force)
+    do c = 1, size(values, 2)
+      do k = 1, size(values, 1)
+        if (per_density) force(k, c) = force(k, c)*inverse_density(system%model, k)
+        values(k, c) = values(k, c) + scale*force(k, c)
       end do
     end do
   end subroutine add_loads
 
+  !> One load.
+  subroutine add_load(model, load, t, scale, per_density, values)
+    type(model_type), intent(in) :: model
+    type(load_type), intent(in) :: load
+    real(wp), intent(in) :: t, scale
+    logical, intent(in) :: per_density
+    real(wp), intent(inout) :: values(:, :)
+    real(wp) :: factor, by
+    integer :: i, c, k
+
+    factor = scale*load%curve%value(t)
+    do c = 1, size(values, 2)
+      do i = 1, size(load%slots)
+        k = load%slots(i)
+        by = factor
+        if (per_density) by = factor*inverse_density(model, k)
+        values(k, c) = values(k, c) + by*load%density(i, c)
+      end do
+    end do
+  end subroutine add_load
+
   !> 1/rho of slot `k` [m3/kg].
   pure real(wp) function inverse_density(model, k)
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: k
+    type(model_type), intent(in) :: model  !! densities of the slots
+    integer, intent(in) :: k               !! slot
     inverse_density = 1.0_wp/model%materials(model%material(k))%density
   end function inverse_density
 
@@ -342,16 +420,23 @@ contains
   !> imposed points enters as their gain in kinetic energy: that is exact, and it holds where an
   !> imposed velocity jumps (at the end of a ramped displacement), too. With `at_rest` (relaxation,
   !> where imposed motion has no speed) nothing is accelerated.
+  !>
+  !> Terms of the force come to the present, too: their work is summed, and they bring their history
+  !> up to date.
   subroutine account(system, t, at_rest)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: t
-    logical, intent(in), optional :: at_rest
+    type(system_type), intent(inout), target :: system
+      !! its work, reactions and the histories of its terms are those of this instant on return
+    real(wp), intent(in) :: t                 !! time of the displacements [s]
+    logical, intent(in), optional :: at_rest  !! nothing is accelerated; false by default
     real(wp), allocatable :: applied(:, :)
     type(running_type) :: running
     real(wp) :: force, acceleration, mass, work, totals(6)
     logical :: first, moving
+    type(load_type), pointer :: load
+    type(term_view_type) :: view
     integer :: m, l, c, i, k, n
 
+    system%time = t
     moving = .true.
     if (present(at_rest)) moving = .not. at_rest
     first = .not. allocated(system%last_u)
@@ -389,23 +474,26 @@ contains
         end do
       end associate
     end do
-    do l = 1, size(system%loads)
-      associate (load => system%loads(l))
-        do c = 1, system%body%dim
-          if (all(abs(load%density(:, c)) <= 0.0_wp) .and. &
-            & .not. associated(system%body%order%ranks)) cycle
-          call new_running(system%body%order, running)
-          do i = 1, size(load%slots)
-            k = load%slots(i)
-            call add_work(system, n, first, work, system%state%u(k, c), &
-              & load%density(i, c)*load%curve%value(t)*system%body%volume(k))
-            call add_point(system%body%order, system%body%point(k), [work], running)
-          end do
-          totals = total_of_running(system%body%order, running)
-          system%external_work = system%external_work + totals(1)
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      do c = 1, system%body%dim
+        if (all(abs(load%density(:, c)) <= 0.0_wp) .and. &
+          & .not. associated(system%body%order%ranks)) cycle
+        call new_running(system%body%order, running)
+        do i = 1, size(load%slots)
+          k = load%slots(i)
+          call add_work(system, n, first, work, system%state%u(k, c), &
+            & load%density(i, c)*load%curve%value(t)*system%body%volume(k))
+          call add_point(system%body%order, system%body%point(k), [work], running)
         end do
-      end associate
+        totals = total_of_running(system%body%order, running)
+        system%external_work = system%external_work + totals(1)
+      end do
     end do
+    if (system%terms%number() == number_of_loads(system%terms)) return
+    call view_of(system, t, view)
+    call system%terms%account(view, system%external_work, system%dissipated)
+    call system%terms%advance(view)
   end subroutine account
 
   !> Work of varying temperature since the last call: the strain energy that it changes at fixed
@@ -459,6 +547,15 @@ contains
     energy = inner(system%body%order, density, system%body%volume)
   end function strain_energy
 
+  !> What the terms of the force store at the present displacements [J].
+  real(wp) function stored_energy(system) result(energy)
+    type(system_type), intent(in), target :: system  !! at the instant of its time
+    type(term_view_type) :: view
+
+    call view_of(system, system%time, view)
+    energy = system%terms%energy(view)
+  end function stored_energy
+
   !> One component's `work` since its last force and place; `n` counts the components. With `mass`
   !> and the imposed velocity `v` its gain in kinetic energy comes on top.
   pure subroutine add_work(system, n, first, work, u, force, mass, v)
@@ -480,18 +577,23 @@ contains
   end subroutine add_work
 
   !> Room for the last force and place of every component that does work.
-  pure subroutine allocate_account(system)
-    type(system_type), intent(inout) :: system
+  subroutine allocate_account(system)
+    type(system_type), intent(inout), target :: system
+    type(load_type), pointer :: load
     integer :: n, m, l
 
     n = 0
     do m = 1, size(system%motions)
       n = n + size(system%motions(m)%slots)
     end do
-    do l = 1, size(system%loads)
-      n = n + size(system%loads(l)%slots)
-      if (any(system%held(system%loads(l)%slots, :) == 1_i1)) system%loaded_and_held = .true.
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      n = n + size(load%slots)
+      if (any(system%held(load%slots, :) == 1_i1)) system%loaded_and_held = .true.
     end do
+    ! other external terms may act anywhere
+    if (system%terms%outside > number_of_loads(system%terms)) &
+      & system%loaded_and_held = system%loaded_and_held .or. any(system%held == 1_i1)
     n = n*system%body%dim
     allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
   end subroutine allocate_account
@@ -499,9 +601,10 @@ contains
   !> Velocities at the time `t` of the displacements [m/s], half a kick [s] on from those that the
   !> integrator keeps.
   subroutine velocities_now(system, t, kick, v)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t, kick
-    real(wp), allocatable, intent(out) :: v(:, :)
+    type(system_type), intent(in) :: system  !! with the forces of this instant
+    real(wp), intent(in) :: t     !! time of the displacements [s]
+    real(wp), intent(in) :: kick  !! time that velocities lag behind, 0 if they do not [s]
+    real(wp), allocatable, intent(out) :: v(:, :)  !! (n_slots, dim) [m/s]
     integer :: k, c
 
     allocate (v, source=system%state%v)
@@ -516,16 +619,19 @@ contains
     where (system%held == 1) v = system%state%v
   end subroutine velocities_now
 
-  !> Kinetic and strain energy [J]; `v` are the velocities at the instant of the displacements.
+  !> Kinetic and stored energy [J]: strain energy of the bonds and what terms of the force store.
+  !> `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: v(:, :)
-    type(energies_type), intent(out) :: energies
+    type(system_type), intent(inout), target :: system
+      !! its state stays as it is; its force loops keep their room in the family
+    real(wp), intent(in) :: v(:, :)               !! (n_slots, dim) [m/s]
+    type(energies_type), intent(out) :: energies  !! those of this instant
     real(wp), allocatable :: density(:), mass(:)
     integer :: k, c
 
     allocate (density(system%body%n_slots), mass(system%body%n_slots))
     energies%strain = strain_energy(system)
+    if (system%terms%inside > 0) energies%strain = energies%strain + stored_energy(system)
     !$omp parallel do schedule(static) default(none) shared(system, v, density, mass) private(k, c)
     do k = 1, system%body%n_slots
       mass(k) = system%body%volume(k)/inverse_density(system%model, k)

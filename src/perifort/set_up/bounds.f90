@@ -25,9 +25,9 @@ contains
   !> An error, at the group that is to blame, if a condition of the scene is beyond the bounds.
   !> `system` is ready at t = 0.
   subroutine check_bounds(scene, system, plan, error)
-    type(scene_type), intent(in) :: scene
-    type(system_type), intent(in) :: system
-    type(plan_type), intent(in) :: plan
+    type(scene_type), intent(in) :: scene    !! a checked scene
+    type(system_type), intent(in) :: system  !! made from it, at t = 0
+    type(plan_type), intent(in) :: plan      !! of its run
     type(error_type), allocatable, intent(out) :: error
     real(wp) :: delta, factor, largest
     integer :: i, c

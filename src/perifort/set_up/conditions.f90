@@ -18,11 +18,13 @@ module pd_set_up_conditions
 
 contains
 
-  !> Imposed motion of every `&boundary`: of its layer, or of the body points in its region.
+  !> Imposed motion of every `&boundary`: of its layer, or of the body points in its region. An
+  !> error is set if one holds no point.
   subroutine motions_of_scene(scene, body, motions, error)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
+    type(scene_type), intent(in) :: scene                      !! a checked scene
+    type(body_type), intent(in) :: body                        !! its points, arranged in slots
     type(motion_type), allocatable, intent(out) :: motions(:)
+      !! (boundaries) in the order of the groups
     type(error_type), allocatable, intent(out) :: error
     logical, allocatable :: chosen(:)
     integer :: m, c
@@ -57,11 +59,12 @@ contains
     end do
   end subroutine motions_of_scene
 
-  !> Force densities of every `&load`: pressure, total force and body force of a group add up.
+  !> Force densities of every `&load`: pressure, total force and body force of a group add up. An
+  !> error is set if one holds no point.
   subroutine loads_of_scene(scene, body, loads, error)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
-    type(load_type), allocatable, intent(out) :: loads(:)
+    type(scene_type), intent(in) :: scene                  !! a checked scene
+    type(body_type), intent(in) :: body                    !! its points, arranged in slots
+    type(load_type), allocatable, intent(out) :: loads(:)  !! (loads) in the order of the groups
     type(error_type), allocatable, intent(out) :: error
     logical, allocatable :: chosen(:)
     real(wp) :: outward
@@ -119,7 +122,7 @@ contains
 
   !> Courses of the temperature changes of every `&initial`.
   subroutine heating_of_scene(scene, heated_by, expansion, heating)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene       !! a checked scene
     integer(i2), intent(in) :: heated_by(:)     !! number of the group that heats each slot, or 0
     real(wp), intent(in) :: expansion(:)        !! alpha dT of each slot at factor 1 [-]
     type(heating_type), intent(out) :: heating  !! empty if the temperature is constant in time
@@ -137,9 +140,9 @@ contains
 
   !> Slots in the region of this name.
   function region_mask(scene, body, name) result(mask)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
-    character(*), intent(in) :: name
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    type(body_type), intent(in) :: body    !! its points, layers included, arranged in slots
+    character(*), intent(in) :: name       !! of a `&region`; no slot is in one that is not there
     logical, allocatable :: mask(:)
     integer :: r
 
@@ -153,9 +156,9 @@ contains
 
   !> Slots in no-fail zone `number` of a scene.
   function no_fail_mask(scene, body, number) result(mask)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
-    integer, intent(in) :: number
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    type(body_type), intent(in) :: body    !! its points, layers included, arranged in slots
+    integer, intent(in) :: number          !! of the `&no_fail` group
     logical, allocatable :: mask(:)
 
     if (scene%no_fail(number)%region /= '') then
@@ -168,8 +171,8 @@ contains
 
   !> Slots in any no-fail zone of a scene.
   function in_no_fail_zones(scene, body) result(mask)
-    type(scene_type), intent(in) :: scene
-    type(body_type), intent(in) :: body
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    type(body_type), intent(in) :: body    !! its points, layers included, arranged in slots
     logical, allocatable :: mask(:)
     integer :: i
 

@@ -7,9 +7,11 @@ module pd_set_up_course_warnings
   use pd_base_warnings, only: warnings_type
   use pd_motion_curve, only: curve_type
   use pd_set_up_plan, only: plan_type
+  use pd_motion_conditions, only: load_of, load_type, number_of_loads
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: given
-  use pd_scene_format_source, only: source_type, scan_source
+  use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: scene_type, is_set
   implicit none (type, external)
   private
@@ -22,9 +24,10 @@ contains
   !> Add warnings about the conditions of a scene; `system` is ready at t = 0.
   subroutine warn_of_courses(scene, system, plan, warnings)
     type(scene_type), intent(in) :: scene            !! a checked scene
-    type(system_type), intent(in) :: system          !! made from it
+    type(system_type), intent(in), target :: system  !! made from it
     type(plan_type), intent(in) :: plan              !! method, step and number of steps
     type(warnings_type), intent(inout) :: warnings   !! what is added to
+    type(load_type), pointer :: load
     integer :: i
 
     if (plan%relaxes) then
@@ -33,8 +36,9 @@ contains
       do i = 1, size(system%motions)
         call warn_of_end('boundary', i, system%motions(i)%curve)
       end do
-      do i = 1, size(system%loads)
-        call warn_of_end('load', i, system%loads(i)%curve)
+      do i = 1, number_of_loads(system%terms)
+        load => load_of(system%terms, i)
+        call warn_of_end('load', i, load%curve)
       end do
       if (allocated(system%heating%curves)) then
         do i = 1, size(system%heating%curves)
@@ -104,7 +108,7 @@ contains
       & abs(scene%initial%temperature_change) > 0.0_wp)) return
     if (.not. allocated(scene%text)) return
     if (len(scene%text) == 0) return
-    call scan_source(scene%text, scene%file, source, ignored)
+    call scan_scene(scene, source, ignored)
     if (allocated(ignored)) return
     do m = 1, size(scene%materials)
       if (given('material', m, 'thermal_expansion', source)) cycle

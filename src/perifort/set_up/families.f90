@@ -16,11 +16,14 @@ module pd_set_up_families
 
 contains
 
-  !> Families of the kind that suits the points; the body is arranged in their slots.
+  !> Families of the kind that suits the points; the body is arranged in their slots. An error is
+  !> set if the scene asks for a lattice, or for mixed precision, that its points cannot have, or if
+  !> the lattice cannot be made.
   subroutine make_family(scene, rule, system, error)
-    type(scene_type), intent(in) :: scene
-    type(volume_rule_type), intent(in) :: rule
+    type(scene_type), intent(in) :: scene       !! a checked scene
+    type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
     type(system_type), intent(inout) :: system
+      !! with its body in point order; gets its family, its body in the slots of that
     type(error_type), allocatable, intent(out) :: error
     type(lattice_family_type), allocatable :: lattice
     type(list_family_type), allocatable :: list
@@ -61,7 +64,7 @@ contains
 
   !> What a family keeps of the model: the weights of its bonds.
   subroutine finish_family(system)
-    type(system_type), intent(inout) :: system
+    type(system_type), intent(inout) :: system  !! with its model; its family gets the weights
     select type (family => system%family)
     type is (lattice_family_type)
       call build_weights(family, system%model)

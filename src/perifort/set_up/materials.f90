@@ -9,10 +9,10 @@ module pd_set_up_materials
 
 contains
 
-  !> The materials with the horizon's parameters.
+  !> The materials with the horizon's parameters. In plane strain alpha becomes (1 + nu) alpha.
   pure function materials_of_scene(scene, delta) result(materials)
-    type(scene_type), intent(in) :: scene
-    real(wp), intent(in) :: delta
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    real(wp), intent(in) :: delta          !! horizon [m]
     type(material_type), allocatable :: materials(:)
     logical :: plane_strain
     integer :: i

@@ -113,7 +113,7 @@ contains
 
   !> Whether some material of the scene can fail.
   pure logical function any_critical(scene)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene  !! a checked scene
     any_critical = any(is_set(scene%materials%critical_stretch)) .or. &
       & any(is_set(scene%materials%critical_energy_release_rate))
   end function any_critical

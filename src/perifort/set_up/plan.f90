@@ -8,12 +8,14 @@ module pd_set_up_plan
   use pd_motion_static_relaxation, only: relaxation_type
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
     & stable_step_of, may_be_unstable, lowest_eigenvalue
-  use pd_motion_system, only: system_type
+  use pd_force_term, only: term_view_type
+  use pd_motion_conditions, only: number_of_loads
+  use pd_motion_system, only: system_type, inverse_density, view_of
   use pd_motion_explicit_time_step, only: stiffness_bound, stable_step, printed_step, book_step, &
-    & chapter_stiffness, constant_stiffness, integrator_limit
+    & chapter_stiffness, constant_stiffness, integrator_limit, damped_step
   implicit none (type, external)
   private
-  public :: plan_type, make_plan, depth_of
+  public :: plan_type, make_plan, steps_of, depth_of
 
   !> Of the square of the largest frequency; the step is at most half of it less than the largest.
   real(wp), parameter :: accuracy = 0.01_wp
@@ -37,13 +39,16 @@ module pd_set_up_plan
 
 contains
 
-  !> Make the plan of a scene for its system.
+  !> Make the plan of a scene for its system. An error is set if no point has a neighbour, if the
+  !> step is not above 0, or if there would be too many steps.
   subroutine make_plan(scene, system, plan, error)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene       !! a checked scene
     type(system_type), intent(inout) :: system
-    type(plan_type), intent(out) :: plan
+      !! ready at t = 0; its state stays as it is
+    type(plan_type), intent(out) :: plan        !! what the run will do
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: bound(:)
+    real(wp), allocatable :: bound(:), rows(:)
+    real(wp) :: stiffness, damping  ! of the terms of the force, over the density
 
     allocate (bound(system%body%n_slots))
     call stiffness_bound(system%body, system%family, system%model, bound)
@@ -57,15 +62,17 @@ contains
       return
     end if
     if (may_be_unstable(system)) call lowest_eigenvalue(system, plan%lowest)
+    call add_terms(system, bound, rows, stiffness, damping)
     if (plan%relaxes) then
-      call plan_relaxation(scene, system, bound, plan%relaxation)
+      call plan_relaxation(scene, system, bound, rows, plan%relaxation)
       plan%steps = plan%relaxation%load_steps
       return
     end if
     plan%equation = stable_step(system%body, system%model, bound) &
       & *integrator_limit(plan%integrator)/2
+    if (damping > 0.0_wp) plan%equation = damped_step(plan%equation, damping, plan%integrator)
     plan%limit = plan%equation
-    if (scene%time%limit == 'spectral') call measure_limit(system, plan)
+    if (scene%time%limit == 'spectral') call measure_limit(system, stiffness, damping, plan)
     call printed_step(system%body, system%family, system%model, plan%printed)
     plan%book = book_step(system%model, system%body%dim, system%family%rule%delta, &
       & depth_of(scene), minval(system%body%spacing, mask=system%body%point > 0))
@@ -84,14 +91,24 @@ contains
         & ' steps of '//to_text(plan%step)//' s', 'there may be '//to_text(huge(1)))
       return
     end if
-    plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
+    plan%steps = steps_of(scene%time%duration, plan%step)
     plan%step = scene%time%duration/plan%steps
   end subroutine make_plan
 
+  !> The fewest steps of at most `step` that make up `duration`; a quotient that only rounding has
+  !> lifted above a whole number is that number.
+  pure integer function steps_of(duration, step) result(steps)
+    real(wp), intent(in) :: duration  !! of the run [s]
+    real(wp), intent(in) :: step      !! the longest step allowed [s]
+    steps = max(1, ceiling(duration/step*(1 - 1.0e-12_wp)))
+  end function steps_of
+
   !> The limit of the step from the largest frequency at the start: of the body as it is, or, where
   !> bonds can break, one that no breaking can lower, so that it needs no second look.
-  subroutine measure_limit(system, plan)
+  subroutine measure_limit(system, stiffness, damping, plan)
     type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: stiffness  !! what the terms of the force add to omega^2 [1/s2]
+    real(wp), intent(in) :: damping    !! largest rate at which they slow down [1/s]
     type(plan_type), intent(inout) :: plan
     type(spectrum_type) :: spectrum
     real(wp) :: step
@@ -101,8 +118,11 @@ contains
     else
       call largest_frequency(system, accuracy, spectrum)
     end if
+    ! the terms may be stiffer later than they are now
+    if (spectrum%squared > 0.0_wp) spectrum%squared = spectrum%squared + stiffness
     plan%evaluations = spectrum%evaluations
     step = stable_step_of(spectrum)*integrator_limit(plan%integrator)/2
+    if (damping > 0.0_wp) step = damped_step(step, damping, plan%integrator)
     ! both bound every broken state of the body; where all is held, nothing vibrates
     if (.not. spectrum%squared > 0.0_wp) return
     if (system%model%breaking .and. step < plan%equation) return
@@ -110,11 +130,40 @@ contains
     plan%limit = step
   end subroutine measure_limit
 
+  !> Add the stiffness of the terms of the force to the `bound` of the bonds. Its rows sum up to
+  !> twice that of 7.25.
+  subroutine add_terms(system, bound, rows, stiffness, damping)
+    type(system_type), intent(in), target :: system
+    real(wp), intent(inout) :: bound(:)     !! (n_slots) [N/m4]
+    real(wp), allocatable, intent(out) :: rows(:)  !! of the terms alone (n_slots) [N/m4]
+    real(wp), intent(out) :: stiffness      !! the largest of the terms over the density [1/s2]
+    real(wp), intent(out) :: damping        !! the largest rate at which they slow down [1/s]
+    real(wp), allocatable :: rates(:)
+    type(term_view_type) :: view
+    integer :: k
+
+    stiffness = 0.0_wp
+    damping = 0.0_wp
+    allocate (rows(size(bound)), source=0.0_wp)
+    if (system%terms%number() == number_of_loads(system%terms)) return
+    allocate (rates(size(bound)), source=0.0_wp)
+    call view_of(system, 0.0_wp, view)
+    call system%terms%add_stiffness_bound(view, rows)
+    call system%terms%add_damping_bound(view, rates)
+    do k = 1, size(bound)
+      if (system%body%point(k) == 0) cycle
+      bound(k) = bound(k) + rows(k)/2
+      stiffness = max(stiffness, rows(k)*inverse_density(system%model, k))
+      damping = max(damping, rates(k)*inverse_density(system%model, k))
+    end do
+  end subroutine add_terms
+
   !> The fictitious mass of every component, for a step of 1.
-  subroutine plan_relaxation(scene, system, bound, relaxation)
+  subroutine plan_relaxation(scene, system, bound, rows, relaxation)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: bound(:)
+    real(wp), intent(in) :: rows(:)    !! bound of the terms of the force (n_slots) [N/m4]
     type(relaxation_type), intent(out) :: relaxation
     real(wp) :: safety
     integer :: c
@@ -144,11 +193,16 @@ contains
     case default
       call internal_fault('unknown density matrix')
     end select
+    if (scene%relaxation%density_matrix == 'frame_invariant' .or. all(rows <= 0.0_wp)) return
+    do c = 1, system%body%dim
+      relaxation%mass(:, c) = relaxation%mass(:, c) + safety*rows/4
+    end do
   end subroutine plan_relaxation
 
-  !> What turns dx^dim into a volume: thickness in 2D, area in 1D.
+  !> What turns dx^dim into a volume: thickness in 2D, area in 1D. It is 1 in 3D [m in 2D, m2 in
+  !> 1D].
   pure real(wp) function depth_of(scene) result(depth)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene  !! a checked scene
     select case (scene%header%dimension)
     case (1); depth = scene%header%area
     case (2); depth = scene%header%thickness

@@ -16,6 +16,8 @@ module pd_set_up_prepare
   use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
+  use pd_force_term, only: term_list_type
+  use pd_motion_conditions, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system
   use pd_scene_content_rules, only: place_fault
   use pd_scene_content_types, only: scene_type
@@ -46,12 +48,17 @@ contains
 
   !> Points, families, corrections, cracks, conditions and the plan of a scene. With `threads` a
   !> run's team begins, with so many threads or, if that is 0, with a number that suits the body;
-  !> without, threads are the caller's.
-  subroutine prepare(scene, set_up, error, threads)
-    type(scene_type), intent(in) :: scene
-    type(set_up_type), intent(out) :: set_up
+  !> without, threads are the caller's. `terms` of the force act beside those of the scene. An error
+  !> is set if the scene does not fit into the memory, or if its points, families, conditions or
+  !> plan are impossible.
+  subroutine prepare(scene, set_up, error, threads, terms)
+    type(scene_type), intent(in) :: scene                !! a checked scene
+    type(set_up_type), intent(out) :: set_up             !! ready for the first step
     type(error_type), allocatable, intent(out) :: error
     integer, intent(in), optional :: threads
+      !! number of threads, 0 for one that suits; without, the caller's are used
+    type(term_list_type), intent(in), optional :: terms  !! copied; none if absent
+    type(load_type), allocatable :: loads(:)
     type(material_type), allocatable :: materials(:)
     real(wp), allocatable :: temperature_change(:)
     integer(i2), allocatable :: heated_by(:)
@@ -97,8 +104,10 @@ contains
         & system%heating)
       call motions_of_scene(scene, system%body, system%motions, error)
       if (allocated(error)) return
-      call loads_of_scene(scene, system%body, system%loads, error)
+      call loads_of_scene(scene, system%body, loads, error)
       if (allocated(error)) return
+      call add_loads_to(system%terms, loads)
+      if (present(terms)) call system%terms%add(terms)
       call timer%stop('conditions')
 
       call timer%start('surface correction')

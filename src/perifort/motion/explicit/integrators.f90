@@ -30,13 +30,16 @@ module pd_motion_explicit_integrators
 contains
 
   !> Move `system` through `steps` steps of `dt` [s] from t = 0, or from where it stands if its
-  !> memory says that it has begun.
+  !> memory says that it has begun. An error is set if the motion is unstable or the observer sets
+  !> one.
   subroutine run_explicit(system, integrator, dt, steps, observer, error)
     type(system_type), intent(inout) :: system
-    character(*), intent(in) :: integrator
-    real(wp), intent(in) :: dt
-    integer, intent(in) :: steps
+      !! ready at t = 0, or as a checkpoint left it; after the last step on return
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
+    real(wp), intent(in) :: dt              !! time step [s]
+    integer, intent(in) :: steps            !! number of the last step
     class(observer_type), intent(inout) :: observer
+      !! called once for each step, the start included, that has not been seen before
     type(error_type), allocatable, intent(out) :: error
     type(start_type) :: start
     type(instant_type) :: instant
@@ -58,6 +61,8 @@ contains
       instant%step = n
       instant%time = n*dt
       instant%last = n == steps
+      system%memory%step = n
+      system%time = instant%time
       if (n > seen) then
         call evaluate(system, instant%time, breaking=.true., &
           & pairing=pairing_of(integrator, n, dt, system%break_late))
@@ -66,7 +71,6 @@ contains
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
         call account(system, instant%time)
         call system%watch%supplied(system%external_work)
-        system%memory%step = n
         call observer%observe(system, instant, error)
         if (allocated(error)) return
       end if
@@ -204,7 +208,8 @@ contains
   !> Room for what the integrator carries from step to step.
   subroutine begin_memory(system, integrator)
     type(system_type), intent(inout) :: system
-    character(*), intent(in) :: integrator
+      !! with an empty memory, and room for earlier steps if the rule needs them, on return
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
     integer :: n, d
 
     system%memory = memory_type()

@@ -18,6 +18,7 @@ module pd_motion_explicit_spectrum
   use pd_family_list, only: list_family_type
   use pd_family_surface, only: bond_factor
   use pd_force_list, only: forget_model
+  use pd_force_model, only: force_options_type, model_type, options_of
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   implicit none (type, external)
@@ -54,15 +55,22 @@ contains
   !> Appl. 13 (1992) 1094): for a random start vector, the chance that the value found is more than
   !> eps below the largest is at most 1.648 sqrt(n) exp(-sqrt(eps) (2 m - 1)) after m steps. The
   !> start vector is random, yet always the same, and so is the result, on any number of threads.
-  subroutine largest_frequency(system, accuracy, spectrum)
+  subroutine largest_frequency(system, accuracy, spectrum, options, model)
     type(system_type), intent(inout) :: system
+      !! its state stays as it is; its force loops keep their room in the family
     real(wp), intent(in) :: accuracy              !! of omega^2, relative
-    type(spectrum_type), intent(out) :: spectrum
+    type(spectrum_type), intent(out) :: spectrum               !! what was found
+    type(force_options_type), intent(in), optional :: options  !! of the forces; the model's own by
+                                                               !! default
+    type(model_type), intent(in), optional :: model            !! the system's by default
     real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :)
     real(wp), allocatable :: diagonal(:), beside(:)
+    type(force_options_type) :: taken
     real(wp) :: length, last
     integer :: m, least, free
 
+    taken = options_of(system%model)
+    if (present(options)) taken = options
     call make_scale(system, scale, free)
     if (free == 0) then
       spectrum%converged = .true.
@@ -75,7 +83,8 @@ contains
     call random_start(system, scale(:, :, 1), now)
     length = length_of(system, now)
     do m = 1, most_evaluations
-      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m))
+      call recur(system, taken, system%state%u, scale, length, now, before, w, kw, diagonal(m), &
+        & beside(m), model)
       length = beside(m)
       spectrum%evaluations = m
       ! a length of rounding: the vectors so far hold all that the start vector consists of
@@ -99,12 +108,13 @@ contains
   !> the step, and a lattice keeps the tables of its weights.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
+      !! its state stays as it is; its force loops keep their room in the family
     real(wp), intent(in) :: accuracy               !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum   !! `squared` and `residual` of the bound
     real(wp), parameter :: alike = 1.01_wp         !! one material's largest beta over another's
     real(wp), allocatable :: share(:), largest(:)
+    type(force_options_type) :: options
     real(wp) :: beta
-    logical :: dilatation
     integer :: k
 
     call dilatation_shares(system, share)
@@ -119,54 +129,56 @@ contains
       largest(k) = largest_of_ranks(system%body%order, largest(k))
     end do
     beta = maxval(largest)
-    dilatation = system%model%dilatation
-    system%model%dilatation = .false.
+    options = options_of(system%model)
+    options%dilatation = .false.
     if (beta > alike*minval(largest, mask=largest > 0.0_wp)) then
-      call stiffened_frequency(system, share, accuracy, spectrum)
+      call stiffened_frequency(system, share, options, accuracy, spectrum)
     else
-      call largest_frequency(system, accuracy, spectrum)
+      call largest_frequency(system, accuracy, spectrum, options)
       spectrum%squared = beta*spectrum%squared
       spectrum%residual = beta*spectrum%residual
     end if
-    system%model%dilatation = dilatation
   end subroutine lasting_frequency
 
   !> The largest frequency with the stiffness q of every slot times its `share`, rounded up by at
   !> most half a per cent (by more where that makes too many materials): slots of one material and
-  !> of shares that are rounded to one number make a material of their own for the time of the
-  !> measurement, in which a lattice makes its weights anew in every pass.
-  subroutine stiffened_frequency(system, share, accuracy, spectrum)
+  !> of shares that are rounded to one number have a material of their own in a copy of the model,
+  !> with which a lattice makes its weights anew in every pass.
+  subroutine stiffened_frequency(system, share, options, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: share(:)               !! at least 1 (n_slots) [-]
+    type(force_options_type), intent(in) :: options  !! of the forces: without a dilatation
     real(wp), intent(in) :: accuracy               !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum
     integer, parameter :: most_materials = 30000   !! whose numbers have two bytes
     real(wp) :: grain                              !! one rounded share over the next smaller one
-    type(material_type), allocatable :: materials(:), finer(:)
-    integer(i2), allocatable :: material(:)
+    type(model_type) :: stiffened
+    type(material_type), allocatable :: finer(:)
     integer(i4), allocatable :: tables(:)
     integer, allocatable :: number(:, :)
     integer :: k, g, n
 
-    call move_alloc(system%model%materials, materials)
-    grain = max(1.005_wp, maxval(share)**(real(size(materials), wp)/most_materials))
-    allocate (material, source=system%model%material)
-    allocate (number(size(materials), 0:grains(maxval(share))), source=0)
-    allocate (finer(size(number)))
-    n = 0
-    do k = 1, system%body%n_slots
-      g = grains(share(k))
-      associate (m => material(k))
-        if (number(m, g) == 0) then
-          n = n + 1
-          number(m, g) = n
-          finer(n) = materials(m)
-          finer(n)%q = materials(m)%q*grain**g
-        end if
-        system%model%material(k) = int(number(m, g), i2)
-      end associate
-    end do
-    system%model%materials = finer(:n)
+    stiffened = system%model
+    stiffened%dilatation = .false.
+    associate (materials => system%model%materials, material => system%model%material)
+      grain = max(1.005_wp, maxval(share)**(real(size(materials), wp)/most_materials))
+      allocate (number(size(materials), 0:grains(maxval(share))), source=0)
+      allocate (finer(size(number)))
+      n = 0
+      do k = 1, system%body%n_slots
+        g = grains(share(k))
+        associate (m => material(k))
+          if (number(m, g) == 0) then
+            n = n + 1
+            number(m, g) = n
+            finer(n) = materials(m)
+            finer(n)%q = materials(m)%q*grain**g
+          end if
+          stiffened%material(k) = int(number(m, g), i2)
+        end associate
+      end do
+    end associate
+    stiffened%materials = finer(:n)
     select type (family => system%family)
     type is (lattice_family_type)
       tables = family%weights
@@ -176,7 +188,7 @@ contains
     class default
       call internal_fault('a family without a rule for changed stiffness')
     end select
-    call largest_frequency(system, accuracy, spectrum)
+    call largest_frequency(system, accuracy, spectrum, options, stiffened)
     select type (family => system%family)
     type is (lattice_family_type)
       family%weights = tables
@@ -185,9 +197,6 @@ contains
     class default
       call internal_fault('a family without a rule for changed stiffness')
     end select
-    system%model%material = material
-    deallocate (system%model%materials)
-    call move_alloc(materials, system%model%materials)
 
   contains
 
@@ -202,7 +211,7 @@ contains
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
   !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0.
   pure logical function may_be_unstable(system)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! with its model
     may_be_unstable = system%model%dilatation .and. system%model%surface .and. &
       & any(system%model%materials%a < 0.0_wp .and. &
       & system%model%materials%poissons_ratio < suspicious_ratio)
@@ -214,27 +223,30 @@ contains
   !> lowest eigenvalue may lie further down.
   subroutine lowest_eigenvalue(system, lowest)
     type(system_type), intent(inout) :: system
-    real(wp), intent(out) :: lowest
-    real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :), u(:, :)
+      !! its state stays as it is; its force loops keep their room in the family
+    real(wp), intent(out) :: lowest  !! < 0 if the body is unstable, else 0 [-]
+    real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :), &
+      & undeformed(:, :)
     real(wp), allocatable :: diagonal(:), beside(:)
     real(wp) :: length, top, bottom, last
+    type(force_options_type) :: options
     integer :: m, free
-    logical :: thermal
 
     lowest = 0.0_wp
     call make_scale(system, scale, free)
     if (free == 0) return
     allocate (now, before, w, kw, mold=scale(:, :, 1))
     allocate (diagonal(stability_evaluations), beside(stability_evaluations))
-    call move_alloc(system%state%u, u)
-    allocate (system%state%u, source=0.0_wp*u)
-    thermal = system%model%thermal
-    system%model%thermal = .false.
+    allocate (undeformed, mold=scale(:, :, 1))
+    undeformed = 0.0_wp
+    options = options_of(system%model)
+    options%thermal = .false.
     before = 0.0_wp
     call random_start(system, scale(:, :, 1), now)
     length = length_of(system, now)
     do m = 1, stability_evaluations
-      call recur(system, scale, length, now, before, w, kw, diagonal(m), beside(m))
+      call recur(system, options, undeformed, scale, length, now, before, w, kw, diagonal(m), &
+        & beside(m))
       length = beside(m)
       if (length <= 1.0e-13_wp*maxval(abs(diagonal(:m)))) beside(m) = 0.0_wp
       if (mod(m, look_every) /= 0 .and. beside(m) > 0.0_wp) cycle
@@ -243,13 +255,11 @@ contains
       if (-bottom < surely_negative*top) lowest = -bottom/top
       if (lowest < 0.0_wp .or. beside(m) <= 0.0_wp) exit
     end do
-    system%model%thermal = thermal
-    call move_alloc(u, system%state%u)
   end subroutine lowest_eigenvalue
 
   !> 2/omega [s], with the residual on the side of caution; huge if nothing vibrates.
   elemental real(wp) function stable_step_of(spectrum) result(step)
-    type(spectrum_type), intent(in) :: spectrum
+    type(spectrum_type), intent(in) :: spectrum  !! as found
     step = huge(step)
     if (spectrum%squared > 0.0_wp) step = 2/sqrt(spectrum%squared + spectrum%residual)
   end function stable_step_of
@@ -343,14 +353,17 @@ contains
 
   !> One step of the recurrence: q = now/length becomes the newest vector, and
   !> A q - diagonal q - length before, of length `beside`, the one to come.
-  subroutine recur(system, scale, length, now, before, w, kw, diagonal, beside)
+  subroutine recur(system, options, u, scale, length, now, before, w, kw, diagonal, beside, model)
     type(system_type), intent(inout) :: system
+    type(force_options_type), intent(in) :: options      !! of the forces
+    real(wp), intent(in), contiguous :: u(:, :)          !! about these displacements [m]
     real(wp), intent(in), contiguous :: scale(:, :, :)   !! of places and of forces
     real(wp), intent(in) :: length
     real(wp), intent(inout), contiguous :: now(:, :)     !! in: not normalised; out: the next
     real(wp), intent(inout), contiguous :: before(:, :)  !! in: the vector before; out: q
     real(wp), intent(inout), contiguous :: w(:, :), kw(:, :)  !! room
     real(wp), intent(out) :: diagonal, beside
+    type(model_type), intent(in), optional :: model      !! the system's by default
     integer :: c
 
     do c = 1, size(now, 2)
@@ -358,7 +371,7 @@ contains
       w(:, c) = now(:, c)
       call multiply_by(w(:, c), scale(:, c, 1))
     end do
-    call apply_tangent(system, system%state%u, w, kw)
+    call apply_tangent(system, u, w, kw, options, model)
     do c = 1, size(now, 2)
       call multiply_by(kw(:, c), scale(:, c, 2))
       call subtract(kw(:, c), length, before(:, c))

@@ -13,7 +13,7 @@ module pd_motion_explicit_time_step
   implicit none (type, external)
   private
   public :: stiffness_bound, stable_step, printed_step, printed_stiffness, book_step, &
-    & chapter_stiffness, integrator_limit, evaluations
+    & chapter_stiffness, integrator_limit, damped_step, evaluations
   public :: constant_stiffness, horizon_volume
 
 contains
@@ -22,10 +22,10 @@ contains
   !> sum_j [ (q_k+q_j) Gb + (m_k I_k + m_j I_j) Gd ] vc V_j/|xi|, m = 2 max(a,0) (d delta)^2,
   !> I_k = sum_l Gd vc V_l/|xi|. The step sqrt(2 rho/M) and the relaxation's mass come from it.
   subroutine stiffness_bound(body, family, model, bound)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(inout), contiguous :: bound(:)
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact
+    type(model_type), intent(in) :: model     !! with surface factors, if there are any
+    real(wp), intent(inout), contiguous :: bound(:)  !! (n_slots) M_k [N/m4]
     type(bonds_type) :: bonds
     real(wp), allocatable :: inverse(:)
     real(wp) :: n(body%dim)
@@ -89,9 +89,9 @@ contains
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
   real(wp) function stable_step(body, model, bound) result(step)
-    type(body_type), intent(in) :: body
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: bound(:)
+    type(body_type), intent(in) :: body    !! arranged in slots
+    type(model_type), intent(in) :: model  !! densities of the slots
+    real(wp), intent(in) :: bound(:)       !! (n_slots) M_k; slots with 0 do not count [N/m4]
     integer :: k
 
     step = huge(step)
@@ -105,10 +105,10 @@ contains
   !> 7.25 as printed: without surface factors, and with the plain sign of a. Negative sums have no
   !> step: 0 is returned. Shown beside the step that is used.
   subroutine printed_step(body, family, model, step)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(out) :: step
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact
+    type(model_type), intent(in) :: model     !! materials of the slots
+    real(wp), intent(out) :: step             !! 0 if some sum is negative [s]
     real(wp), allocatable :: printed(:)
     real(wp) :: squared
     integer :: k
@@ -128,10 +128,10 @@ contains
   !> The sum of 7.25 as printed for every slot [N/m4], 0 without bonds: no surface factors, a with
   !> its sign. Its inner sum has the plain volumes in the book, and is all but the same with v_c.
   subroutine printed_stiffness(body, family, model, printed)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(inout), contiguous :: printed(:)
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact
+    type(model_type), intent(in) :: model     !! materials of the slots
+    real(wp), intent(inout), contiguous :: printed(:)  !! (n_slots) set for all slots [N/m4]
 
     select type (family)
     type is (lattice_family_type)
@@ -177,8 +177,10 @@ contains
 
   !> Volume of the horizon [m3]: 4/3 pi delta^3, pi delta^2 h, 2 delta A.
   pure real(wp) function horizon_volume(dim, delta, depth) result(volume)
-    integer, intent(in) :: dim
-    real(wp), intent(in) :: delta, depth
+    integer, intent(in) :: dim     !! number of dimensions
+    real(wp), intent(in) :: delta  !! horizon [m]
+    real(wp), intent(in) :: depth
+      !! thickness in 2D [m], cross section in 1D [m2], without meaning in 3D
     select case (dim)
     case (3); volume = 4*pi*delta**3/3
     case (2); volume = pi*delta**2*depth
@@ -188,19 +190,22 @@ contains
 
   !> The book's own estimate of the step, sqrt(2 rho dx/(V_h c)) [s], least over the materials.
   pure real(wp) function book_step(model, dim, delta, depth, spacing) result(step)
-    type(model_type), intent(in) :: model
-    integer, intent(in) :: dim
-    real(wp), intent(in) :: delta, depth, spacing
+    type(model_type), intent(in) :: model  !! its materials
+    integer, intent(in) :: dim             !! number of dimensions
+    real(wp), intent(in) :: delta          !! horizon [m]
+    real(wp), intent(in) :: depth
+      !! thickness in 2D [m], cross section in 1D [m2], without meaning in 3D
+    real(wp), intent(in) :: spacing        !! smallest spacing [m]
     step = minval(sqrt(2*model%materials%density*spacing &
       & /(horizon_volume(dim, delta, depth)*2*model%materials%q)))
   end function book_step
 
   !> The sum 7.32 for each component, each term times vc V_j [N/m4].
   subroutine chapter_stiffness(body, family, model, stiffness)
-    type(body_type), intent(in) :: body
-    class(family_type), intent(in) :: family
-    type(model_type), intent(in) :: model
-    real(wp), intent(out) :: stiffness(:, :)
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact
+    type(model_type), intent(in) :: model     !! materials of the slots; no surface factors come in
+    real(wp), intent(out) :: stiffness(:, :)  !! (n_slots, dim) 0 for dead slots [N/m4]
     type(bonds_type) :: bonds
     real(wp) :: term, delta
     integer :: k, i, c, j
@@ -231,10 +236,12 @@ contains
 
   !> V_h c/spacing of every slot, the book's own estimate of the stiffness [N/m4].
   pure subroutine constant_stiffness(body, model, delta, depth, stiffness)
-    type(body_type), intent(in) :: body
-    type(model_type), intent(in) :: model
-    real(wp), intent(in) :: delta, depth
-    real(wp), intent(out) :: stiffness(:)
+    type(body_type), intent(in) :: body    !! arranged in slots
+    type(model_type), intent(in) :: model  !! materials of the slots
+    real(wp), intent(in) :: delta          !! horizon [m]
+    real(wp), intent(in) :: depth
+      !! thickness in 2D [m], cross section in 1D [m2], without meaning in 3D
+    real(wp), intent(out) :: stiffness(:)  !! (n_slots) 0 for dead slots [N/m4]
     integer :: k
 
     do k = 1, body%n_slots
@@ -247,24 +254,52 @@ contains
 
   !> Largest stable omega dt of an integrator on the undamped oscillator.
   pure real(wp) function integrator_limit(integrator) result(limit)
-    character(*), intent(in) :: integrator
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
     select case (integrator)
     case ('adams_bashforth'); limit = 0.72_wp
     case ('adams_moulton'); limit = 1.29_wp
     case ('runge_kutta'); limit = 2.83_wp
     case ('forward_backward', 'velocity_verlet'); limit = 2.0_wp
-    case default; call internal_fault('unknown integrator')
+    case default
+      call internal_fault('unknown integrator')
     end select
   end function integrator_limit
 
+  !> The stable step where something is slowed down as well: `step` is that without damping [s], and
+  !> `rate` the largest ratio of damping to density [1/s]. With forces from the velocities of half a
+  !> step before, 7.8 and 7.9 are stable while (step omega/2)^2 + step rate/2 <= 1; the others are
+  !> so while step omega and step rate lie in an ellipse about their limits on both axes, of which
+  !> this takes the chord.
+  pure real(wp) function damped_step(step, rate, integrator) result(damped)
+    real(wp), intent(in) :: step            !! stable step without damping [s]
+    real(wp), intent(in) :: rate            !! largest ratio of damping to density [1/s]
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
+    real(wp) :: half
+
+    select case (integrator)
+    case ('forward_backward', 'velocity_verlet')
+      half = rate*step/4
+      damped = step/(half + sqrt(half**2 + 1))
+    case ('adams_bashforth')
+      damped = step/(1 + step*rate/(6.0_wp/11))
+    case ('adams_moulton')
+      damped = step/(1 + step*rate/2)
+    case ('runge_kutta')
+      damped = step/(1 + step*rate/2.78_wp)
+    case default
+      call internal_fault('unknown integrator')
+    end select
+  end function damped_step
+
   !> Force evaluations of one step of an integrator.
   pure integer function evaluations(integrator)
-    character(*), intent(in) :: integrator
+    character(*), intent(in) :: integrator  !! value of `integrator` in &time
     select case (integrator)
     case ('runge_kutta'); evaluations = 4
     case ('adams_moulton'); evaluations = 2
     case ('forward_backward', 'velocity_verlet', 'adams_bashforth'); evaluations = 1
-    case default; call internal_fault('unknown integrator')
+    case default
+      call internal_fault('unknown integrator')
     end select
   end function evaluations
 

@@ -12,7 +12,8 @@ module pd_motion_static_balance
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_residual, only: relaxation_type, squared_force
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
-  use pd_motion_system, only: system_type, add_loads
+  use pd_force_term, only: term_view_type
+  use pd_motion_system, only: system_type, add_loads, view_of
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
@@ -81,6 +82,10 @@ contains
     allocate (force(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., force)
     balance%acting = squared_force(system, force, held=.true.)
+    if (system%terms%inside > 0) then
+      call forces_of_terms(system, t, force)
+      balance%acting = max(balance%acting, squared_force(system, force, held=.true.))
+    end if
     if (.not. system%model%thermal) return
     allocate (none, mold=force)
     allocate (energy(system%body%n_slots), source=0.0_wp)
@@ -114,6 +119,19 @@ contains
     end function of_piece
   end subroutine begin_balance
 
+  !> Force density of the terms that are not external, at the present displacements: what they bear
+  !> is support, as that of constrained components, and in balance with loads and reactions.
+  subroutine forces_of_terms(system, t, force)
+    type(system_type), intent(in), target :: system
+    real(wp), intent(in) :: t                     !! time [s]
+    real(wp), intent(out), contiguous :: force(:, :)  !! (n_slots, dim) [N/m3]
+    type(term_view_type) :: view
+
+    force = 0.0_wp
+    call view_of(system, t, view)
+    call system%terms%add_force(view, force)
+  end subroutine forces_of_terms
+
   !> Sum up the state of every piece at time `t`; the forces of the system must belong to its
   !> displacements.
   subroutine weigh(system, relaxation, rigid, t, balance)
@@ -122,7 +140,7 @@ contains
     type(rigid_type), intent(in) :: rigid             !! its pieces
     real(wp), intent(in) :: t                         !! time [s]
     type(balance_type), intent(inout) :: balance      !! gets the sums
-    real(wp), allocatable :: loads(:, :)
+    real(wp), allocatable :: loads(:, :), borne(:, :)
     type(running_type) :: running
     real(wp) :: squared, floor, terms(6)
     integer :: i, k, c, p
@@ -169,14 +187,30 @@ contains
         piece%rho = terms(6)
       end associate
     end do
-    call add_groups(system, rigid, loads, balance)
+    allocate (borne, mold=loads)
+    if (system%terms%inside > 0) then
+      call forces_of_terms(system, t, borne)
+      do p = 1, size(balance%piece)
+        call new_running(system%body%order, running)
+        do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+          k = rigid%pieces%slots(i)
+          call add_point(system%body%order, system%body%point(k), &
+            & [sum((borne(k, :)*system%body%volume(k))**2)], running)
+        end do
+        terms = total_of_running(system%body%order, running)
+        balance%piece(p)%support = balance%piece(p)%support + terms(1)
+      end do
+    end if
+    call add_groups(system, rigid, loads, borne, balance)
   end subroutine weigh
 
-  !> Net forces and moments of each boundary and each load on every piece, and their sums.
-  subroutine add_groups(system, rigid, loads, balance)
+  !> Net forces and moments of each boundary, of the terms of the force and of the loads on every
+  !> piece, and their sums.
+  subroutine add_groups(system, rigid, loads, borne, balance)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
     real(wp), intent(in) :: loads(:, :)
+    real(wp), intent(in) :: borne(:, :)   !! by the terms of the force that are not external, if any
     type(balance_type), intent(inout) :: balance
     type(running_type) :: running, of_applied
     integer, allocatable :: order(:)
@@ -206,6 +240,16 @@ contains
       end associate
     end do
     do p = 1, size(balance%piece)
+      if (system%terms%inside > 0) then
+        call new_running(system%body%order, running)
+        do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+          k = rigid%pieces%slots(i)
+          one = 0.0_wp
+          one(:dim) = borne(k, :)*system%body%volume(k)
+          call add_one(k, one)
+        end do
+        call add_net()
+      end if
       call new_running(system%body%order, running)
       call new_running(system%body%order, of_applied)
       do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
@@ -249,11 +293,13 @@ contains
     end subroutine add_net
   end subroutine add_groups
 
-  !> Twice the strain energy of every piece, or that of its heat alone if that is larger.
+  !> Twice the stored energy of every piece, or that of its heat alone if that is larger.
   subroutine weigh_energies(system, rigid, balance)
-    type(system_type), intent(inout) :: system
-    type(rigid_type), intent(in) :: rigid
-    type(balance_type), intent(inout) :: balance
+    type(system_type), intent(inout), target :: system
+      !! at the state that is weighed; its force loops keep their room in the family
+    type(rigid_type), intent(in) :: rigid         !! its pieces
+    type(balance_type), intent(inout) :: balance  !! gets the energy of every piece
+    type(term_view_type) :: view
     real(wp), allocatable :: energy(:)
     type(running_type) :: running
     real(wp) :: totals(6)
@@ -261,6 +307,8 @@ contains
 
     allocate (energy(system%body%n_slots), source=0.0_wp)
     call energy_pass(system%family, system%model, system%state%u, energy)
+    call view_of(system, system%time, view)
+    call system%terms%add_energy(view, energy)
     do p = 1, size(balance%piece)
       call new_running(system%body%order, running)
       do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
@@ -331,17 +379,17 @@ contains
   !> Whether the forces of every piece are in balance as weighed; what remains to be known is how
   !> far off its displacements are.
   pure logical function balanced_but_for_error(relaxation, rigid, balance) result(balanced)
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
-    type(balance_type), intent(in) :: balance
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
+    type(rigid_type), intent(in) :: rigid            !! its pieces
+    type(balance_type), intent(in) :: balance        !! as weighed
     balanced = all(piece_balanced(relaxation, rigid%piece%size, balance%piece))
   end function balanced_but_for_error
 
-  !> The error energy (error . stiffness . error) that each piece's displacements may have [J]:
-  !> relative to the strain energy its root is 100 times the tolerance, and at most 1e-3.
+  !> The error energy (error . stiffness . error) that each piece's displacements may have (pieces)
+  !> [J]: relative to the strain energy its root is 100 times the tolerance, and at most 1e-3.
   pure function allowed_error(relaxation, balance) result(allowed)
-    type(relaxation_type), intent(in) :: relaxation
-    type(balance_type), intent(in) :: balance
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
+    type(balance_type), intent(in) :: balance        !! as weighed, with energies
     real(wp), allocatable :: allowed(:)
     allocate (allowed(size(balance%piece)), source= &
       & min(1.0e-3_wp, 100*relaxation%tolerance)**2*balance%piece%energy)
@@ -361,7 +409,7 @@ contains
 
   !> The largest relative residual of all pieces; 0 where nothing but rounding is left.
   pure real(wp) function relative_residual(balance) result(residual)
-    type(balance_type), intent(in) :: balance
+    type(balance_type), intent(in) :: balance  !! as weighed
     residual = maxval(relative_to_scale(balance%piece))
   end function relative_residual
 
@@ -381,9 +429,9 @@ contains
 
   !> The error of a relaxation whose iterations are used up; `balance` is where it stands.
   subroutine fail_unconverged(system, relaxation, rigid, balance, load_step, t, change, error)
-    type(system_type), intent(in) :: system
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system          !! where its iterations ended
+    type(relaxation_type), intent(in) :: relaxation  !! whose iterations are used up
+    type(rigid_type), intent(in) :: rigid            !! its pieces
     type(balance_type), intent(in) :: balance   !! as weighed
     integer, intent(in) :: load_step            !! its number
     real(wp), intent(in) :: t                   !! its time [s]
@@ -408,7 +456,7 @@ contains
 
   !> What to say about an accepted state whose residual is above the tolerance, '' if it is not.
   function rounding_note(relaxation, balance) result(text)
-    type(relaxation_type), intent(in) :: relaxation
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
     type(balance_type), intent(in) :: balance   !! as weighed
     character(:), allocatable :: text
 
@@ -422,9 +470,9 @@ contains
   !> An error if what acts on some piece vanishes in the rounding of its forces: then nothing is
   !> known of its equilibrium.
   subroutine check_drowned(system, relaxation, rigid, balance, error)
-    type(system_type), intent(in) :: system
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system          !! at the accepted state
+    type(relaxation_type), intent(in) :: relaxation  !! with the tolerance
+    type(rigid_type), intent(in) :: rigid            !! its pieces
     type(balance_type), intent(in) :: balance   !! as weighed, of an accepted state
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: text
@@ -479,8 +527,8 @@ contains
 
   !> What is left over in a piece and where, in words.
   function describe_left_over(system, rigid, balance, piece, t) result(text)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system      !! at the state that is weighed
+    type(rigid_type), intent(in) :: rigid        !! its pieces
     type(balance_type), intent(in) :: balance    !! as weighed
     integer, intent(in) :: piece                 !! its number
     real(wp), intent(in) :: t                    !! time of the loads [s]

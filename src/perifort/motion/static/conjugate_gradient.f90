@@ -8,7 +8,6 @@ module pd_motion_static_conjugate_gradient
   use pd_body_body, only: share_halo
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
-  use pd_force_forces, only: dilatation_pass, force_pass
   use pd_motion_static_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
     & check_drowned, rounding_note
@@ -21,7 +20,7 @@ module pd_motion_static_conjugate_gradient
   use pd_motion_static_residual, only: relaxation_type, squared_force
   use pd_motion_static_rigid, only: rigid_type, remove_free_motions
   use pd_motion_static_start, only: move_along
-  use pd_motion_system, only: system_type, add_loads
+  use pd_motion_system, only: system_type, renew_forces
   implicit none (type, external)
   private
   public :: relax_by_conjugate_gradient
@@ -68,16 +67,19 @@ contains
   !> Bring `system`, at rest under earlier conditions, to rest at `instant%time`; bonds don't break.
   !> If its memory says that it is on the way there, it goes on from where it stands. `trend` is the
   !> change of displacement in the load step before, or of size 0. If `gave_way`, no rest was found,
-  !> and the displacements are the best on the way.
+  !> and the displacements are the best on the way. An error is set if the iterations are used up,
+  !> if rounding hides the equilibrium, or if the observer sets one.
   subroutine relax_by_conjugate_gradient(system, relaxation, rigid, trend, instant, observer, &
     & gave_way, error)
     type(system_type), intent(inout) :: system
-    type(relaxation_type), intent(in) :: relaxation
-    type(rigid_type), intent(in) :: rigid
-    real(wp), intent(in) :: trend(:, :)
+      !! at rest on return; how far it is meanwhile stands in its memory
+    type(relaxation_type), intent(in) :: relaxation  !! tolerance, iterations and the preconditioner
+    type(rigid_type), intent(in) :: rigid            !! its pieces and their free motions
+    real(wp), intent(in) :: trend(:, :)              !! (n_slots, dim), or of 0 rows [m]
     type(instant_type), intent(inout) :: instant
-    class(observer_type), intent(inout) :: observer
-    logical, intent(out) :: gave_way
+      !! time and load step; gets step, iterations and notes
+    class(observer_type), intent(inout) :: observer  !! called once for each iteration
+    logical, intent(out) :: gave_way                 !! dynamic relaxation has to go on
     type(error_type), allocatable, intent(out) :: error
     type(newton_type), allocatable :: newton
     type(balance_type) :: balance
@@ -400,23 +402,9 @@ contains
     type(krylov_type), intent(inout) :: krylov
     type(sums_type), intent(out) :: sums
 
-    call renew_forces(system)
+    call renew_forces(system, t)
     call take_residual(system, t, krylov, sums)
   end subroutine look
-
-  !> Forces at the present displacements, nothing imposed.
-  subroutine renew_forces(system)
-    type(system_type), intent(inout) :: system
-    associate (state => system%state, model => system%model)
-      call share_halo(system%body, state%u)
-      if (model%dilatation) then
-        call dilatation_pass(system%family, model, state%u, state%p, system%strained)
-        call share_halo(system%body, state%p)
-      end if
-      call force_pass(system%family, model, state%u, state%p, state%force, system%strained)
-      call share_halo(system%body, state%force)
-    end associate
-  end subroutine renew_forces
 
   !> After a solve with the tangent that has not taken much of the residual: a shorter step.
   subroutine shorten(system, t, krylov, sums, failed)

@@ -7,9 +7,12 @@ module pd_motion_static_krylov
     & largest_over, new_running, new_sums, put_block, running_type, take_block, total_of, &
     & total_of_running, summed_type => sums_type
   use pd_body_body, only: share_halo
+  use pd_force_model, only: force_options_type, options_of
+  use pd_motion_conditions, only: number_of_loads
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
-  use pd_motion_system, only: system_type, add_loads
-  use pd_motion_tangent, only: forces_at
+  use pd_force_term, only: term_view_type
+  use pd_motion_system, only: system_type, add_loads, view_of
+  use pd_motion_tangent, only: at_rest, forces_at, one_sided, tangent_product, tangent_type
   implicit none (type, external)
   private
   public :: make_room, linearise, take_residual, first_direction
@@ -29,9 +32,10 @@ contains
   !> Room for a system's solves, where there is none yet; `mass` (n_slots, dim) is the
   !> preconditioner [N/m4].
   subroutine make_room(system, mass, krylov)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: mass(:, :)
+    type(system_type), intent(in) :: system  !! whose constrained components are held
+    real(wp), intent(in) :: mass(:, :)       !! (n_slots, dim) [N/m4]
     type(krylov_type), intent(inout) :: krylov
+      !! gets room, and the inverse of `mass`, 0 where held
 
     if (.not. allocated(krylov%residual)) allocate (krylov%residual, krylov%direction, &
       & krylov%origin, source=0.0_wp*mass)
@@ -42,10 +46,11 @@ contains
 
   !> The residual from the system's forces and the loads at `t`, and its sums.
   subroutine take_residual(system, t, krylov, sums)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: t
+    type(system_type), intent(inout) :: system  !! with its forces at the present displacements
+    real(wp), intent(in) :: t             !! time of the loads [s]
     type(krylov_type), intent(inout) :: krylov
-    type(sums_type), intent(out) :: sums
+      !! with the preconditioner; gets the residual, 0 where held
+    type(sums_type), intent(out) :: sums  !! over the residual and the supports; nothing has moved
 
     krylov%residual = system%state%force
     call add_loads(system, t, 1.0_wp, .false., krylov%residual)
@@ -57,8 +62,9 @@ contains
 
   !> Start anew from the residual: the direction is the preconditioned residual.
   subroutine first_direction(system, krylov)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! its volumes and horizon
     type(krylov_type), intent(inout) :: krylov
+      !! with the residual; gets the direction and its scale
     real(wp) :: largest
     integer :: k, c
 
@@ -82,9 +88,10 @@ contains
 
   !> The next direction, conjugate to those before; `rho` belongs to the new residual.
   subroutine next_direction(system, rho, krylov)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: rho
+    type(system_type), intent(in) :: system  !! its volumes and horizon
+    real(wp), intent(in) :: rho  !! residual . preconditioned residual, weighted with volume
     type(krylov_type), intent(inout) :: krylov
+      !! with the new residual and the last direction; gets the next one
     real(wp) :: beta, largest, scaled
     integer :: k, c
 
@@ -148,9 +155,9 @@ contains
 
   !> Take a displacement for the direction; `scale` is 0 if it is none.
   subroutine take_direction(system, displacement, krylov)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in), contiguous :: displacement(:, :)
-    type(krylov_type), intent(inout) :: krylov
+    type(system_type), intent(in) :: system     !! its horizon
+    real(wp), intent(in), contiguous :: displacement(:, :)  !! (n_slots, dim) [m]
+    type(krylov_type), intent(inout) :: krylov  !! gets the direction, made small, and its scale
     real(wp) :: largest
 
     largest = largest_over(system%body%order, displacement)
@@ -177,81 +184,68 @@ contains
   !> there takes the place of the undeformed stiffness.
   subroutine linearise(system, deformed, krylov)
     type(system_type), intent(inout) :: system
+      !! at the displacements of the origin; its force loops keep their room in the family
     logical, intent(in) :: deformed
+      !! the tangent at these displacements, else the undeformed stiffness
     type(krylov_type), intent(inout) :: krylov
+      !! gets the origin and, if `deformed`, the unprojected forces there
 
     krylov%origin = system%state%u
     krylov%deformed = deformed
     if (.not. deformed) return
     if (.not. allocated(krylov%forces)) allocate (krylov%forces, mold=krylov%origin)
-    call unprojected_forces(system, krylov%origin, krylov%forces)
+    call forces_at(system, krylov%origin, krylov%forces, forces_of(system, deformed))
   end subroutine linearise
 
-  !> Forces with the unprojected dilatation: they are a gradient, and their tangent is symmetric.
-  subroutine unprojected_forces(system, u, force)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in), contiguous :: u(:, :)
-    real(wp), intent(inout), contiguous :: force(:, :)
-    logical :: projected
+  !> What the forces take in whose tangent is the stiffness. Those of a deformed body have the
+  !> unprojected dilatation: they are a gradient, and their tangent is symmetric. At no displacement
+  !> both dilatations have the same, symmetric stiffness, and heat has none.
+  pure type(force_options_type) function forces_of(system, deformed) result(options)
+    type(system_type), intent(in) :: system
+    logical, intent(in) :: deformed
 
-    projected = system%model%projected
-    system%model%projected = .false.
-    call forces_at(system, u, force)
-    system%model%projected = projected
-  end subroutine unprojected_forces
+    options = options_of(system%model)
+    options%projected = .not. deformed
+    if (.not. deformed) options%thermal = .false.
+  end function forces_of
 
   !> `product` = stiffness times `direction`, which may move constrained components, too. Either
   !> costs one evaluation of the forces, the undeformed stiffness (with the bonds that are intact
   !> now) by the fast formulas. The tangent is a one-sided difference, some seven digits: more than
   !> what isn't linear leaves to a solve.
+  !> Terms of the force resist with the tangents that they give.
   subroutine apply_stiffness(system, krylov)
-    type(system_type), intent(inout) :: system
-    type(krylov_type), intent(inout) :: krylov
-    logical :: projected, thermal
-    real(wp) :: step
-    integer :: k, c
+    type(system_type), intent(inout), target :: system
+      !! its state stays as it is; its force loops keep their room in the family
+    type(krylov_type), intent(inout), target :: krylov  !! with the direction; gets the product
+    type(tangent_type) :: tangent
+    type(term_view_type) :: view
 
-    if (.not. krylov%deformed) then
-      ! at no displacement both dilatations have the same, symmetric stiffness, and heat has none
-      projected = system%model%projected
-      thermal = system%model%thermal
-      system%model%projected = .true.
-      system%model%thermal = .false.
-      call forces_at(system, krylov%direction, krylov%product)
-      system%model%projected = projected
-      system%model%thermal = thermal
-      do c = 1, size(krylov%product, 2)
-        !$omp parallel do simd schedule(static) default(none) shared(krylov, c) private(k)
-        do k = 1, size(krylov%product, 1)
-          krylov%product(k, c) = -krylov%product(k, c)
-        end do
-      end do
-      return
+    tangent%options = forces_of(system, krylov%deformed)
+    if (krylov%deformed) then
+      tangent%difference = one_sided
+      tangent%step = difference_size*system%family%rule%delta/krylov%largest
+      call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
+        & krylov%moved, krylov%forces)
+    else
+      ! directions are so small that they need no other factor
+      tangent%difference = at_rest
+      call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
+        & krylov%moved)
     end if
-    if (.not. allocated(krylov%moved)) allocate (krylov%moved, mold=krylov%origin)
-    step = difference_size*system%family%rule%delta/krylov%largest
-    do c = 1, size(krylov%product, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)
-      do k = 1, size(krylov%product, 1)
-        krylov%moved(k, c) = krylov%origin(k, c) + step*krylov%direction(k, c)
-      end do
-    end do
-    call unprojected_forces(system, krylov%moved, krylov%product)
-    do c = 1, size(krylov%product, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(krylov, step, c) private(k)
-      do k = 1, size(krylov%product, 1)
-        krylov%product(k, c) = (krylov%forces(k, c) - krylov%product(k, c))/step
-      end do
-    end do
+    if (system%terms%number() == number_of_loads(system%terms)) return
+    call view_of(system, system%time, view, krylov%origin)
+    call system%terms%add_tangent(view, krylov%direction, krylov%product)
+    call share_halo(system%body, krylov%product)
   end subroutine apply_stiffness
 
   !> Go `length` along the direction: displacements, the forces that follow linearly, the residual,
   !> and the sums, in blocks of points.
   subroutine go_along(system, length, krylov, sums)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: length
-    type(krylov_type), intent(inout) :: krylov
-    type(sums_type), intent(out) :: sums
+    type(system_type), intent(inout) :: system  !! its displacements and forces move on
+    real(wp), intent(in) :: length              !! in units of the direction [-]
+    type(krylov_type), intent(inout) :: krylov  !! with direction and product; its residual moves on
+    type(sums_type), intent(out) :: sums        !! after the step
     type(summed_type) :: parts
     real(wp) :: terms(block_points, 4), taken(block_points, 7), totals(4)
     integer :: block, c, r, first, last, at
@@ -375,8 +369,8 @@ contains
 
   !> Sum of V a b over all components.
   function volume_inner(system, a, b) result(sum_of_all)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in), contiguous :: a(:, :), b(:, :)
+    type(system_type), intent(in) :: system               !! its volumes
+    real(wp), intent(in), contiguous :: a(:, :), b(:, :)  !! (n_slots, dim) fields
     real(wp) :: sum_of_all
     sum_of_all = inner(system%body%order, system%body%volume, a, b)
   end function volume_inner

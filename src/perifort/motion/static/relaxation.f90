@@ -34,6 +34,9 @@ module pd_motion_static_relaxation
   integer, parameter :: judged_anyway = 200
   !> Iterations between two judgements, at least, and as a part of those that have been made.
   integer, parameter :: least_wait = 10, wait_part = 20
+  !> Iterations of dynamic relaxation after which conjugate gradients go on: on slender bodies and
+  !> large contrasts of stiffness its slowest mode needs millions.
+  integer, parameter :: patience = 100000
   !> Iterations that an estimate of the error may take.
   integer, parameter :: most_estimating = 20000
 
@@ -54,20 +57,25 @@ module pd_motion_static_relaxation
 contains
 
   !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if
-  !> its memory says that it has begun, it goes on from there.
+  !> its memory says that it has begun, it goes on from there. An error is set if there is no
+  !> equilibrium, if it is not found, or if the observer sets one.
   subroutine run_relaxation(system, relaxation, observer, error)
     type(system_type), intent(inout) :: system
-    type(relaxation_type), intent(in) :: relaxation
+      !! ready, or as a checkpoint left it; settled at the last load step on return
+    type(relaxation_type), intent(in) :: relaxation  !! solver, load steps, tolerance and mass
     class(observer_type), intent(inout) :: observer
+      !! called once for each iteration and settled load step
     type(error_type), allocatable, intent(out) :: error
     type(instant_type) :: instant
     type(rigid_type) :: rigid
     type(good_state_type) :: good
     integer(i8) :: number
     integer :: i, first, parts
-    logical :: amid, dynamic
+    logical :: amid, dynamic, unfinished
 
     instant%dt = 1.0_wp
+    call check_terms(system, error)
+    if (allocated(error)) return
     call find_free_motions(system, rigid)
     do i = max(1, system%memory%load_step), relaxation%load_steps
       call check_balance(system, rigid, real(i, wp)/relaxation%load_steps, merge(status_input, &
@@ -96,17 +104,22 @@ contains
       amid = .false.
       instant%load_step = i
       instant%time = real(i, wp)/relaxation%load_steps
+      system%time = instant%time
       call bring_temperature(system, instant%time)
       do
-        dynamic = system%memory%iteration > 0 .or. .not. relaxation%conjugate_gradient
+        dynamic = system%memory%iteration > 0 .or. .not. (relaxation%conjugate_gradient .or. &
+          & allocated(system%memory%newton))
         if (.not. dynamic) then
           call relax_by_conjugate_gradient(system, relaxation, rigid, system%memory%trend, &
             & instant, observer, dynamic, error)
           instant%gave_way = dynamic
         end if
         instant%dynamic = dynamic
-        if (dynamic .and. .not. allocated(error)) &
-          & call relax(system, relaxation, rigid, instant, observer, error)
+        if (dynamic .and. .not. allocated(error)) then
+          call relax(system, relaxation, rigid, instant, observer, unfinished, error)
+          if (unfinished .and. .not. relaxation%conjugate_gradient) &
+            & call finish_by_conjugate_gradient(system, relaxation, rigid, instant, observer, error)
+        end if
         instant%gave_way = .false.
         instant%dynamic = .false.
         if (allocated(error)) then
@@ -142,6 +155,48 @@ contains
     system%memory%step = not_begun  ! whoever runs it again begins anew
   end subroutine run_relaxation
 
+  !> Go on by conjugate gradients where dynamic relaxation has not converged, and say so; where they
+  !> end without an answer, dynamic relaxation begins anew from there, once. Its first error stays
+  !> if that finds no equilibrium either.
+  subroutine finish_by_conjugate_gradient(system, relaxation, rigid, instant, observer, error)
+    type(system_type), intent(inout) :: system       !! where dynamic relaxation ended
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    type(instant_type), intent(inout) :: instant
+    class(observer_type), intent(inout) :: observer
+    type(error_type), allocatable, intent(inout) :: error  !! why dynamic relaxation ended
+    type(error_type), allocatable :: first
+    real(wp) :: no_trend(0, system%body%dim)
+    logical :: gave_way, unfinished
+
+    call move_alloc(error, first)
+    system%memory%iteration = 0
+    if (allocated(system%memory%rate)) deallocate (system%memory%rate)
+    if (allocated(system%memory%base)) deallocate (system%memory%base)
+    call add_note(instant, 'dynamic relaxation has found no equilibrium in '// &
+      & to_text(instant%iteration)//' iterations; the conjugate gradient solver goes on from there')
+    instant%dynamic = .false.
+    call relax_by_conjugate_gradient(system, relaxation, rigid, no_trend, instant, observer, &
+      & gave_way, error)
+    if (gave_way .and. .not. allocated(error)) then
+      instant%dynamic = .true.
+      call relax(system, relaxation, rigid, instant, observer, unfinished, error)
+      if (unfinished) call move_alloc(first, error)
+    end if
+  end subroutine finish_by_conjugate_gradient
+
+  !> An error if the force of some term depends on displacements in a way that it does not tell.
+  subroutine check_terms(system, error)
+    type(system_type), intent(in) :: system
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: name
+
+    name = system%terms%without_tangent()
+    if (name /= '') call fail(error, 'no static equilibrium can be computed: the force term '// &
+      & name//' has no tangent, which a solver needs. Give it one, or integrate in time with '// &
+      & 'damping until the body rests', status_input)
+  end subroutine check_terms
+
   !> Take back what pieces that are free have moved as a whole, unless that takes them out of
   !> balance: loads that keep their direction hold a piece as it is turned, and the projected
   !> dilatation isn't the same in a frame that is turned. Then only translations are taken back.
@@ -175,7 +230,8 @@ contains
   !> Fill a system's memory with all that a relaxation may ever carry, whose size is then known.
   subroutine fill_memory(system, relaxation)
     type(system_type), intent(inout) :: system
-    type(relaxation_type), intent(in) :: relaxation
+      !! with a memory of the largest size, without contents, on return
+    type(relaxation_type), intent(in) :: relaxation  !! solver and number of load steps
 
     system%memory = memory_type()
     if (.not. relaxation%conjugate_gradient) then
@@ -208,12 +264,13 @@ contains
   end subroutine settle
 
   !> Iterate to equilibrium at `instant%time`, or go on in the midst of that.
-  subroutine relax(system, relaxation, rigid, instant, observer, error)
+  subroutine relax(system, relaxation, rigid, instant, observer, unfinished, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
     type(rigid_type), intent(in) :: rigid
     type(instant_type), intent(inout) :: instant
     class(observer_type), intent(inout) :: observer
+    logical, intent(out) :: unfinished   !! the error is that no equilibrium was found, or too rough
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: a(:, :), a_before(:, :)
     real(wp) :: no_trend(0, system%body%dim)
@@ -223,6 +280,7 @@ contains
     integer :: iteration, fault, m
     logical :: accepted
 
+    unfinished = .false.
     allocate (a, a_before, mold=system%state%u)
     if (.not. allocated(system%memory%rate)) allocate (system%memory%rate, mold=system%state%u)
     instant%settled = .false.
@@ -241,12 +299,13 @@ contains
         if (balanced_but_for_error(relaxation, rigid, balance) .and. error_is_known(balance, &
           & 0.0_wp, allowed_error(relaxation, balance))) then
           call check_drowned(system, relaxation, rigid, balance, error)
+          unfinished = allocated(error)
           return
         end if
       end if
       call fictitious_acceleration(system, relaxation, instant%time, a)
       if (memory%iteration == 0) rate = a/2                        ! 7.30
-      do iteration = max(1, memory%iteration), relaxation%maximum_iterations
+      do iteration = max(1, memory%iteration), min(relaxation%maximum_iterations, patience)
         if (iteration > memory%iteration) then
           call move(system%state%u, rate)                          ! 7.29b
           a_before = a
@@ -291,6 +350,7 @@ contains
             call add_note(instant, rounding_note(relaxation, balance))
             memory%iteration = 0
             call check_drowned(system, relaxation, rigid, balance, error)
+            unfinished = allocated(error)
             return
           end if
         end if
@@ -300,6 +360,7 @@ contains
         call accelerate(rate, a, damping)                          ! 7.29a
       end do
     end associate
+    unfinished = relaxation%maximum_iterations >= patience
     call weigh(system, relaxation, rigid, instant%time, balance)
     call fail_unconverged(system, relaxation, rigid, balance, instant%load_step, instant%time, &
       & sqrt(system%memory%change/max(tiny(1.0_wp), system%memory%displacement)), error)

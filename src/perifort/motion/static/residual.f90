@@ -19,10 +19,10 @@ module pd_motion_static_residual
 
 contains
 
-  !> (V F).(V F) over the free components of a force density, or over all with `held`.
+  !> (V F).(V F) over the free components of a force density, or over all with `held` [N2].
   real(wp) function squared_force(system, density, held) result(squared)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: density(:, :)   !! (n_slots, dim) [N/m3]
+    type(system_type), intent(in) :: system  !! its volumes and constrained components
+    real(wp), intent(in) :: density(:, :)   !! (n_slots, dim) force density [N/m3]
     logical, intent(in), optional :: held   !! constrained components, too
     type(sums_type) :: parts
     real(wp) :: terms(block_points, 1), totals(1)

@@ -3,11 +3,13 @@
 module pd_motion_static_rigid
   use pd_base_kinds, only: wp, i1
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
-    & largest_of_ranks
+    & largest_of_ranks, largest_over
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
-  use pd_motion_system, only: system_type, add_loads
+  use pd_force_term, only: term_view_type
+  use pd_motion_conditions, only: load_of, load_type, number_of_loads
+  use pd_motion_system, only: system_type, add_loads, view_of
   implicit none (type, external)
   private
   public :: rigid_type, piece_type, find_free_motions, check_balance, remove_free_motions
@@ -36,27 +38,38 @@ module pd_motion_static_rigid
 
 contains
 
-  !> The pieces that intact bonds join now, and which rigid motions of each no constraint resists.
+  !> The pieces that intact bonds join now, and which rigid motions of each neither a constraint
+  !> nor a term of the force resists, while the other pieces stay where they are.
   subroutine find_free_motions(system, rigid)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(out) :: rigid
+    type(system_type), intent(in), target :: system  !! with its bonds as they are now
+    type(rigid_type), intent(out) :: rigid           !! pieces and free motions
+    type(load_type), pointer :: load
+    real(wp), allocatable :: resistance(:, :, :)
     integer :: p, l, i
 
     call find_pieces(system%body, system%family, rigid%pieces)
     allocate (rigid%piece(rigid%pieces%number))
     do p = 1, rigid%pieces%number
       associate (pieces => rigid%pieces)
-        call describe_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
+        call place_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
           & rigid%piece(p))
       end associate
     end do
-    do l = 1, size(system%loads)
-      associate (load => system%loads(l))
-        do i = 1, size(load%slots)
-          if (any(abs(load%density(i, :)) > 0.0_wp)) &
-            & rigid%piece(rigid%pieces%of(load%slots(i)))%loaded = .true.
-        end do
+    call find_resistance(system, rigid, resistance)
+    do p = 1, rigid%pieces%number
+      associate (pieces => rigid%pieces)
+        call describe_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
+          & resistance(:, :, p), rigid%piece(p))
       end associate
+    end do
+    ! other external terms may act anywhere
+    if (system%terms%outside > number_of_loads(system%terms)) rigid%piece%loaded = .true.
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      do i = 1, size(load%slots)
+        if (any(abs(load%density(i, :)) > 0.0_wp)) &
+          & rigid%piece(rigid%pieces%of(load%slots(i)))%loaded = .true.
+      end do
     end do
     do p = 1, rigid%pieces%number
       rigid%piece(p)%loaded = largest_of_ranks(system%body%order, &
@@ -64,14 +77,12 @@ contains
     end do
   end subroutine find_free_motions
 
-  !> Place, extent and free motions of the piece that consists of `slots`.
-  subroutine describe_piece(system, slots, piece)
+  !> Place and extent of the piece that consists of `slots`.
+  subroutine place_piece(system, slots, piece)
     type(system_type), intent(in) :: system
     integer, intent(in) :: slots(:)
     type(piece_type), intent(out) :: piece
-    type(running_type) :: of_mass(6), of_resistance(6)
-    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6), held(6)
-    integer :: n, k, c, i, j, dim
+    integer :: c, dim
 
     dim = system%body%dim
     piece%centre(:dim) = mean_over(system, slots, system%body%x)
@@ -83,6 +94,71 @@ contains
       end do
       piece%held = largest_of_ranks(order, &
         & real(maxval(system%held(slots, :)), wp)) > 0.0_wp
+    end associate
+  end subroutine place_piece
+
+  !> What the terms of the force resist to the six unit motions of each piece alone, over the
+  !> largest stiffness of a point, so that a point counts about as one that is held.
+  subroutine find_resistance(system, rigid, resistance)
+    type(system_type), intent(in), target :: system
+    type(rigid_type), intent(in) :: rigid              !! pieces in their places
+    real(wp), allocatable, intent(out) :: resistance(:, :, :)  !! (6, 6, pieces) [-]
+    real(wp), allocatable :: w(:, :), kw(:, :), rows(:)
+    type(term_view_type) :: view
+    type(running_type) :: running
+    real(wp) :: mode(6), largest
+    integer :: i, n, k, c, p
+
+    allocate (resistance(6, 6, rigid%pieces%number), source=0.0_wp)
+    if (system%terms%number() == number_of_loads(system%terms)) return
+    call view_of(system, system%time, view)
+    allocate (rows(system%body%n_slots), source=0.0_wp)
+    call system%terms%add_stiffness_bound(view, rows)
+    rows = rows*system%body%volume
+    largest = largest_over(system%body%order, rows)
+    if (.not. largest > 0.0_wp) return
+    allocate (w, kw, mold=system%state%u)
+    w = 0.0_wp
+    do p = 1, rigid%pieces%number
+      associate (piece => rigid%piece(p), slots => rigid%pieces%slots(rigid%pieces%start(p): &
+        & rigid%pieces%start(p + 1) - 1))
+        do i = 1, 6
+          do c = 1, system%body%dim
+            do n = 1, size(slots)
+              mode = motion_at(piece%centre, piece%size, system%body%x(slots(n), :), c)
+              w(slots(n), c) = mode(i)
+            end do
+          end do
+          kw = 0.0_wp
+          call system%terms%add_tangent(view, w, kw)
+          call new_running(system%body%order, running)
+          do n = 1, size(slots)
+            k = slots(n)
+            do c = 1, system%body%dim
+              mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
+              call add_point(system%body%order, system%body%point(k), &
+                & mode*(kw(k, c)*system%body%volume(k)/largest), running)
+            end do
+          end do
+          resistance(:, i, p) = total_of_running(system%body%order, running)
+        end do
+        w(slots, :) = 0.0_wp
+      end associate
+    end do
+  end subroutine find_resistance
+
+  !> Free motions of the piece that consists of `slots`.
+  subroutine describe_piece(system, slots, of_terms, piece)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: slots(:)
+    real(wp), intent(in) :: of_terms(6, 6)      !! resistance of the terms of the force [-]
+    type(piece_type), intent(inout) :: piece    !! in its place
+    type(running_type) :: of_mass(6), of_resistance(6)
+    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6), held(6)
+    integer :: n, k, c, i, j, dim
+
+    dim = system%body%dim
+    associate (order => system%body%order)
       do i = 1, 6
         call new_running(order, of_mass(i))
         call new_running(order, of_resistance(i))
@@ -102,7 +178,7 @@ contains
       end do
       do i = 1, 6
         mass(:, i) = total_of_running(order, of_mass(i))
-        resistance(:, i) = total_of_running(order, of_resistance(i))
+        resistance(:, i) = of_terms(:, i) + total_of_running(order, of_resistance(i))
       end do
     end associate
     call eigenvectors(resistance, values, vectors)
@@ -169,17 +245,17 @@ contains
   !> An error unless the loads at time `t` leave the free motions of every piece alone. `status` is
   !> that of the error.
   subroutine check_balance(system, rigid, t, status, error)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    real(wp), intent(in) :: t
-    integer, intent(in) :: status
+    type(system_type), intent(in) :: system  !! its loads
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
+    real(wp), intent(in) :: t                !! time of the loads [s]
+    integer, intent(in) :: status            !! exit status of the error
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: loads(:, :)
     type(running_type) :: of_work, of_applied
     real(wp) :: work(6), applied, mode(6), share(6), totals(6)
     integer :: p, i, k, c
 
-    if (size(system%loads) == 0 .or. all(rigid%piece%number == 0)) return
+    if (system%terms%outside == 0 .or. all(rigid%piece%number == 0)) return
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
     do p = 1, rigid%pieces%number
@@ -245,9 +321,10 @@ contains
   !> Take the free rigid motions of every piece out of a field (n_slots, dim), by linear modes about
   !> the undeformed body.
   subroutine remove_free_motions(system, rigid, field)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
+    type(system_type), intent(in) :: system  !! its positions, volumes and constrained components
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
     real(wp), intent(inout) :: field(:, :)
+      !! (n_slots, dim) constrained components stay as they are
     real(wp) :: mode(6)
     integer :: p, i, k, c
 
@@ -297,10 +374,10 @@ contains
   !> were in the least squares of volume). Of a piece that is held in part, and of all pieces
   !> without `turning`, a free translation is taken back, and a free rotation left as it is.
   subroutine turn_back(system, rigid, turning, u)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    logical, intent(in) :: turning
-    real(wp), intent(inout) :: u(:, :)
+    type(system_type), intent(in) :: system  !! its positions, volumes and constrained components
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
+    logical, intent(in) :: turning           !! pieces without any constraint are turned back
+    real(wp), intent(inout) :: u(:, :)       !! (n_slots, dim) displacements [m]
     real(wp) :: mode(6), amount(6), largest
     integer :: p, turn, i, c
 
@@ -373,11 +450,14 @@ contains
   !> iterations on the finite motion, to the last digit of what is left of the displacements.
   !> Motions that no weighted component sees are left alone.
   subroutine fit_rigid_motion(system, rigid, p, target, weight, u)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    integer, intent(in) :: p
-    real(wp), intent(in) :: target(:, :), weight(:, :)
+    type(system_type), intent(in) :: system  !! its positions and volumes
+    type(rigid_type), intent(in) :: rigid    !! its pieces
+    integer, intent(in) :: p                 !! number of the piece
+    real(wp), intent(in) :: target(:, :)     !! (n_slots, dim) displacements to come near to [m]
+    real(wp), intent(in) :: weight(:, :)
+      !! (n_slots, dim) of each component, 0 for those that do not count
     real(wp), intent(inout) :: u(:, :)
+      !! (n_slots, dim) displacements; those of the piece change [m]
     real(wp) :: matrix(6, 6), vectors(6, 6), values(6), side(6), mode(6), part(6), centre(3)
     type(running_type) :: of_matrix(6), of_side
     integer :: turn, n, k, c, i

@@ -5,7 +5,7 @@ module pd_motion_static_start
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
     & largest_of_ranks
   use pd_base_text, only: to_text
-  use pd_motion_conditions, only: impose
+  use pd_motion_conditions, only: impose, number_of_loads
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
   use pd_motion_system, only: system_type, add_loads
@@ -33,10 +33,10 @@ contains
   !> as a rigid body that is where they carry it. `trend`, the change of displacement that is to be
   !> tried next (n_slots, dim, or of size 0), loses what is done here.
   subroutine move_along(system, rigid, t, trend)
-    type(system_type), intent(inout) :: system
-    type(rigid_type), intent(in) :: rigid
-    real(wp), intent(in) :: t
-    real(wp), intent(inout) :: trend(:, :)
+    type(system_type), intent(inout) :: system  !! its displacements change
+    type(rigid_type), intent(in) :: rigid       !! as `find_free_motions` found it
+    real(wp), intent(in) :: t                   !! at which the load step ends [s]
+    real(wp), intent(inout) :: trend(:, :)      !! (n_slots, dim), or of 0 rows [m]
     real(wp), allocatable :: imposed(:, :), rate(:, :), moved(:, :), weight(:, :), goal(:, :)
     logical, allocatable :: acted(:)
     real(wp) :: before, after
@@ -108,7 +108,7 @@ contains
     end subroutine put_to_rest
   end subroutine move_along
 
-  !> On which pieces a load or heat acts at time `t`.
+  !> On which pieces a load, heat or another term of the force acts at time `t`.
   subroutine find_acted(system, rigid, t, acted)
     type(system_type), intent(in) :: system
     type(rigid_type), intent(in) :: rigid
@@ -118,6 +118,8 @@ contains
     integer :: k
 
     allocate (acted(rigid%pieces%number), source=.false.)
+    ! where terms of the force let a piece rest is theirs to say
+    if (system%terms%number() > number_of_loads(system%terms)) acted = .true.
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
     do k = 1, system%body%n_slots
@@ -154,9 +156,9 @@ contains
   !> What to say about pieces that nothing holds, '' if there is nothing: `parts` was the number of
   !> pieces before bonds broke.
   function loose_text(system, rigid, parts) result(text)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    integer, intent(in) :: parts
+    type(system_type), intent(in) :: system  !! for numbers of points
+    type(rigid_type), intent(in) :: rigid    !! as `find_free_motions` found it
+    integer, intent(in) :: parts             !! number of pieces before
     character(:), allocatable :: text
     integer :: p, loose, points, first
 

@@ -25,10 +25,11 @@ contains
   !> gets the sum of the squares of all components, whose rounding depends on the number of threads:
   !> it is a bound for those who watch, and no answer depends on its last digits.
   integer function faulty_slot(system, rate, dt, squares) result(slot)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system     !! its horizon
     real(wp), intent(in), contiguous :: rate(:, :)
-    real(wp), intent(in) :: dt
-    real(wp), intent(out), optional :: squares
+      !! (n_slots, dim) velocities [m/s], or displacements of an iteration [m]
+    real(wp), intent(in) :: dt                  !! time step [s], or 1
+    real(wp), intent(out), optional :: squares  !! sum of the squares of `rate`
     real(wp) :: sum_of_all, sum_of_block, largest_sum
     integer :: block, first, last, c
 
@@ -67,9 +68,12 @@ contains
   !> much as the rest of the pass. They tell as long as a block whose points all move alike moves by
   !> less than a twentieth of the horizon; else the largest rate is looked for.
   logical function stays_within(system, rate, dt, squares, largest_sum)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! its horizon
     real(wp), intent(in), contiguous :: rate(:, :)
-    real(wp), intent(in) :: dt, squares, largest_sum
+      !! (n_slots, dim) velocities [m/s], or displacements of an iteration [m]
+    real(wp), intent(in) :: dt           !! time step [s], or 1
+    real(wp), intent(in) :: squares      !! sum of the squares of `rate`
+    real(wp), intent(in) :: largest_sum  !! largest sum of the squares of one component in a block
     real(wp) :: largest
     integer :: k, c
 
@@ -105,9 +109,9 @@ contains
   !> The error for a motion that is none any more after `step` steps of `dt` [s]. Which of the two
   !> faults it is stands in the system: a point flies off, or energy comes from nowhere.
   subroutine explain_fault(system, step, dt, error)
-    type(system_type), intent(in) :: system
-    integer, intent(in) :: step
-    real(wp), intent(in) :: dt
+    type(system_type), intent(in) :: system  !! after the step that failed
+    integer, intent(in) :: step              !! number of that step
+    real(wp), intent(in) :: dt               !! time step [s]
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: text
     real(wp) :: speed, stretch, energy, supply
@@ -164,9 +168,9 @@ contains
   !> energy of their bonds. Such a body has no state of rest and blows itself up, at any step. The
   !> projected dilatation leaves the sign of energies open that are small beside the kinetic one.
   subroutine check_strain_energy(system, energies, t, error)
-    type(system_type), intent(in) :: system
-    type(energies_type), intent(in) :: energies
-    real(wp), intent(in) :: t
+    type(system_type), intent(in) :: system      !! its materials and the rounding of its energies
+    type(energies_type), intent(in) :: energies  !! at this instant
+    real(wp), intent(in) :: t                    !! time [s]
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: advice
 
@@ -184,8 +188,8 @@ contains
   !> The largest stretch, in size, of the intact bonds of slot `k`; not finite if displacements
   !> around it are not.
   real(wp) function greatest_stretch(system, k) result(stretch)
-    type(system_type), intent(in) :: system
-    integer, intent(in) :: k
+    type(system_type), intent(in) :: system  !! at the present displacements
+    integer, intent(in) :: k                 !! slot
     type(bonds_type) :: bonds
     type(bond_state_type) :: bond
     integer :: i
@@ -206,8 +210,8 @@ contains
 
   !> Position of a slot as text.
   pure function place(system, k) result(text)
-    type(system_type), intent(in) :: system
-    integer, intent(in) :: k
+    type(system_type), intent(in) :: system  !! its positions
+    integer, intent(in) :: k                 !! slot
     character(:), allocatable :: text
     integer :: c
 

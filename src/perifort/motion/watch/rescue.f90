@@ -25,10 +25,10 @@ contains
   !> is ever wanted, it must not have more energy than `most` [J]: looking at that costs as much as
   !> several steps.
   subroutine keep_good(good, system, instant, most)
-    type(good_state_type), intent(inout) :: good
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
-    real(wp), intent(in), optional :: most
+    type(good_state_type), intent(inout) :: good  !! gets this state
+    type(system_type), intent(inout) :: system  !! left as it is
+    type(instant_type), intent(in) :: instant  !! of the state
+    real(wp), intent(in), optional :: most     !! energy that the state may have; any by default [J]
 
     call good%shelf%rewind(reading=.false.)
     call keep_system(good%shelf, system)
@@ -42,8 +42,9 @@ contains
   !> error in writing it goes to the end of `error`, the fault that ended the motion.
   subroutine show_good(good, system, observer, error)
     type(good_state_type), intent(inout) :: good
-    type(system_type), intent(inout) :: system
-    class(observer_type), intent(inout) :: observer
+      !! the last good state; without one nothing is done
+    type(system_type), intent(inout) :: system       !! in that state on return
+    class(observer_type), intent(inout) :: observer  !! sees that state
     type(error_type), allocatable, intent(inout) :: error
     type(error_type), allocatable :: late
     type(energies_type) :: energies
@@ -53,6 +54,7 @@ contains
     call good%shelf%rewind(reading=.true.)
     call keep_system(good%shelf, system)
     if (allocated(good%shelf%error)) return
+    system%time = good%instant%time
     if (good%most < huge(good%most)) then
       call velocities_now(system, good%instant%time, good%instant%kick, v)
       call energies_of(system, v, energies)

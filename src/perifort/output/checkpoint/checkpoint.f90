@@ -45,6 +45,7 @@ module pd_output_checkpoint_checkpoint
     integer :: written = 0
     integer :: last_step = 0            !! step of the last one
     real(wp) :: last = 0.0_wp           !! wall time of the last one, or of the start [s]
+    logical :: in_files = .true.        !! there is a folder to write to
   contains
     procedure :: start
     procedure :: is_due
@@ -54,12 +55,12 @@ module pd_output_checkpoint_checkpoint
 
 contains
 
-  !> Of this program and this run.
+  !> What a checkpoint says of this program and this run, before its first step.
   function new_about(scene_text, start, steps, dt) result(about)
-    character(*), intent(in) :: scene_text
-    integer(i8), intent(in) :: start
-    integer, intent(in) :: steps
-    real(wp), intent(in) :: dt
+    character(*), intent(in) :: scene_text  !! the resolved scene
+    integer(i8), intent(in) :: start        !! checksum of the points and the initial state
+    integer, intent(in) :: steps            !! of the whole run; in a relaxation load steps
+    real(wp), intent(in) :: dt              !! time step [s]; 0 in a relaxation
     type(about_type) :: about
 
     about%version = program_version
@@ -73,8 +74,9 @@ contains
 
   !> Keep all of it, or put it back.
   subroutine keep_about(archive, about)
-    class(archive_type), intent(inout) :: archive
-    type(about_type), intent(inout) :: about
+    class(archive_type), intent(inout) :: archive  !! to write to or to read from; its `error` is
+                                                   !! set if that fails
+    type(about_type), intent(inout) :: about       !! in reading that of the archive on return
 
     call archive%keep('version', about%version)
     call archive%keep('compiler', about%compiler)
@@ -96,21 +98,23 @@ contains
 
   !> The newest checkpoint of a run.
   pure function checkpoint_path(directory, stem) result(path)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
     character(:), allocatable :: path
     path = in_directory(directory, trim(stem)//'.checkpoint')
   end function checkpoint_path
 
   !> The one before it.
   pure function older_path(newest) result(path)
-    character(*), intent(in) :: newest
+    character(*), intent(in) :: newest  !! path of the newest checkpoint
     character(:), allocatable :: path
     path = newest//'.old'
   end function older_path
 
   !> Remove the checkpoints of an earlier run.
   subroutine remove_checkpoints(directory, stem)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
     character(:), allocatable :: newest
 
     newest = checkpoint_path(directory, stem)
@@ -121,8 +125,8 @@ contains
 
   !> Bytes of a checkpoint.
   integer(i8) function checkpoint_bytes(about, system) result(bytes)
-    type(about_type), intent(inout) :: about
-    type(system_type), intent(inout) :: system
+    type(about_type), intent(inout) :: about    !! as it is to be written; unchanged
+    type(system_type), intent(inout) :: system  !! as it is to be written; unchanged
     type(meter_type) :: meter
 
     call keep_about(meter, about)
@@ -130,18 +134,20 @@ contains
     bytes = meter%bytes
   end function checkpoint_bytes
 
-  !> Begin: the clock runs from here.
+  !> Begin: the clock runs from here. With the path '' none is ever due.
   subroutine start(self, path, every, minutes, goes_on, keep_newest)
-    class(checkpoint_type), intent(inout) :: self
-    character(*), intent(in) :: path
-    integer, intent(in) :: every
-    real(wp), intent(in) :: minutes
+    class(checkpoint_type), intent(inout) :: self  !! nothing written yet, or as of a run that goes
+                                                   !! on
+    character(*), intent(in) :: path               !! of the newest checkpoint
+    integer, intent(in) :: every  !! steps (in a relaxation iterations) between two; 0: not by steps
+    real(wp), intent(in) :: minutes                !! wall time between two; 0: not by time [min]
     logical, intent(in) :: goes_on      !! the run has checkpoints from before
     logical, intent(in) :: keep_newest  !! the newest of them is whole
 
     self%path = path
-    self%every = every
-    self%minutes = minutes
+    self%in_files = path /= ''
+    self%every = merge(every, 0, self%in_files)
+    self%minutes = merge(minutes, 0.0_wp, self%in_files)
     self%keep_newest = keep_newest
     self%written = merge(1, 0, goes_on)
     self%last = wall_time()
@@ -150,14 +156,14 @@ contains
   !> Whether the end of a run is to be kept, so that it can be prolonged: if it has had checkpoints,
   !> or was to have some by steps.
   pure logical function keeps_end(self)
-    class(checkpoint_type), intent(in) :: self
+    class(checkpoint_type), intent(in) :: self  !! the checkpoints of the run
     keeps_end = self%every > 0 .or. self%written > 0
   end function keeps_end
 
   !> Whether a checkpoint is due after so many steps.
   logical function is_due(self, step)
-    class(checkpoint_type), intent(in) :: self
-    integer, intent(in) :: step
+    class(checkpoint_type), intent(in) :: self  !! the checkpoints of the run
+    integer, intent(in) :: step                 !! complete steps (in a relaxation iterations)
 
     is_due = .false.
     ! the instants after a load step has settled have the number of its last iteration
@@ -166,11 +172,13 @@ contains
       & is_due = wall_time() - self%last >= 60*self%minutes
   end function is_due
 
-  !> Write the next one. After an error those before it are as they were.
+  !> Write the next one. An error if it cannot be written or brought to the disk; those before it
+  !> are then as they were.
   subroutine write_checkpoint(self, about, system, error)
-    class(checkpoint_type), intent(inout) :: self
-    type(about_type), intent(inout) :: about
-    type(system_type), intent(inout) :: system
+    class(checkpoint_type), intent(inout) :: self  !! the checkpoints of the run, with one more on
+                                                   !! return
+    type(about_type), intent(inout) :: about       !! what is kept beside the system; unchanged
+    type(system_type), intent(inout) :: system     !! what is to be kept; unchanged
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: ignored
     type(writer_type) :: writer

@@ -16,7 +16,8 @@ contains
 
   !> The first file of earlier results of this stem in `directory`; '' if there is none.
   function existing_results(directory, stem) result(path)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
     character(:), allocatable :: path
 
     path = in_directory(directory, trim(stem)//'.vtkhdf')
@@ -29,7 +30,8 @@ contains
 
   !> Whether earlier results are of a run that never came to its end.
   logical function unfinished(directory, stem)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
     unfinished = file_exists(mark_of(directory, stem))
   end function unfinished
 
@@ -40,11 +42,12 @@ contains
     path = in_directory(directory, trim(stem)//'.unfinished')
   end function mark_of
 
-  !> Fail if earlier results would have to be overwritten and mustn't be. Cheap: meant to be
-  !> called before any long preparation.
+  !> An error if there are earlier results or a checkpoint and they must not be overwritten. Cheap:
+  !> meant to be called before any long preparation.
   subroutine refuse_existing(directory, stem, overwrite, error)
-    character(*), intent(in) :: directory, stem
-    logical, intent(in) :: overwrite
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
+    logical, intent(in) :: overwrite       !! older results may go: never an error
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: path
 
@@ -63,9 +66,10 @@ contains
     end if
   end subroutine refuse_existing
 
-  !> Set the mark of results that aren't complete.
+  !> Make the file that says that the results are not complete. An error if it cannot be written.
   subroutine mark_unfinished(directory, stem, error)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: late
     type(sink_type) :: mark
@@ -78,16 +82,17 @@ contains
     if (.not. allocated(error)) call move_alloc(late, error)
   end subroutine mark_unfinished
 
-  !> Take the mark away.
+  !> Remove the file of `mark_unfinished`: the results are complete.
   subroutine mark_complete(directory, stem)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory  !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem       !! name of the results' files without their endings
     call remove_file(mark_of(directory, stem))
   end subroutine mark_complete
 
-  !> The scene that a results file holds.
+  !> The scene that a results file holds. An error if the file cannot be read or holds none.
   subroutine scene_of_results(path, text, error)
-    character(*), intent(in) :: path
-    character(:), allocatable, intent(out) :: text
+    character(*), intent(in) :: path                !! of a results file (HDF5)
+    character(:), allocatable, intent(out) :: text  !! the resolved scene; '' after an error
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: ignored
     type(hdf5_file) :: file

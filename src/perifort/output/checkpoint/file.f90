@@ -57,17 +57,21 @@ module pd_output_checkpoint_file
 
 contains
 
+  !> Add what name, kind and extents of a value take in a file.
   subroutine measure_description(self, name, kind_name, extents)
-    class(meter_type), intent(inout) :: self
-    character(*), intent(in) :: name, kind_name
-    integer(i8), intent(inout) :: extents(:)
+    class(meter_type), intent(inout) :: self  !! has the size of the head of this value more on
+                                              !! return
+    character(*), intent(in) :: name          !! of the value
+    character(*), intent(in) :: kind_name     !! kind of its elements
+    integer(i8), intent(inout) :: extents(:)  !! (rank) of the value; unchanged
     self%bytes = self%bytes + len(description(name, kind_name)) + 8_i8*(1 + size(extents))
   end subroutine measure_description
 
+  !> Add what the elements of a value take in a file.
   subroutine measure_bytes(self, place, bytes)
-    class(meter_type), intent(inout) :: self
-    type(c_ptr), intent(in) :: place
-    integer(i8), intent(in) :: bytes
+    class(meter_type), intent(inout) :: self  !! has these bytes more on return
+    type(c_ptr), intent(in) :: place          !! not used
+    integer(i8), intent(in) :: bytes          !! length of the value [bytes]
     ! the place is that of a value, and has nothing to be measured
     associate (unused => place)
     end associate
@@ -76,18 +80,20 @@ contains
 
   !> Begin a file of so many bytes, as a meter has found them.
   subroutine create(self, path, bytes)
-    class(writer_type), intent(out) :: self
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: bytes
+    class(writer_type), intent(out) :: self  !! open on return; its `error` is set if the file
+                                             !! cannot be made
+    character(*), intent(in) :: path         !! of the file; one that is there is replaced
+    integer(i8), intent(in) :: bytes         !! length of the whole file [bytes]
 
     call self%sink%open(path, self%error)
     call write_text(self, magic)
     call write_numbers(self, [order, format_version, bytes])
   end subroutine create
 
-  !> Complete the file: when this returns without an error, it is on the disk.
+  !> Complete the file: when this returns without an error, it is on the disk. The error is the
+  !> first one since `create`.
   subroutine finish(self, error)
-    class(writer_type), intent(inout) :: self
+    class(writer_type), intent(inout) :: self  !! with all values written; not open on return
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: late
 
@@ -109,10 +115,13 @@ contains
     text(longest_name:) = newline
   end function description
 
+  !> Write name, kind, rank and extents of a value.
   subroutine write_description(self, name, kind_name, extents)
-    class(writer_type), intent(inout) :: self
-    character(*), intent(in) :: name, kind_name
-    integer(i8), intent(inout) :: extents(:)
+    class(writer_type), intent(inout) :: self  !! open; its `error` is set if the file cannot be
+                                               !! written
+    character(*), intent(in) :: name           !! of the value; with its kind at most 61 characters
+    character(*), intent(in) :: kind_name      !! kind of its elements
+    integer(i8), intent(inout) :: extents(:)   !! (rank) of the value; unchanged
 
     call write_text(self, description(name, kind_name))
     call write_numbers(self, [size(extents, kind=i8), extents])
@@ -130,10 +139,12 @@ contains
     call self%move(c_loc(numbers), 8_i8*size(numbers))
   end subroutine write_numbers
 
+  !> Write the elements of a value, and add them to the checksum.
   subroutine write_bytes(self, place, bytes)
-    class(writer_type), intent(inout) :: self
-    type(c_ptr), intent(in) :: place
-    integer(i8), intent(in) :: bytes
+    class(writer_type), intent(inout) :: self  !! open; its `error` is set if the file cannot be
+                                               !! written
+    type(c_ptr), intent(in) :: place           !! address of the value's first byte
+    integer(i8), intent(in) :: bytes           !! length of the value [bytes]
     integer(i1), pointer, contiguous :: values(:)
 
     if (allocated(self%error)) return
@@ -145,8 +156,9 @@ contains
   !> Open a file and make sure of it: after that, its values can be read one by one. An error says
   !> what is wrong with it: no such file, no checkpoint, of another version, damaged.
   subroutine open_reader(self, path, error)
-    class(reader_type), intent(out) :: self
-    character(*), intent(in) :: path
+    class(reader_type), intent(out) :: self  !! at the first value on return; not open after an
+                                             !! error
+    character(*), intent(in) :: path         !! of the checkpoint
     type(error_type), allocatable, intent(out) :: error
     character(512) :: reason
     integer :: status
@@ -227,10 +239,14 @@ contains
     text = 'the checkpoint '//path//' is damaged: '//why
   end function damaged
 
+  !> Read name, kind, rank and extents of a value, and check them.
   subroutine read_description(self, name, kind_name, extents)
-    class(reader_type), intent(inout) :: self
-    character(*), intent(in) :: name, kind_name
-    integer(i8), intent(inout) :: extents(:)
+    class(reader_type), intent(inout) :: self  !! at the value; its `error` is set if another one
+                                               !! stands there or the file is too short
+    character(*), intent(in) :: name           !! of the value; it must be that in the file
+    character(*), intent(in) :: kind_name      !! kind of its elements; it must be that in the file
+    integer(i8), intent(inout) :: extents(:)   !! (rank) those in the file on return; negative: not
+                                               !! allocated
     character(longest_name) :: found
     integer(i8) :: rank, bytes
     integer :: status, i
@@ -262,10 +278,12 @@ contains
     end do
   end subroutine read_description
 
+  !> Read the elements of a value.
   subroutine read_bytes(self, place, bytes)
-    class(reader_type), intent(inout) :: self
-    type(c_ptr), intent(in) :: place
-    integer(i8), intent(in) :: bytes
+    class(reader_type), intent(inout) :: self  !! behind the value on return; its `error` is set if
+                                               !! it cannot be read
+    type(c_ptr), intent(in) :: place           !! address of the value's first byte
+    integer(i8), intent(in) :: bytes           !! length of the value [bytes]
     integer(i1), pointer, contiguous :: values(:)
     integer :: status
 
@@ -276,8 +294,9 @@ contains
     if (status /= 0) call fail(self%error, 'the checkpoint '//self%path//' cannot be read')
   end subroutine read_bytes
 
+  !> Close the file.
   subroutine close_reader(self)
-    class(reader_type), intent(inout) :: self
+    class(reader_type), intent(inout) :: self  !! open or not; not open on return
     if (self%unit /= -1) close (self%unit)
     self%unit = -1
   end subroutine close_reader

@@ -1,12 +1,12 @@
 !> Going on with a run from a checkpoint: which one, whether it fits the scene, and putting the run
 !> back to where it was.
 module pd_output_checkpoint_restart
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type, fail, internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_motion_keep, only: checksum_of_start, keep_system
-  use pd_set_up_plan, only: plan_type
+  use pd_set_up_plan, only: plan_type, steps_of
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_path, keep_about, older_path
   use pd_output_checkpoint_file, only: reader_type
@@ -14,8 +14,12 @@ module pd_output_checkpoint_restart
     & scene_of_results, unfinished
   use pd_output_results_files, only: file_exists, in_directory
   use pd_scene_content_compare, only: difference_type, scene_differences
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_groups, only: table_of
+  use pd_scene_content_types, only: group_table, scene_type, is_set
   use pd_scene_content_write, only: scene_text
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_groups_group, only: change_harmless, change_of_the_end, change_of_the_files, &
+    & change_refused
   implicit none (type, external)
   private
   public :: restart_type, find_restart, put_back
@@ -31,22 +35,24 @@ module pd_output_checkpoint_restart
     logical :: longer = .false.        !! the end of the run may have changed
   end type restart_type
 
-  ! What may change is named by what it does to the results.
-  integer, parameter :: refused = 0, harmless = 1, of_the_end = 2, of_the_files = 3
-
 contains
 
   !> Find the checkpoint of a run in its folder, or take the one that is named, and compare its
-  !> scene with the present one. `command` starts the run again with `--restart`.
+  !> scene with the present one.
   !>
   !> Where there is no checkpoint, the run starts from the beginning (`found` is false), unless its
   !> results are complete.
+  !>
+  !> An error if the checkpoint cannot be read or is damaged, if the scene has changed in what may
+  !> not change, or if there are results of another scene.
   subroutine find_restart(directory, stem, named, scene, command, restart, error)
-    character(*), intent(in) :: directory, stem
+    character(*), intent(in) :: directory       !! folder of the results; '' for the current one
+    character(*), intent(in) :: stem            !! name of the results' files without their endings
     character(*), intent(in) :: named  !! path of a checkpoint, '' = the run's newest
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: command
-    type(restart_type), intent(out) :: restart
+    type(scene_type), intent(in) :: scene       !! the present one
+    character(*), intent(in) :: command  !! starts the run again with `--restart`, for messages
+    type(restart_type), intent(out) :: restart  !! where to go on, with its file open at the system
+                                                !! if one is found
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: path, newest
 
@@ -150,28 +156,43 @@ contains
     end associate
   end subroutine check_build
 
-  !> What a change of a key means to a run that goes on.
-  pure integer function meaning_of(difference) result(meaning)
+  !> What a change of a key means to a run that goes on: its group knows.
+  integer function meaning_of(difference, table) result(meaning)
     type(difference_type), intent(in) :: difference
+    type(group_table), intent(in) :: table
 
-    meaning = refused
-    select case (difference%group)
-    case ('scene')
-      if (difference%key == 'title') meaning = harmless
-    case ('time')
-      if (difference%key == 'steps' .or. difference%key == 'duration') meaning = of_the_end
-    case ('relaxation')
-      if (difference%key == 'maximum_iterations') meaning = harmless
-    case ('output')
-      meaning = harmless
-      if (any(difference%key == [character(9) :: 'fields', 'precision', 'format'])) &
-        & meaning = of_the_files
-    case ('probe')
-      meaning = of_the_files
-    case default
-      continue
-    end select
+    meaning = change_refused
+    associate (place => table%place_of(difference%group))
+      if (place > 0) meaning = table%entries(place)%fresh%change_of(difference%key)
+    end associate
   end function meaning_of
+
+  !> All that may change: `&time steps, duration; &output`.
+  function changeable(table) result(text)
+    type(group_table), intent(in) :: table
+    character(:), allocatable :: text, keys_of_group
+    type(keys_type) :: keys
+    integer :: g, k
+
+    text = ''
+    do g = 1, table%count
+      associate (entry => table%entries(g))
+        keys_of_group = ''
+        ! a group of which all may change is named alone
+        if (entry%fresh%change_of('') == change_refused) then
+          call table%describe(trim(entry%name), keys)
+          do k = 1, keys%count
+            if (entry%fresh%change_of(keys%known(k)%name) == change_refused) cycle
+            if (len(keys_of_group) > 0) keys_of_group = keys_of_group//','
+            keys_of_group = keys_of_group//' '//keys%known(k)%name
+          end do
+          if (len(keys_of_group) == 0) cycle
+        end if
+        if (len(text) > 0) text = text//'; '
+        text = text//'&'//trim(entry%name)//keys_of_group
+      end associate
+    end do
+  end function changeable
 
   !> Compare the scenes: say what has changed, or refuse.
   subroutine compare(directory, stem, scene, restart, error)
@@ -180,31 +201,34 @@ contains
     type(restart_type), intent(inout) :: restart
     type(error_type), allocatable, intent(out) :: error
     type(difference_type), allocatable :: differences(:)
+    type(group_table) :: table
     character(:), allocatable :: wrong, other_files
     integer :: i
 
+    call table_of(scene, table)
     differences = scene_differences(restart%about%kept%scene_text, scene_text(scene))
     wrong = ''
     other_files = ''
     do i = 1, size(differences)
-      select case (meaning_of(differences(i)))
-      case (refused)
+      select case (meaning_of(differences(i), table))
+      case (change_refused)
         wrong = wrong//newline//'  '//differences(i)%text
         cycle
-      case (of_the_end)
+      case (change_of_the_end)
         restart%longer = .true.
-      case (of_the_files)
+      case (change_of_the_files)
         other_files = other_files//newline//'  '//differences(i)%text
-      case default
+      case (change_harmless)
         continue
+      case default
+        call internal_fault('compare does not know what a change means')
       end select
       restart%note = restart%note//newline//'  changed         '//differences(i)%text
     end do
     if (wrong /= '') then
       call fail(error, 'the scene has changed since the checkpoint was written:'//wrong//newline// &
-        & '  may change: &time steps, duration; &relaxation maximum_iterations; &output; '// &
-        & '&probe; title'//newline//'  --overwrite without --restart computes the new scene '// &
-        & 'from the beginning')
+        & '  may change: '//changeable(table)//newline//'  --overwrite without --restart '// &
+        & 'computes the new scene from the beginning')
     else if (other_files /= '' .and. existing_results(directory, stem) /= '') then
       call fail(error, 'the results that are there have another form than the scene asks for:'// &
         & other_files//newline//'  with this checkpoint named and --output, the run goes on '// &
@@ -214,12 +238,16 @@ contains
   end subroutine compare
 
   !> Put a system that was made from the scene back to where the checkpoint stands, and let the plan
-  !> go on with its time step.
+  !> go on with its time step. An error if the points or the initial state are others, if the
+  !> checkpoint is beyond the end of the run, or if it does not hold what the system needs.
   subroutine put_back(restart, scene, system, plan, error)
-    type(restart_type), intent(inout) :: restart
-    type(scene_type), intent(in) :: scene
-    type(system_type), intent(inout) :: system
-    type(plan_type), intent(inout) :: plan
+    type(restart_type), intent(inout) :: restart  !! with the checkpoint's file open; closed on
+                                                  !! return
+    type(scene_type), intent(in) :: scene         !! the present one, for its duration
+    type(system_type), intent(inout) :: system    !! as it was made from the scene; as in the
+                                                  !! checkpoint on return
+    type(plan_type), intent(inout) :: plan        !! gets time step and number of steps, unless it
+                                                  !! is a relaxation
     type(error_type), allocatable, intent(out) :: error
 
     if (checksum_of_start(system) /= restart%about%start) then
@@ -228,7 +256,7 @@ contains
     else if (.not. plan%relaxes) then
       plan%step = restart%about%dt
       if (is_set(scene%time%duration)) &
-        & plan%steps = max(1, ceiling(scene%time%duration/plan%step*(1 - 1.0e-12_wp)))
+        & plan%steps = steps_of(scene%time%duration, plan%step)
       if (plan%steps < restart%about%step) call fail(error, 'the checkpoint is of step '// &
         & to_text(restart%about%step)//', beyond the '//to_text(plan%steps)//' of the scene')
       restart%complete = plan%steps == restart%about%step .and. restart%about%finished

@@ -4,43 +4,46 @@ module pd_output_report_begin
   use pd_base_clock, only: output_is_terminal
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_text, only: to_text
   use pd_base_version, only: program_version
-  use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: scene_type
   use pd_scene_content_write, only: scene_text
   use pd_body_body, only: body_type, gather
   use pd_set_up_conditions, only: region_mask
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_motion_explicit_time_step, only: evaluations
   use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about
-  use pd_output_report_recorder, only: recorder_type, schedule_type, field_of, check_fields, &
-    & history_columns, planned_outputs, planned_rows
+  use pd_output_fields_table, only: all_fields, field_table_type
+  use pd_output_report_columns, only: history_columns, history_table
+  use pd_output_report_recorder, only: recorder_type
+  use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of
   use pd_output_checkpoint_restart, only: restart_type
   use pd_output_results_types, only: kept_type
   implicit none (type, external)
   private
-  public :: run_options_type, open_recorder, keep_checkpoints, schedule_of, check_schedule, &
-    & history_interval, output_directory, stem_of, command_of, text_of
+  public :: run_options_type, open_recorder, keep_checkpoints, output_directory, stem_of, &
+    & command_of, text_of, fields_of
 
-  !> How to run, from the command line.
+  !> How to run, from the command line or from a program that uses the library.
   type :: run_options_type
+    logical :: files = .true.                      !! .false.: nothing is written to the disk
     character(:), allocatable :: output_directory  !! '' = out/<stem of the scene file>
     character(:), allocatable :: command           !! as typed, kept in the results
     integer :: threads = 0                         !! 0 = as many as OpenMP offers
-    logical :: overwrite = .false.
+    logical :: overwrite = .false.                 !! replace results that are there
     logical :: restart = .false.                   !! go on from a checkpoint, if there is one
     character(:), allocatable :: checkpoint        !! its path; '' = the newest of the run
     real(wp) :: max_minutes = 0.0_wp               !! of wall time, then stop in order; 0 = no limit
     character(:), allocatable :: restart_command   !! goes on with the run, for messages
-    logical :: quiet = .false.
+    logical :: quiet = .false.                     !! print nothing
+    type(field_table_type), allocatable :: fields  !! that scenes may name; none = `all_fields`
   end type run_options_type
 
 contains
 
-  !> Files, history and progress of a run, whose probes the recorder has.
-  subroutine open_recorder(scene, options, system, plan, directory, stem, restart, recorder, error)
+  !> Files, history and progress of a run, whose probes the recorder has. With `in_memory` the last
+  !> output stays in memory, too.
+  subroutine open_recorder(scene, options, system, plan, directory, stem, restart, recorder, &
+    & in_memory, error)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(system_type), intent(in) :: system
@@ -48,36 +51,36 @@ contains
     character(*), intent(in) :: directory, stem
     type(restart_type), intent(in) :: restart
     type(recorder_type), intent(inout) :: recorder
+    logical, intent(in) :: in_memory
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: positions(:, :)
     type(kept_type), allocatable :: kept
+    type(field_table_type) :: table
     character(:), allocatable :: command
     integer :: f, c
 
     if (restart%found) kept = restart%about%kept
     associate (body => system%body, schedule => recorder%schedule)
       schedule = schedule_of(scene, plan, system%family%n_bonds)
+      recorder%columns = history_table(plan%relaxes)
+      table = fields_of(options)
       allocate (recorder%fields(size(scene%output%fields)))
       do f = 1, size(recorder%fields)
-        recorder%fields(f) = field_of(trim(scene%output%fields(f)))
+        recorder%fields(f) = table%field(trim(scene%output%fields(f)))
       end do
-      call check_fields(recorder%fields, error)
-      do f = 1, size(recorder%probes)
-        if (allocated(error)) return
-        call check_fields(recorder%probes(f)%fields, error)
-      end do
-      if (allocated(error)) return
       allocate (positions(body%n_points, 3), source=0.0_wp)
       do c = 1, body%dim
         call gather(body, body%x(:, c), positions(:, c))
       end do
       command = text_of(options%command)
-      call recorder%results%create(directory, stem, positions, recorder%fields, &
+      call recorder%results%create(directory, stem, positions, &
+        & [(recorder%fields(f)%in_file(body%dim), f=1, size(recorder%fields))], &
         & planned_outputs(schedule, plan%step), &
         & history_columns(system, recorder%probes, plan%relaxes), planned_rows(schedule), &
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
         & program_version, options%overwrite .or. options%restart, error, kept)
       if (allocated(error)) return
+      if (in_memory) call recorder%results%keep_outputs(positions)
       if (.not. recorder%results%goes_on()) call put_points(scene, body, recorder, error)
       if (allocated(error)) return
       call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet, &
@@ -86,84 +89,15 @@ contains
     end associate
   end subroutine open_recorder
 
-  !> When a scene's run writes; `bonds` are the ordered pairs of its families.
-  pure type(schedule_type) function schedule_of(scene, plan, bonds) result(schedule)
-    type(scene_type), intent(in) :: scene
-    type(plan_type), intent(in) :: plan
-    integer(i8), intent(in) :: bonds
-
-    schedule%relaxation = plan%relaxes
-    schedule%steps = plan%steps
-    schedule%every = scene%output%every
-    if (is_set(scene%output%interval)) schedule%interval = scene%output%interval
-    if (schedule%every == 0) schedule%every = merge(1, max(1, plan%steps/10), plan%relaxes)
-    schedule%history_every = history_interval(scene, plan, bonds)
-    schedule%tolerance = plan%relaxation%tolerance
-  end function schedule_of
-
-  !> An error if a run would write more outputs, or rows of its history, than anybody can look at:
-  !> the results have room for all of them from the beginning.
-  subroutine check_schedule(scene, plan, bonds, error)
-    type(scene_type), intent(in) :: scene
-    type(plan_type), intent(in) :: plan
-    integer(i8), intent(in) :: bonds     !! ordered pairs of the families
-    type(error_type), allocatable, intent(out) :: error
-    integer, parameter :: most_outputs = 1000000, most_rows = 10000000
-    type(schedule_type) :: schedule
-    real(wp) :: duration
-
-    schedule = schedule_of(scene, plan, bonds)
-    if (schedule%interval > 0.0_wp) then
-      duration = schedule%steps*plan%step
-      if (min(duration/schedule%interval, real(schedule%steps, wp)) > most_outputs) &
-        & call scene_fault(error, scene, 'output', 1, 'interval', &
-        & 'the run would write more than '//to_text(most_outputs)//' outputs', &
-        & 'allowed: interval = '//to_text(duration/most_outputs, 3))
-    else if (schedule%steps/schedule%every > most_outputs) then
-      call scene_fault(error, scene, 'output', 1, 'every', 'the run would write '// &
-        & to_text(schedule%steps/schedule%every)//' outputs', 'at most '//to_text(most_outputs)// &
-        & ' are allowed: every = '//to_text(schedule%steps/most_outputs + 1))
-    end if
-    if (allocated(error) .or. schedule%relaxation) return
-    if (schedule%steps/schedule%history_every > most_rows) call scene_fault(error, scene, &
-      & 'output', 1, 'history_every', 'the history would have '// &
-      & to_text(schedule%steps/schedule%history_every)//' rows', 'at most '//to_text(most_rows)// &
-      & ' are allowed: history_every = '//to_text(schedule%steps/most_rows + 1))
-  end subroutine check_schedule
-
-  !> Steps between rows of the history; in relaxation, whose history has a row for each load step,
-  !> iterations between lines of `iterations.csv` (`iteration_due` adds those that meet the
-  !> tolerance). Without the user's word there are
-  !> at most about 2000, and so few that they take a twentieth of the time of the steps at most: for
-  !> the strain energy, a row takes 1.4 to 2 evaluations of the forces over all `bonds` (ordered
-  !> pairs). Rows that cost next to nothing, those of small bodies, may be more. The number follows
-  !> from the scene alone and not from a clock, so that every run of it has the same rows.
-  pure integer function history_interval(scene, plan, bonds) result(every)
-    type(scene_type), intent(in) :: scene
-    type(plan_type), intent(in) :: plan
-    integer(i8), intent(in) :: bonds
-    real(wp), parameter :: row = 2.5_wp           ! evaluations of the forces that a row takes
-    real(wp), parameter :: share = 0.05_wp        ! of the time of the steps
-    real(wp), parameter :: no_cost = 5.0e6_wp     ! bonds of all rows: some 0.02 s on one thread
-    real(wp) :: affordable, free
-
-    every = scene%output%history_every
-    if (every > 0) return
-    if (plan%relaxes) then
-      every = 1
-    else
-      affordable = row/(share*evaluations(plan%integrator))
-      free = real(plan%steps, wp)*bonds/no_cost
-      every = max(1, plan%steps/2000, ceiling(min(affordable, free)))
-    end if
-  end function history_interval
-
-  !> The folder of the results: the one asked for, or out/ and the scene file's name.
+  !> The folder of the results: the one asked for, or out/ and the scene file's name; '' if nothing
+  !> is to be written.
   pure function output_directory(scene, options) result(directory)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     character(:), allocatable :: directory
 
+    directory = ''
+    if (.not. options%files) return
     directory = 'out/'//stem_of(scene)
     if (.not. allocated(options%output_directory)) return
     if (options%output_directory /= '') directory = options%output_directory
@@ -179,12 +113,16 @@ contains
     character(*), intent(in) :: directory, stem
     type(restart_type), intent(in) :: restart
     type(recorder_type), intent(inout) :: recorder
+    character(:), allocatable :: path
 
     recorder%about = new_about(scene_text(scene), start, plan%steps, plan%step)
-    recorder%command = command_of(options)
+    recorder%command = ''
+    if (directory /= '') recorder%command = command_of(options)
     recorder%quiet = options%quiet
     recorder%most_seconds = 60*options%max_minutes
-    call recorder%checkpoint%start(checkpoint_path(directory, stem), &
+    path = ''
+    if (directory /= '') path = checkpoint_path(directory, stem)
+    call recorder%checkpoint%start(path, &
       & scene%output%checkpoint_every, scene%output%checkpoint_minutes, goes_on=restart%found, &
       & keep_newest=restart%newest)
     if (.not. restart%found) return
@@ -193,9 +131,9 @@ contains
     recorder%time = restart%about%time
     recorder%rows = size(restart%about%kept%rows, 2)
     recorder%outputs = size(restart%about%kept%times)
-    recorder%supply = restart%about%supply
-    recorder%energies%kinetic = restart%about%kinetic
-    recorder%energies%strain = restart%about%strain
+    recorder%balance%supply = restart%about%supply
+    recorder%balance%energies%kinetic = restart%about%kinetic
+    recorder%balance%energies%strain = restart%about%strain
     recorder%warnings = restart%about%warnings
   end subroutine keep_checkpoints
 
@@ -222,6 +160,17 @@ contains
     text = 'the same with --restart'
     if (allocated(options%restart_command)) text = options%restart_command
   end function command_of
+
+  !> The table of fields that scenes may name.
+  type(field_table_type) function fields_of(options) result(table)
+    type(run_options_type), intent(in) :: options
+
+    if (allocated(options%fields)) then
+      table = options%fields
+    else
+      table = all_fields()
+    end if
+  end function fields_of
 
   !> A text that may be missing.
   pure function text_of(text) result(known)

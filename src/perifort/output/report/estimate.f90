@@ -13,9 +13,11 @@ module pd_output_report_estimate
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
   use pd_output_report_contact, only: touching_points
-  use pd_output_report_recorder, only: field_of, planned_outputs, planned_rows, schedule_type
-  use pd_output_report_strain, only: find_large_strains
+  use pd_output_fields_field, only: output_field_type
+  use pd_output_fields_table, only: field_table_type
   use pd_output_results_types, only: field_type
+  use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_type
+  use pd_output_report_strain, only: find_large_strains
   implicit none (type, external)
   private
   public :: estimate
@@ -38,8 +40,9 @@ contains
 
   !> Predict the time of a run from its first steps; the system is used up. Each line of `text` ends
   !> with a newline.
-  subroutine estimate(scene, system, plan, schedule, set_up, text)
+  subroutine estimate(scene, table, system, plan, schedule, set_up, text)
     type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
     type(system_type), intent(inout) :: system
     type(plan_type), intent(in) :: plan
     type(schedule_type), intent(in) :: schedule
@@ -73,7 +76,7 @@ contains
     slow = watch%seconds(order((3*n + 3)/4))
     call time_row(system, row)
     call time_output(system, output)
-    bytes = bytes_of_output(scene, system)
+    bytes = bytes_of_output(scene, table, system)
     if (plan%relaxes) then
       text = line('run time', 'depends on the number of iterations, which is not known before')// &
         & line('an iteration', with_unit(step, 's', 3)//' (measured)')
@@ -156,16 +159,19 @@ contains
   end subroutine time_output
 
   !> Bytes of one output.
-  pure real(wp) function bytes_of_output(scene, system) result(bytes)
+  pure real(wp) function bytes_of_output(scene, table, system) result(bytes)
     type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table
     type(system_type), intent(in) :: system
-    type(field_type) :: field
+    type(output_field_type) :: field
+    type(field_type) :: entry
     integer :: f
 
     bytes = 0.0_wp
     do f = 1, size(scene%output%fields)
-      field = field_of(trim(scene%output%fields(f)))
-      bytes = bytes + field%components*real(system%body%n_points, wp) &
+      field = table%field(trim(scene%output%fields(f)))
+      entry = field%in_file(system%body%dim)
+      bytes = bytes + entry%components*real(system%body%n_points, wp) &
         & *merge(4, 8, scene%output%precision == 'single')
     end do
     if (scene%output%format == 'both') bytes = 2*bytes

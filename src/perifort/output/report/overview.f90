@@ -2,6 +2,7 @@
 !> for each material, how many points each group of the scene acts on, and how long the horizon is
 !> beside bodies and cracks.
 module pd_output_report_overview
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
   use pd_scene_content_types, only: scene_type
@@ -9,6 +10,7 @@ module pd_output_report_overview
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_set_up_conditions, only: no_fail_mask, region_mask
+  use pd_motion_conditions, only: load_of, load_type, number_of_loads
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -49,8 +51,10 @@ contains
       case (2)
         text = line('P wave', with_unit(longitudinal_speed(m), 'm/s', 4)//', plane '// &
           & trim(scene%header%plane))
-      case default
+      case (3)
         text = line('P wave', with_unit(longitudinal_speed(m), 'm/s', 4))
+      case default
+        call internal_fault('material_lines knows one to three dimensions')
       end select
       if (scene%header%dimension > 1) text = text// &
         & line('S wave', with_unit(shear_speed(m), 'm/s', 4))// &
@@ -98,7 +102,7 @@ contains
   !> Points of each region, boundary, load and no-fail zone.
   function counts(scene, system) result(text)
     type(scene_type), intent(in) :: scene
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in), target :: system
     character(:), allocatable :: text
     integer :: i
 
@@ -113,9 +117,9 @@ contains
           & system%motions(i)%slots), 'point')//', '//place(group%side, group%region))
       end associate
     end do
-    do i = 1, size(system%loads)
+    do i = 1, number_of_loads(system%terms)
       associate (group => scene%loads(i))
-        text = text//line('load '//to_text(i), counted(size(system%loads(i)%slots), &
+        text = text//line('load '//to_text(i), counted(points_of_load(i), &
           & 'point')//', '//place(group%side, group%region))
       end associate
     end do
@@ -123,6 +127,16 @@ contains
       text = text//line('no-fail zone '//to_text(i), &
         & counted(count(no_fail_mask(scene, system%body, i)), 'point'))
     end do
+
+  contains
+
+    !> On how many points the `l`-th load acts.
+    integer function points_of_load(l) result(points)
+      integer, intent(in) :: l
+      type(load_type), pointer :: load
+      load => load_of(system%terms, l)
+      points = size(load%slots)
+    end function points_of_load
   end function counts
 
   !> A name before what is told of it.

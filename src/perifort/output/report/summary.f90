@@ -1,18 +1,20 @@
-!> What the user reads on the terminal: what will be computed and why so, and what it came to.
+!> What the user reads on the terminal before a run: what will be computed and why so.
 module pd_output_report_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
+  use pd_base_error, only: internal_fault
   use pd_base_reduce, only: largest_over
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_scene_content_types, only: scene_type
   use pd_family_lattice, only: lattice_family_type
+  use pd_family_list, only: list_family_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_output_report_recorder, only: recorder_type, probe_type
+  use pd_output_report_probes, only: probe_type
   implicit none (type, external)
   private
-  public :: summary_before, summary_after, checkpoint_line, memory_of
+  public :: summary_before, checkpoint_line, memory_of
 
 contains
 
@@ -32,6 +34,8 @@ contains
 
     text = ''
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
+    if (scene%header%defaults /= '') &
+      & text = text//line('defaults', 'those of version '//trim(scene%header%defaults))
     text = text//line('points', to_text(system%body%n_points)//' in '// &
       & to_text(scene%header%dimension)//'D')
     text = text//line('horizon', with_unit(system%family%rule%delta, 'm')//', '// &
@@ -44,7 +48,7 @@ contains
       & text = text//line('cracks', to_text(size(scene%cracks))//', which cut the bonds of '// &
       & to_text(cut)//' pairs')
     text = text//line('memory', with_unit(real(memory_of(system), wp), 'B', 3))
-    text = text//forces(scene, system)
+    text = text//forces(scene, system)//terms_of(system)
     text = text//line('threads', to_text(threads))
     if (plan%relaxes) then
       text = text//statics(scene, plan)
@@ -145,6 +149,21 @@ contains
     end associate
   end function forces
 
+  !> A line for each term of the force that tells of itself.
+  function terms_of(system) result(text)
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text, lines
+    integer :: end_of_line
+
+    text = ''
+    lines = system%terms%describe()
+    do while (len(lines) > 0)
+      end_of_line = index(lines, newline)
+      text = text//line('force term', lines(:end_of_line - 1))
+      lines = lines(end_of_line + 1:)
+    end do
+  end function terms_of
+
   !> The precision of the bonds, and why it is not the one that was asked for.
   function precision_of(scene, system) result(text)
     type(scene_type), intent(in) :: scene
@@ -155,8 +174,10 @@ contains
     select type (family => system%family)
     type is (lattice_family_type)
       if (family%mixed) text = 'mixed: bonds in single precision, state in double'
-    class default  ! others have double precision alone
+    type is (list_family_type)  ! in double precision alone
       continue
+    class default
+      call internal_fault('precision_of does not know a kind of family')
     end select
     if (text /= 'double' .or. scene%header%precision /= 'mixed') return
     text = text//': mixed precision is not available for '
@@ -192,49 +213,6 @@ contains
     if (text == '') text = 'only when the run is interrupted'
     text = '  checkpoints     '//with_unit(real(bytes, wp), 'B', 3)//', the last two kept, '//text
   end function checkpoint_line
-
-  !> What the run came to: time per phase, speed, energies, damage, where the results are.
-  function summary_after(system, recorder, directory) result(text)
-    type(system_type), intent(in) :: system
-    type(recorder_type), intent(in) :: recorder
-    character(*), intent(in) :: directory
-    character(:), allocatable :: text, parts
-    real(wp) :: balance, share
-    integer :: steps
-
-    text = recorder%timer%table()//newline
-    steps = recorder%steps_done - recorder%first_step
-    if (steps > 0) text = text//line('speed', &
-      & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
-      & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
-      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
-      & trim(merge(' iterations/s', ' steps/s     ', recorder%schedule%relaxation)))
-    if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
-    if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
-      & 'load step')//' left to dynamic relaxation by the conjugate gradient')
-    associate (now => recorder%energies)
-      text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
-      text = text//line('strain energy', with_unit(now%strain, 'J'))
-      if (system%model%breaking) then
-        text = text//line('dissipated', with_unit(system%dissipated, 'J'))
-        text = text//line('broken bonds', to_text(system%broken)//' pairs of points')
-        text = text//line('greatest damage', to_text(largest_over(system%body%order, &
-          & system%state%damage), 3))
-      end if
-      text = text//line('external work', with_unit(system%external_work, 'J'))
-      call recorder%energy_balance(system, balance, share)
-      if (share >= 0.0_wp) then
-        parts = to_text(100*share, 2)//' % of the greater of the energy supplied and the '// &
-          & 'energy present'
-        if (abs(system%dissipated) > 0.0_wp) parts = parts//', '// &
-          & to_text(100*abs(balance/system%dissipated), 2)//' % of the dissipated energy'
-        text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '//parts)
-      end if
-    end associate
-    if (recorder%warnings%count() > 0) text = text//line('warnings', &
-      & to_text(recorder%warnings%count())//', kept in warnings.txt')
-    text = text//line('results', directory)
-  end function summary_after
 
   !> Memory of points and families [bytes].
   pure integer(i8) function memory_of(system) result(bytes)

@@ -13,7 +13,7 @@ module pd_output_report_warnings
   use pd_set_up_conditions, only: no_fail_mask, region_mask
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_output_report_recorder, only: probe_type
+  use pd_output_report_probes, only: probe_type
   implicit none (type, external)
   private
   public :: warn_before, note_before

@@ -23,17 +23,19 @@ contains
 
   !> The longest text that `put` makes of so many bytes, or `finish` of none.
   pure integer function base64_length(bytes)
-    integer, intent(in) :: bytes
+    integer, intent(in) :: bytes  !! how many are given to `put`
     base64_length = 4*((bytes + 2)/3 + 1)
   end function base64_length
 
   !> Encode `bytes` into `text(:length)`; up to two bytes are kept for the next call.
   !> `text` has at least `base64_length(size(bytes))` characters.
   subroutine put(self, bytes, text, length)
-    class(base64_encoder), intent(inout) :: self
-    integer(i1), contiguous, intent(in) :: bytes(:)
-    character(:), allocatable, intent(inout) :: text
-    integer, intent(out) :: length
+    class(base64_encoder), intent(inout) :: self      !! the encoder, with up to two bytes of its
+                                                      !! run that wait
+    integer(i1), contiguous, intent(in) :: bytes(:)   !! (any length), the next ones of the run
+    character(:), allocatable, intent(inout) :: text  !! room for the letters; the first `length`
+                                                      !! are set
+    integer, intent(out) :: length                    !! letters made: a multiple of 4
     integer :: i, first, bits
 
     if (.not. allocated(self%pairs)) call make_pairs(self)
@@ -65,9 +67,11 @@ contains
 
   !> Encode what is left into `text(:length)`, padded with `=`, and be ready for another run.
   subroutine finish(self, text, length)
-    class(base64_encoder), intent(inout) :: self
-    character(:), allocatable, intent(inout) :: text
-    integer, intent(out) :: length
+    class(base64_encoder), intent(inout) :: self      !! the encoder, with up to two bytes of its
+                                                      !! run that wait
+    character(:), allocatable, intent(inout) :: text  !! room for 4 letters; the first `length` are
+                                                      !! set
+    integer, intent(out) :: length                    !! letters made: 0 or 4
     integer :: bits
 
     length = 0

@@ -2,6 +2,9 @@
 !>
 !> Arrays of several components are `values(component, row)` in memory and (row, component) for
 !> readers in C's order. Rows count from 0.
+!>
+!> An error is set if HDF5 fails (no such dataset, a name that is taken, a write that the system
+!> refuses): it names the file and HDF5's reason.
 module pd_output_results_datasets
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t, c_loc, c_ptr
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5P_DATASET_CREATE_F, &
@@ -12,7 +15,7 @@ module pd_output_results_datasets
     & h5pget_chunk_f, h5pset_chunk_f, h5pset_fill_time_f, h5sclose_f, h5screate_simple_f, &
     & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, &
     & hsize_t
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type, fail, internal_fault
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_output_results_hdf5, only: explain, hdf5_file
   implicit none (type, external)
@@ -67,18 +70,23 @@ contains
       storage_id = H5T_STD_I64LE
     case (storage_i4)
       storage_id = H5T_STD_I32LE
-    case default
+    case (storage_i1)
       storage_id = H5T_STD_I8LE
+    case default
+      storage_id = -1
+      call internal_fault('storage_id does not know a kind of number')
     end select
   end function storage_id
 
   !> Make a dataset of fixed size: `rows`, or `rows` x `components` if that is above 1.
   !> Its place in the file is set aside at once; its values are undefined until written.
   subroutine make_dataset(file, path, storage, components, rows, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer, intent(in) :: storage, components
-    integer(i8), intent(in) :: rows
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer, intent(in) :: storage       !! kind of its numbers: `storage_f8`, `storage_f4`,
+                                         !! `storage_i8`, ...
+    integer, intent(in) :: components    !! numbers in a row
+    integer(i8), intent(in) :: rows      !! their number, for good
     type(error_type), allocatable, intent(out) :: error
 
     call make_any(file, path, storage, components, rows, 0_i8, error)
@@ -88,10 +96,13 @@ contains
   !> The blocks of its first `rows` are set aside at once and not filled, so that
   !> writing them later changes none of the file's own records.
   subroutine make_series(file, path, storage, components, rows, chunk, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer, intent(in) :: storage, components
-    integer(i8), intent(in) :: rows, chunk
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer, intent(in) :: storage       !! kind of its numbers: `storage_f8`, `storage_f4`,
+                                         !! `storage_i8`, ...
+    integer, intent(in) :: components    !! numbers in a row
+    integer(i8), intent(in) :: rows      !! their number to begin with
+    integer(i8), intent(in) :: chunk     !! rows of a block; less than 1 is taken as 1
     type(error_type), allocatable, intent(out) :: error
 
     call make_any(file, path, storage, components, rows, max(1_i8, chunk), error)
@@ -141,10 +152,11 @@ contains
 
   !> Change the number of rows of a series.
   subroutine set_rows(file, path, components, rows, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer, intent(in) :: components
-    integer(i8), intent(in) :: rows
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer, intent(in) :: components    !! numbers in a row
+    integer(i8), intent(in) :: rows      !! their new number; those beyond it are lost, new ones are
+                                         !! undefined
     type(error_type), allocatable, intent(out) :: error
     integer(hid_t) :: dataset
     integer :: status, ignored
@@ -165,10 +177,10 @@ contains
 
   !> The shape of a dataset: `rows`, and `components` (1 if it has one dimension).
   subroutine get_shape(file, path, components, rows, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer, intent(out) :: components
-    integer(i8), intent(out) :: rows
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer, intent(out) :: components   !! numbers in a row
+    integer(i8), intent(out) :: rows     !! their number
     type(error_type), allocatable, intent(out) :: error
     integer(hid_t) :: dataset, space
     integer(hsize_t) :: extent(2), most(2)
@@ -192,11 +204,11 @@ contains
     call h5dclose_f(dataset, ignored)
   end subroutine get_shape
 
-  !> Rows of a chunk of a series of one component.
+  !> Rows of a chunk of a series of one component. An error if there is none or it has no chunks.
   subroutine get_chunk(file, path, rows, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(out) :: rows
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(out) :: rows     !! of a chunk
     type(error_type), allocatable, intent(out) :: error
     integer(hid_t) :: dataset, properties
     integer(hsize_t) :: extent(1)
@@ -268,10 +280,11 @@ contains
       & call fail(error, 'cannot select rows of '//path//' in '//file%name)
   end subroutine move_rows
 
+  !> A vector of reals as a dataset.
   subroutine put_array_real(file, path, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    real(wp), contiguous, target, intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    real(wp), contiguous, target, intent(in) :: values(:)  !! (rows), kept as 64-bit reals
     type(error_type), allocatable, intent(out) :: error
 
     call make_dataset(file, path, storage_f8, 1, size(values, kind=i8), error)
@@ -280,10 +293,11 @@ contains
       & error)
   end subroutine put_array_real
 
+  !> A vector of 8-bit integers as a dataset.
   subroutine put_array_i1(file, path, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i1), contiguous, target, intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i1), contiguous, target, intent(in) :: values(:)  !! (rows), kept as 8-bit integers
     type(error_type), allocatable, intent(out) :: error
 
     call make_dataset(file, path, storage_i1, 1, size(values, kind=i8), error)
@@ -292,10 +306,11 @@ contains
       & error)
   end subroutine put_array_i1
 
+  !> A vector of 32-bit integers as a dataset.
   subroutine put_array_i4(file, path, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i4), contiguous, target, intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i4), contiguous, target, intent(in) :: values(:)  !! (rows), kept as 32-bit integers
     type(error_type), allocatable, intent(out) :: error
 
     call make_dataset(file, path, storage_i4, 1, size(values, kind=i8), error)
@@ -304,10 +319,11 @@ contains
       & error)
   end subroutine put_array_i4
 
+  !> A vector of 64-bit integers as a dataset.
   subroutine put_array_i8(file, path, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), contiguous, target, intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), contiguous, target, intent(in) :: values(:)  !! (rows), kept as 64-bit integers
     type(error_type), allocatable, intent(out) :: error
 
     call make_dataset(file, path, storage_i8, 1, size(values, kind=i8), error)
@@ -316,11 +332,12 @@ contains
       & error)
   end subroutine put_array_i8
 
+  !> Write rows of one 64-bit real each.
   subroutine write_rows_real(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
-    real(wp), contiguous, target, intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
+    real(wp), contiguous, target, intent(in) :: values(:)  !! (rows), as many as are to be written
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -328,11 +345,12 @@ contains
       & c_loc(values), .true., error)
   end subroutine write_rows_real
 
+  !> Write rows of one 32-bit real each.
   subroutine write_rows_single(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
-    real(sp), contiguous, target, intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
+    real(sp), contiguous, target, intent(in) :: values(:)  !! (rows), as many as are to be written
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -340,11 +358,13 @@ contains
       & c_loc(values), .true., error)
   end subroutine write_rows_single
 
+  !> Write rows of one 64-bit integer each.
   subroutine write_rows_i8(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
     integer(i8), contiguous, target, intent(in) :: values(:)
+      !! (rows), as many as are to be written
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -352,11 +372,13 @@ contains
       & c_loc(values), .true., error)
   end subroutine write_rows_i8
 
+  !> Write rows of several 64-bit reals each.
   subroutine write_table_real(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first column of `values`, from 0
     real(wp), contiguous, target, intent(in) :: values(:, :)
+      !! (component, row), as many rows as are to be written
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -364,11 +386,13 @@ contains
       & c_loc(values), .true., error)
   end subroutine write_table_real
 
+  !> Write rows of several 32-bit reals each.
   subroutine write_table_single(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first column of `values`, from 0
     real(sp), contiguous, target, intent(in) :: values(:, :)
+      !! (component, row), as many rows as are to be written
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -376,11 +400,13 @@ contains
       & c_loc(values), .true., error)
   end subroutine write_table_single
 
+  !> Write rows of several 64-bit integers each.
   subroutine write_table_i8(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first column of `values`, from 0
     integer(i8), contiguous, target, intent(in) :: values(:, :)
+      !! (component, row), as many rows as are to be written
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -388,11 +414,12 @@ contains
       & c_loc(values), .true., error)
   end subroutine write_table_i8
 
+  !> Read rows of one real each; single precision in the file is widened.
   subroutine read_rows_real(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
-    real(wp), contiguous, target, intent(out) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
+    real(wp), contiguous, target, intent(out) :: values(:)  !! (rows), as many as are to be read
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -400,11 +427,12 @@ contains
       & c_loc(values), .false., error)
   end subroutine read_rows_real
 
+  !> Read rows of one integer each.
   subroutine read_rows_i8(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
-    integer(i8), contiguous, target, intent(out) :: values(:)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
+    integer(i8), contiguous, target, intent(out) :: values(:)  !! (rows), as many as are to be read
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return
@@ -412,11 +440,13 @@ contains
       & c_loc(values), .false., error)
   end subroutine read_rows_i8
 
+  !> Read rows of several reals each; single precision in the file is widened.
   subroutine read_table_real(file, path, first, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: first
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first column of `values`, from 0
     real(wp), contiguous, target, intent(out) :: values(:, :)
+      !! (component, row), as many rows as are to be read
     type(error_type), allocatable, intent(out) :: error
 
     if (size(values) == 0) return

@@ -10,12 +10,15 @@ module pd_output_results_description
 
 contains
 
-  !> Whether names, shapes and words are usable.
+  !> An error if there is no point, if positions do not have three components, if precision or
+  !> format are unknown, if a name is unusable or taken twice, or if a field has neither 1 nor 3
+  !> components.
   subroutine check_description(positions, fields, columns, precision, format, error)
-    real(wp), intent(in) :: positions(:, :)
-    type(field_type), intent(in) :: fields(:)
-    type(column_type), intent(in) :: columns(:)
-    character(*), intent(in) :: precision, format
+    real(wp), intent(in) :: positions(:, :)      !! (n_points, 3) [m]
+    type(field_type), intent(in) :: fields(:)    !! (any number) of every output
+    type(column_type), intent(in) :: columns(:)  !! (any number) of the history
+    character(*), intent(in) :: precision        !! of the fields: 'single' or 'double', in any case
+    character(*), intent(in) :: format  !! of the files: 'vtkhdf', 'vtu' or 'both', in any case
     type(error_type), allocatable, intent(out) :: error
     character(label_length), allocatable :: names(:)
     integer :: i
@@ -34,8 +37,8 @@ contains
       if (allocated(error)) return
       names(i) = fields(i)%name
       call check_name(names(i), names(:i - 1), error)
-      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3])) &
-        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1 nor 3 components')
+      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3, 6])) &
+        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1, 3 nor 6 components')
     end do
     do i = 1, size(columns)
       if (allocated(error)) return

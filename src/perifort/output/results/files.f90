@@ -74,7 +74,7 @@ contains
   !> Make a folder and the folders above it; those that are there are left alone.
   !> Fails with the path and the system's reason.
   subroutine make_directory(path, error)
-    character(*), intent(in) :: path
+    character(*), intent(in) :: path  !! of the folder; '' for the current one
     type(error_type), allocatable, intent(out) :: error
     integer(c_int), parameter :: everyone = int(o'777', c_int)
     integer :: i
@@ -106,19 +106,21 @@ contains
     if (index(reason, ': ', back=.true.) > 0) reason = reason(index(reason, ': ', back=.true.) + 2:)
   end function reason_for
 
-  !> Put the file `from` in the place of `to` in one step: whoever opens `to` sees either the old
-  !> or the new file, whole.
+  !> Put the file `from` in the place of `to` in one step: whoever opens `to` sees either the old or
+  !> the new file, whole. An error if the system refuses.
   subroutine rename_file(from, to, error)
-    character(*), intent(in) :: from, to
+    character(*), intent(in) :: from  !! path of the file
+    character(*), intent(in) :: to    !! path in the same file system; a file there is replaced
     type(error_type), allocatable, intent(out) :: error
 
     if (c_rename(trim(from)//c_null_char, trim(to)//c_null_char) == 0) return
     call fail(error, 'cannot rename '//trim(from)//' to '//trim(to))
   end subroutine rename_file
 
-  !> Wait until all that was written to a file is on the disk; of a folder, the names in it.
+  !> Wait until all that was written to a file is on the disk; of a folder, the names in it. An
+  !> error if it cannot be opened or the system reports a failure.
   subroutine sync_path(path, error)
-    character(*), intent(in) :: path
+    character(*), intent(in) :: path  !! of a file or folder that is there
     type(error_type), allocatable, intent(out) :: error
     type(c_ptr) :: stream
     integer(c_int) :: status, ignored
@@ -132,19 +134,19 @@ contains
     if (status /= 0) call fail(error, 'the system does not bring '//trim(path)//' to the disk')
   end subroutine sync_path
 
-  !> Remove a file if it is there.
+  !> Remove a file if it is there. A failure is not reported.
   subroutine remove_file(path)
-    character(*), intent(in) :: path
+    character(*), intent(in) :: path  !! of a file or an empty folder
     integer(c_int) :: status
 
     if (.not. file_exists(path)) return
     status = c_remove(trim(path)//c_null_char)
   end subroutine remove_file
 
-  !> Cut a file to its first `bytes` bytes.
+  !> Cut a file to its first `bytes` bytes. A failure is not reported.
   subroutine cut_file(path, bytes)
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: bytes
+    character(*), intent(in) :: path  !! of a file that is there
+    integer(i8), intent(in) :: bytes  !! length that is left [bytes]
     integer(c_int) :: status
 
     status = c_truncate(trim(path)//c_null_char, int(bytes, c_int64_t))
@@ -152,25 +154,26 @@ contains
 
   !> Whether there is a file (or folder) of this name.
   logical function file_exists(path)
-    character(*), intent(in) :: path
+    character(*), intent(in) :: path  !! blanks at its end do not count
     inquire (file=trim(path), exist=file_exists)
   end function file_exists
 
   !> Whether there is a folder of this name.
   logical function directory_exists(path)
-    character(*), intent(in) :: path
+    character(*), intent(in) :: path  !! blanks at its end do not count
     inquire (file=trim(path)//'/.', exist=directory_exists)
   end function directory_exists
 
   !> The size of a file [bytes]; -1 if it isn't there.
   integer(i8) function file_bytes(path)
-    character(*), intent(in) :: path
+    character(*), intent(in) :: path  !! blanks at its end do not count
     inquire (file=trim(path), size=file_bytes)
   end function file_bytes
 
   !> Set a variable of the process's environment unless the user has set it already.
   subroutine set_environment(name, value)
-    character(*), intent(in) :: name, value
+    character(*), intent(in) :: name   !! of the variable, without blanks at its end
+    character(*), intent(in) :: value  !! that it gets if it is not set
     integer(c_int) :: status
 
     status = c_setenv(name//c_null_char, value//c_null_char, 0_c_int)
@@ -178,7 +181,8 @@ contains
 
   !> `name` inside `directory` ('' = the current one).
   pure function in_directory(directory, name) result(path)
-    character(*), intent(in) :: directory, name
+    character(*), intent(in) :: directory  !! '' for the current one; a slash may end it
+    character(*), intent(in) :: name       !! of the file; blanks at its end do not count
     character(:), allocatable :: path
 
     if (len_trim(directory) == 0) then

@@ -3,6 +3,9 @@
 !> Nothing is cached between a write and the system: a `write_rows` into a series that exists is a
 !> plain write into the file. HDF5's own records (metadata) reach the file only in `flush_file`
 !> and `close_file`. Both matter for a file that must survive the end of its writer at any moment.
+!>
+!> An error is set if HDF5 fails: it names what was to be done, the file, and the system's reason or
+!> HDF5's own.
 module pd_output_results_hdf5
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, &
     & c_int64_t, c_loc, c_ptr, c_size_t
@@ -130,7 +133,8 @@ contains
   !> Make an error of the HDF5 call that failed just now: `action` and the reason.
   subroutine explain(error, action, file_name)
     type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in) :: action, file_name
+    character(*), intent(in) :: action     !! what could not be done, to follow `cannot`
+    character(*), intent(in) :: file_name  !! on which it was to be done
     type(reason_type), target :: reason
     character(:), allocatable :: message
 
@@ -157,8 +161,8 @@ contains
 
   !> Make a new file; one of this name is replaced.
   subroutine create_file(name, file, error)
-    character(*), intent(in) :: name
-    type(hdf5_file), intent(out) :: file
+    character(*), intent(in) :: name      !! path of the file
+    type(hdf5_file), intent(out) :: file  !! open for reading and writing; not open after an error
     type(error_type), allocatable, intent(out) :: error
     integer(hid_t) :: access
     integer :: status, ignored
@@ -176,9 +180,9 @@ contains
 
   !> Open a file that is there, for reading only or for both.
   subroutine open_file(name, writable, file, error)
-    character(*), intent(in) :: name
-    logical, intent(in) :: writable
-    type(hdf5_file), intent(out) :: file
+    character(*), intent(in) :: name      !! path of a file that is there
+    logical, intent(in) :: writable       !! for reading and writing; else for reading only
+    type(hdf5_file), intent(out) :: file  !! open; not open after an error
     type(error_type), allocatable, intent(out) :: error
     integer(hid_t) :: access
     integer :: status, ignored
@@ -196,7 +200,7 @@ contains
 
   !> Hand all that is pending to the system.
   subroutine flush_file(file, error)
-    type(hdf5_file), intent(in) :: file
+    type(hdf5_file), intent(in) :: file  !! open, with what is pending
     type(error_type), allocatable, intent(out) :: error
     integer :: status
 
@@ -206,7 +210,7 @@ contains
 
   !> Close a file; one that isn't open is left alone.
   subroutine close_file(file, error)
-    type(hdf5_file), intent(inout) :: file
+    type(hdf5_file), intent(inout) :: file  !! not open on return
     type(error_type), allocatable, intent(out) :: error
     integer :: status
 
@@ -218,8 +222,8 @@ contains
 
   !> Make a group; the groups above it must be there.
   subroutine make_group(file, path, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the new group
     type(error_type), allocatable, intent(out) :: error
     integer(hid_t) :: group
     integer :: status
@@ -231,9 +235,9 @@ contains
 
   !> Copy a group or dataset, with all it holds, to the same path of another file.
   subroutine copy_object(from, path, to, error)
-    type(hdf5_file), intent(in) :: from
-    character(*), intent(in) :: path
-    type(hdf5_file), intent(in) :: to
+    type(hdf5_file), intent(in) :: from  !! the file with the object
+    character(*), intent(in) :: path     !! of the object, in both files; none may be at it in `to`
+    type(hdf5_file), intent(in) :: to    !! the file that gets the copy, writable
     type(error_type), allocatable, intent(out) :: error
     integer :: status
 
@@ -243,8 +247,8 @@ contains
 
   !> Whether there is an object at `path`; the groups above it must be there.
   logical function object_exists(file, path)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the object in the file, from its root
     integer :: status
 
     call h5lexists_f(file%id, path, object_exists, status)
@@ -253,8 +257,8 @@ contains
 
   !> Remove the object at `path`.
   subroutine remove_object(file, path, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the object in the file, from its root
     type(error_type), allocatable, intent(out) :: error
     integer :: status
 
@@ -282,10 +286,12 @@ contains
     call h5oclose_f(object, ignored)
   end subroutine add_attribute
 
+  !> A 64-bit integer as a scalar attribute.
   subroutine put_attribute_integer(file, path, name, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path, name
-    integer(i8), intent(in) :: values
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the object that gets it
+    character(*), intent(in) :: name     !! of the new attribute
+    integer(i8), intent(in) :: values    !! its value
     type(error_type), allocatable, intent(out) :: error
     integer(i8), target :: buffer
     integer(hid_t) :: space
@@ -300,10 +306,12 @@ contains
     end if
   end subroutine put_attribute_integer
 
+  !> 64-bit integers as an attribute of rank 1.
   subroutine put_attribute_integers(file, path, name, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path, name
-    integer(i8), intent(in) :: values(:)
+    type(hdf5_file), intent(in) :: file   !! open, writable if it is changed
+    character(*), intent(in) :: path      !! of the object that gets it
+    character(*), intent(in) :: name      !! of the new attribute
+    integer(i8), intent(in) :: values(:)  !! (any length), its values
     type(error_type), allocatable, intent(out) :: error
     integer(i8), allocatable, target :: buffer(:)
     integer(hid_t) :: space
@@ -328,9 +336,12 @@ contains
     if (status == 0) call h5tset_size_f(kind_id, int(max(1, length), size_t), status)
   end subroutine make_text_type
 
+  !> A text of fixed length as a scalar attribute.
   subroutine put_attribute_text(file, path, name, values, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path, name, values
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the object that gets it
+    character(*), intent(in) :: name     !! of the new attribute
+    character(*), intent(in) :: values   !! its text; '' is kept as one blank
     type(error_type), allocatable, intent(out) :: error
     character(len(values) + 1), target :: buffer
     integer(hid_t) :: space, kind_id
@@ -349,9 +360,10 @@ contains
 
   !> Change the value of a scalar 64-bit integer attribute: eight bytes of the file.
   subroutine change_attribute(file, path, name, value, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path, name
-    integer(i8), intent(in) :: value
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the object that has it
+    character(*), intent(in) :: name     !! of the attribute
+    integer(i8), intent(in) :: value     !! its new value
     type(error_type), allocatable, intent(out) :: error
     integer(i8), target :: buffer
     integer(hid_t) :: object, attribute
@@ -376,9 +388,10 @@ contains
 
   !> The value of a scalar 64-bit integer attribute.
   subroutine get_attribute(file, path, name, value, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path, name
-    integer(i8), intent(out) :: value
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the object that has it
+    character(*), intent(in) :: name     !! of the attribute
+    integer(i8), intent(out) :: value    !! its value; 0 after an error
     type(error_type), allocatable, intent(out) :: error
     integer(i8), target :: buffer
     integer(hid_t) :: attribute
@@ -400,8 +413,9 @@ contains
 
   !> Write a text as a dataset of one value; it may be UTF-8.
   subroutine put_text(file, path, text, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path, text
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is changed
+    character(*), intent(in) :: path     !! of the new dataset
+    character(*), intent(in) :: text     !! of any length; '' is kept as one blank
     type(error_type), allocatable, intent(out) :: error
     character(kind=c_char), allocatable, target :: buffer(:)
     integer(hid_t) :: space, kind_id, dataset
@@ -431,9 +445,10 @@ contains
 
   !> A text as `put_text` writes it.
   subroutine get_text(file, path, text, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    character(:), allocatable, intent(out) :: text
+    type(hdf5_file), intent(in) :: file             !! open, writable if it is changed
+    character(*), intent(in) :: path                !! of the dataset
+    character(:), allocatable, intent(out) :: text  !! of the length that the file has; '' after an
+                                                    !! error
     type(error_type), allocatable, intent(out) :: error
     character(kind=c_char), allocatable, target :: buffer(:)
     integer(hid_t) :: kind_id, dataset

@@ -1,5 +1,6 @@
 !> The history: a table of a row per reported step, gathered in memory and written now and then. All
-!> rows stay in memory, since checkpoints hold them.
+!> rows stay in memory, since checkpoints hold them. Procedures of the text set an error if the file
+!> cannot be written.
 module pd_output_results_history
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, i8
@@ -47,18 +48,18 @@ contains
 
   !> Begin a table of so many columns.
   subroutine start(self, columns)
-    class(history_type), intent(out) :: self
-    integer, intent(in) :: columns
+    class(history_type), intent(out) :: self  !! empty, with room for some rows
+    integer, intent(in) :: columns            !! values in a row
 
     self%columns = columns
     allocate (self%rows(columns, initial_rows))
     call system_clock(self%written_at)
   end subroutine start
 
-  !> Add a row: a value for each column.
+  !> Add a row: a value for each column. An error if their number is another one.
   subroutine add(self, values, error)
-    class(history_type), intent(inout) :: self
-    real(wp), intent(in) :: values(:)
+    class(history_type), intent(inout) :: self  !! with one row more on return
+    real(wp), intent(in) :: values(:)           !! (columns), one for each
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: longer(:, :)
 
@@ -78,7 +79,7 @@ contains
 
   !> Whether rows wait since a second, or are many.
   logical function is_due(self)
-    class(history_type), intent(in) :: self
+    class(history_type), intent(in) :: self  !! with the rows that wait
     integer(i8) :: now, rate
 
     is_due = self%count - self%written >= many_rows
@@ -89,14 +90,14 @@ contains
 
   !> Whether rows wait.
   pure logical function has_rows(self)
-    class(history_type), intent(in) :: self
+    class(history_type), intent(in) :: self  !! with the rows that wait
     has_rows = self%count > self%written
   end function has_rows
 
   !> Hand out the waiting rows as `table(row, column)`, which no longer wait.
   subroutine take(self, table)
-    class(history_type), intent(inout) :: self
-    real(wp), allocatable, intent(out) :: table(:, :)
+    class(history_type), intent(inout) :: self  !! all its rows count as written on return
+    real(wp), allocatable, intent(out) :: table(:, :)  !! (row, column) that waited
 
     allocate (table(self%count - self%written, self%columns), &
       & source=transpose(self%rows(:, self%written + 1:self%count)))
@@ -106,17 +107,17 @@ contains
 
   !> The first rows (column, row), all but the last `but`.
   pure function rows_so_far(self, but) result(rows)
-    class(history_type), intent(in) :: self
-    integer, intent(in) :: but
+    class(history_type), intent(in) :: self  !! with all rows
+    integer, intent(in) :: but               !! how many of the last to leave out
     real(wp), allocatable :: rows(:, :)
     allocate (rows, source=self%rows(:, :self%count - but))
   end function rows_so_far
 
   !> Go on after `rows` (column, row), which the files have already if they are `written`.
   pure subroutine restore(self, rows, written)
-    class(history_type), intent(inout) :: self
-    real(wp), intent(in) :: rows(:, :)
-    logical, intent(in) :: written
+    class(history_type), intent(inout) :: self  !! begun by `start`; has these rows only on return
+    real(wp), intent(in) :: rows(:, :)          !! (column, row) of the run that goes on
+    logical, intent(in) :: written              !! whether the files have them; else they wait
 
     self%rows = rows
     self%count = size(rows, 2)
@@ -125,9 +126,9 @@ contains
 
   !> Make the file with its line of names.
   subroutine open_csv(self, path, columns, error)
-    class(csv_type), intent(inout) :: self
-    character(*), intent(in) :: path
-    type(column_type), intent(in) :: columns(:)
+    class(csv_type), intent(inout) :: self       !! open on return
+    character(*), intent(in) :: path             !! of the file; one that is there is emptied
+    type(column_type), intent(in) :: columns(:)  !! (any number), for the line of names
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: line
     integer :: i
@@ -144,10 +145,10 @@ contains
 
   !> Make the file anew with `rows` (column, row), in place of an older one in one step.
   subroutine replace_csv(self, path, columns, rows, error)
-    class(csv_type), intent(inout) :: self
-    character(*), intent(in) :: path
-    type(column_type), intent(in) :: columns(:)
-    real(wp), intent(in) :: rows(:, :)
+    class(csv_type), intent(inout) :: self       !! open on return, behind the rows
+    character(*), intent(in) :: path             !! of the file
+    type(column_type), intent(in) :: columns(:)  !! (any number), for the line of names
+    real(wp), intent(in) :: rows(:, :)           !! (column, row), all from the first on
     type(error_type), allocatable, intent(out) :: error
 
     call self%open(path//'.part', columns, error)
@@ -157,15 +158,15 @@ contains
 
   !> Wait until all rows are on the disk.
   subroutine sync_csv(self, error)
-    class(csv_type), intent(inout) :: self
+    class(csv_type), intent(inout) :: self  !! open
     type(error_type), allocatable, intent(out) :: error
     call self%sink%sync(error)
   end subroutine sync_csv
 
   !> Append `table(row, column)` and hand it to the system.
   subroutine append_csv(self, table, error)
-    class(csv_type), intent(inout) :: self
-    real(wp), intent(in) :: table(:, :)
+    class(csv_type), intent(inout) :: self  !! open
+    real(wp), intent(in) :: table(:, :)     !! (row, column) to be added
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: width = 24
     character(:), allocatable :: line
@@ -192,14 +193,14 @@ contains
 
   !> Complete the file.
   subroutine close_csv(self, error)
-    class(csv_type), intent(inout) :: self
+    class(csv_type), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error
     call self%sink%close(error)
   end subroutine close_csv
 
   !> Whether the file is open.
   logical function is_csv_open(self)
-    class(csv_type), intent(in) :: self
+    class(csv_type), intent(in) :: self  !! the table as text
     is_csv_open = self%sink%is_open()
   end function is_csv_open
 

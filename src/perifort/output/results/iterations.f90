@@ -1,6 +1,6 @@
 !> The way of a relaxation to equilibrium, `iterations.csv`: a line for each iteration that is
 !> due. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes
-!> on, and adds to them.
+!> on, and adds to them. An error is set if the file cannot be read or written.
 module pd_output_results_iterations
   use pd_base_error, only: error_type
   use pd_base_kinds, only: i8
@@ -33,10 +33,10 @@ contains
   !> Make the file `path`, with the lines of an older one whose step (the first number) is at most
   !> `last`, if it is to `go_on`.
   subroutine begin(self, path, go_on, last, error)
-    class(iterations_type), intent(inout) :: self
-    character(*), intent(in) :: path
-    logical, intent(in) :: go_on
-    integer, intent(in) :: last
+    class(iterations_type), intent(inout) :: self  !! open on return, behind the lines that stay
+    character(*), intent(in) :: path               !! of the file
+    logical, intent(in) :: go_on                   !! keep lines of an older file
+    integer, intent(in) :: last  !! step of the last line that stays; not used without `go_on`
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: text
     integer :: first, length, step, status
@@ -63,14 +63,14 @@ contains
 
   !> Whether the file has been made.
   pure logical function has_begun(self)
-    class(iterations_type), intent(in) :: self
+    class(iterations_type), intent(in) :: self  !! the file of iterations
     has_begun = self%begun
   end function has_begun
 
   !> Add a line, which reaches the file within about a second.
   subroutine add(self, line, error)
-    class(iterations_type), intent(inout) :: self
-    character(*), intent(in) :: line
+    class(iterations_type), intent(inout) :: self  !! begun
+    character(*), intent(in) :: line  !! values in the order of the file's head, parted by commas
     type(error_type), allocatable, intent(out) :: error
     integer(i8) :: now, rate
 
@@ -84,14 +84,14 @@ contains
 
   !> Wait until all lines are on the disk.
   subroutine sync(self, error)
-    class(iterations_type), intent(inout) :: self
+    class(iterations_type), intent(inout) :: self  !! begun or not
     type(error_type), allocatable, intent(out) :: error
     if (self%sink%is_open()) call self%sink%sync(error)
   end subroutine sync
 
   !> Complete the file.
   subroutine close_iterations(self, error)
-    class(iterations_type), intent(inout) :: self
+    class(iterations_type), intent(inout) :: self  !! begun or not; not open on return
     type(error_type), allocatable, intent(out) :: error
     if (self%sink%is_open()) call self%sink%close(error)
   end subroutine close_iterations

@@ -2,6 +2,8 @@
 !>
 !> `/VTKHDF` follows VTK's file format of that name (version 2.0, type PolyData, with steps);
 !> `/scene`, `/points` and `/history` are this program's own, and other readers pass over them.
+!>
+!> An error is set if HDF5 fails to read or write the file.
 module pd_output_results_layout
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use pd_base_error, only: error_type
@@ -47,8 +49,8 @@ contains
   !> their records are neighbours at a fixed place, and HDF5 joins them into one write.
   !> Should another version not do so, NSteps is written first.
   subroutine make_heart(self, file, error)
-    class(layout_type), intent(in) :: self
-    type(hdf5_file), intent(in) :: file
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    type(hdf5_file), intent(in) :: file     !! new, with nothing in it
     type(error_type), allocatable, intent(out) :: error
 
     call make_group(file, '/VTKHDF', error)
@@ -66,8 +68,10 @@ contains
 
   !> `/scene`: what was computed, by what.
   subroutine put_scene(file, scene_text, command, version, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: scene_text, command, version
+    type(hdf5_file), intent(in) :: file     !! writable, without `/scene`
+    character(*), intent(in) :: scene_text  !! the resolved scene, as a scene file
+    character(*), intent(in) :: command     !! the command line of the run
+    character(*), intent(in) :: version     !! of the program
     type(error_type), allocatable, intent(out) :: error
 
     call make_group(file, '/scene', error)
@@ -80,8 +84,8 @@ contains
 
   !> What doesn't change with time: points, each of them a vertex, and no other cells.
   subroutine put_geometry(file, positions, error)
-    type(hdf5_file), intent(in) :: file
-    real(wp), intent(in) :: positions(:, :)
+    type(hdf5_file), intent(in) :: file      !! writable, with `/VTKHDF`
+    real(wp), intent(in) :: positions(:, :)  !! (n_points, 3) [m]
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: empty(3) = [character(8) :: 'Lines', 'Polygons', 'Strips']
     character(:), allocatable :: group
@@ -148,8 +152,8 @@ contains
 
   !> What else grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
   subroutine make_time_series(self, file, error)
-    class(layout_type), intent(in) :: self
-    type(hdf5_file), intent(in) :: file
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    type(hdf5_file), intent(in) :: file     !! writable, begun by `make_heart`
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: steps = '/VTKHDF/Steps'
     character(:), allocatable :: path
@@ -191,6 +195,9 @@ contains
         if (allocated(error)) return
         call put_attribute(file, path, 'units', trim(field%unit), error)
         if (allocated(error)) return
+        if (field%labels /= '') call put_attribute(file, path, 'components', trim(field%labels), &
+          & error)
+        if (allocated(error)) return
         call put_multiples(file, steps//'/PointDataOffsets/'//trim(field%name), s, self%points, &
           & chunk, error)
         if (allocated(error)) return
@@ -209,6 +216,9 @@ contains
       call write_rows(file, path, 0_i8, [0.0_wp], error)
       if (allocated(error)) return
       call put_attribute(file, path, 'units', trim(self%columns(i)%unit), error)
+      if (allocated(error)) return
+      if (self%columns(i)%origin /= '') call put_attribute(file, path, 'origin', &
+        & trim(self%columns(i)%origin), error)
     end do
   end subroutine make_time_series
 
@@ -238,14 +248,14 @@ contains
 
   !> Bytes a point of field `i`.
   pure integer(i8) function field_bytes(self, i)
-    class(layout_type), intent(in) :: self
-    integer, intent(in) :: i
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    integer, intent(in) :: i                !! number of the field
     field_bytes = self%fields(i)%components*merge(4, 8, self%single)
   end function field_bytes
 
   !> Bytes that one output takes.
   pure integer(i8) function output_bytes(self)
-    class(layout_type), intent(in) :: self
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
     integer :: i
 
     output_bytes = 0
@@ -256,26 +266,26 @@ contains
 
   !> Bytes written before the first output, within some kilobytes.
   pure integer(i8) function fixed_bytes(self)
-    class(layout_type), intent(in) :: self
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
 
     fixed_bytes = self%points*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
       & + self%row_capacity*8*size(self%columns)
   end function fixed_bytes
 
-  !> Write `values(n, 3)` as rows of three from row `at` on, turned block by block.
+  !> Write `values(n, components)` as rows of components from row `at` on, turned block by block.
   subroutine write_vectors(file, path, at, values, single, error)
-    type(hdf5_file), intent(in) :: file
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: at
-    real(wp), intent(in) :: values(:, :)
-    logical, intent(in) :: single
+    type(hdf5_file), intent(in) :: file   !! open and writable
+    character(*), intent(in) :: path      !! of the dataset, of three components
+    integer(i8), intent(in) :: at         !! row of the first vector, from 0
+    real(wp), intent(in) :: values(:, :)  !! (n, 3)
+    logical, intent(in) :: single         !! the dataset is in single precision
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: turned(:, :)
     real(sp), allocatable :: short(:, :)
     integer(i8) :: n, first, count, i
 
     n = size(values, 1, kind=i8)
-    allocate (turned(3, min(n, int(block_rows, i8))))
+    allocate (turned(size(values, 2), min(n, int(block_rows, i8))))
     do first = 0, n - 1, block_rows
       count = min(int(block_rows, i8), n - first)
       do i = 1, count
@@ -293,7 +303,7 @@ contains
 
   !> To single precision; what is beyond its range goes to the end of the range.
   elemental real(sp) function to_single(value)
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value  !! of any size
     real(wp), parameter :: most = huge(1.0_sp)
     to_single = real(value, sp)
     if (abs(value) > most) to_single = sign(huge(1.0_sp), real(sign(1.0_wp, value), sp))
@@ -301,7 +311,8 @@ contains
 
   !> Copy all that doesn't grow but the scene.
   subroutine copy_static(from, to, error)
-    type(hdf5_file), intent(in) :: from, to
+    type(hdf5_file), intent(in) :: from  !! a complete file of this layout
+    type(hdf5_file), intent(in) :: to    !! writable, begun by `make_heart`
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: parts(7) = [character(24) :: '/points', &
       & '/VTKHDF/NumberOfPoints', '/VTKHDF/Points', '/VTKHDF/Vertices', '/VTKHDF/Lines', &
@@ -316,7 +327,8 @@ contains
 
   !> Copy the scene.
   subroutine copy_scene(from, to, error)
-    type(hdf5_file), intent(in) :: from, to
+    type(hdf5_file), intent(in) :: from  !! a file with `/scene`
+    type(hdf5_file), intent(in) :: to    !! writable, without it
     type(error_type), allocatable, intent(out) :: error
     call copy_object(from, '/scene', to, error)
   end subroutine copy_scene
@@ -324,10 +336,11 @@ contains
   !> Copy the complete outputs and rows, and what there is of an output under way, field by field
   !> and block by block. `outputs` and `rows` count the complete ones.
   subroutine copy_time_series(self, from, outputs, rows, to, error)
-    class(layout_type), intent(in) :: self
-    type(hdf5_file), intent(in) :: from
-    integer(i8), intent(in) :: outputs, rows
-    type(hdf5_file), intent(in) :: to
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    type(hdf5_file), intent(in) :: from     !! a file of the same fields and columns
+    integer(i8), intent(in) :: outputs      !! complete ones
+    integer(i8), intent(in) :: rows         !! complete ones of the history
+    type(hdf5_file), intent(in) :: to  !! writable, made by `make_time_series` with room for more
     type(error_type), allocatable, intent(out) :: error
     integer :: i
 
@@ -383,9 +396,10 @@ contains
 
   !> Cut off the room that `outputs` outputs and `rows` rows of history didn't need.
   subroutine trim_time_series(self, file, outputs, rows, error)
-    class(layout_type), intent(in) :: self
-    type(hdf5_file), intent(in) :: file
-    integer(i8), intent(in) :: outputs, rows
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    type(hdf5_file), intent(in) :: file     !! open and writable
+    integer(i8), intent(in) :: outputs      !! that stay
+    integer(i8), intent(in) :: rows         !! of the history that stay
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: steps = '/VTKHDF/Steps/'
     character(*), parameter :: scalars(4) = [character(16) :: 'Values', 'PartOffsets', &

@@ -10,11 +10,15 @@
 !>
 !> Nothing of an earlier run is touched before the first output is complete. After an error call
 !> `close` none the less: it leaves the files as they were at the last complete output.
+!>
+!> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
+!> are the fields of the last output, and `answer` gives both.
 module pd_output_results_results
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_text, only: join, lower_case, to_text, with_unit
   use pd_output_checkpoint_checkpoint, only: remove_checkpoints
+  use pd_output_results_answer, only: answer_type, values_type
   use pd_output_results_description, only: check_description
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
@@ -53,6 +57,10 @@ module pd_output_results_results
     logical :: started = .false.         !! the files have their names
     logical :: resumed = .false.         !! they are those of a run that goes on
     logical :: failed = .false.
+    logical :: in_files = .true.         !! there is a folder to write to
+    real(wp), allocatable :: positions(:, :)       !! what stays in memory: points, ...
+    type(values_type), allocatable :: latest(:)    !! fields of the output under way, ...
+    type(values_type), allocatable :: complete(:)  !! and of the last complete one
   contains
     procedure :: create
     procedure, private :: put_points_real, put_points_i4, put_points_i1
@@ -62,7 +70,7 @@ module pd_output_results_results
     procedure :: begin_output
     procedure, private :: put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     !> Write one field of the output under way, by its number or name: `values(n)`, or
-    !> `values(n, 3)` for vectors.
+    !> `values(n, components)`.
     generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     procedure :: end_output
     procedure :: add_row
@@ -72,42 +80,55 @@ module pd_output_results_results
     procedure :: sync
     procedure :: kept => rows_and_times
     procedure :: goes_on
+    procedure :: keep_outputs
+    procedure :: answer
   end type results_type
 
 contains
 
-  !> Begin the results `directory/stem.*` and `directory/history.csv`.
+  !> Begin the results `directory/stem.*` and `directory/history.csv`, or, where `directory` is '',
+  !> results that are in memory alone.
   !>
-  !> `positions(n, 3)` [m] and everything per point come in point order. `planned_outputs` and
-  !> `planned_rows` may be too few or 0 (unknown): the file then grows by copying itself.
-  !> `precision` ('double', 'single') is that of the fields; `format` is 'vtkhdf', 'vtu' or 'both'.
-  !> `scene_text`, `command` and the program's `version` are kept in the file. With `kept`, the
-  !> files that are there go on after the outputs and rows in it; where there are none, new ones
-  !> begin with its rows.
+  !> Everything per point comes in point order. `planned_outputs` and `planned_rows` may be too few
+  !> or 0 (unknown): the file then grows by copying itself. With `kept`, the files that are there go
+  !> on after the outputs and rows in it; where there are none, new ones begin with its rows.
+  !>
+  !> An error if the description is unusable, if older results are in the way, if the files do not
+  !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
     & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept)
-    class(results_type), intent(out) :: self
-    character(*), intent(in) :: directory, stem
-    real(wp), intent(in) :: positions(:, :)
-    type(field_type), intent(in) :: fields(:)
-    integer, intent(in) :: planned_outputs
-    type(column_type), intent(in) :: columns(:)
-    integer, intent(in) :: planned_rows
-    character(*), intent(in) :: precision, format
-    character(*), intent(in) :: scene_text, command, version
-    logical, intent(in) :: overwrite
+    class(results_type), intent(out) :: self       !! open on return, unless an error is set
+    character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
+                                                   !! the current one
+    character(*), intent(in) :: stem               !! name of the files without their endings
+    real(wp), intent(in) :: positions(:, :)        !! (n_points, 3) in point order [m]
+    type(field_type), intent(in) :: fields(:)      !! (any number) that every output has
+    integer, intent(in) :: planned_outputs         !! their number; 0: unknown
+    type(column_type), intent(in) :: columns(:)    !! (any number) of the history; none: no history
+                                                   !! file
+    integer, intent(in) :: planned_rows            !! their number; 0: unknown
+    character(*), intent(in) :: precision          !! of the fields: 'double' or 'single'
+    character(*), intent(in) :: format             !! 'vtkhdf', 'vtu' or 'both'
+    character(*), intent(in) :: scene_text         !! the resolved scene, kept in the file
+    character(*), intent(in) :: command            !! the command line of the run, kept in the file
+    character(*), intent(in) :: version            !! of the program, kept in the file
+    logical, intent(in) :: overwrite               !! older results may go; else they are an error
     type(error_type), allocatable, intent(out) :: error
-    type(kept_type), intent(in), optional :: kept
+    type(kept_type), intent(in), optional :: kept  !! rows, times and scene of a checkpoint to go on
+                                                   !! from; absent: a new run
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
     if (allocated(error)) return
     self%resumed = .false.
-    if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
-    if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
-    if (allocated(error)) return
-    call make_directory(directory, error)
-    if (allocated(error)) return
+    self%in_files = directory /= ''
+    if (self%in_files) then
+      if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
+      if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
+      if (allocated(error)) return
+      call make_directory(directory, error)
+      if (allocated(error)) return
+    end if
 
     self%directory = trim(directory)
     self%stem = trim(stem)
@@ -117,8 +138,8 @@ contains
     self%points = size(positions, 1)
     self%planned_outputs = planned_outputs
     single = lower_case(precision) == 'single'
-    self%use_vtkhdf = lower_case(format) /= 'vtu'
-    self%use_vtu = lower_case(format) /= 'vtkhdf'
+    self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
+    self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
     call self%history%start(size(columns))
     allocate (self%times(0))
     if (present(kept)) call self%history%restore(kept%rows, written=self%resumed)
@@ -155,37 +176,43 @@ contains
     self%started = .not. allocated(error)
   end subroutine resume_others
 
+  !> An array of reals over the points. An error if its length is wrong or an output has begun.
   subroutine put_points_real(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self     !! the results
+    character(*), intent(in) :: name               !! of the array, below `/points`
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_real
 
+  !> An array of 32-bit integers over the points. An error if its length is wrong or an output has
+  !> begun.
   subroutine put_points_i4(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i4), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self        !! the results
+    character(*), intent(in) :: name                  !! of the array, below `/points`
+    integer(i4), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i4
 
+  !> An array of 8-bit integers over the points. An error if its length is wrong or an output has
+  !> begun.
   subroutine put_points_i1(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i1), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self        !! the results
+    character(*), intent(in) :: name                  !! of the array, below `/points`
+    integer(i1), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i1
 
-  !> Begin the output of the state at `time` [s].
+  !> Begin the output of the state at `time` [s]. An error if the results are not open, if another
+  !> output is under way, or if the files cannot be written.
   subroutine begin_output(self, time, error)
-    class(results_type), intent(inout) :: self
-    real(wp), intent(in) :: time
+    class(results_type), intent(inout) :: self  !! open; an output is under way on return
+    real(wp), intent(in) :: time                !! of the state [s]; in a relaxation its load factor
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. self%open .or. self%in_output) then
@@ -200,10 +227,12 @@ contains
     self%in_output = .not. allocated(error)
   end subroutine begin_output
 
+  !> A field of one component, by its number. An error outside an output, for a field given twice or
+  !> of another shape, or if it cannot be written.
   subroutine put_scalar_at(self, field, values, error)
-    class(results_type), intent(inout) :: self
-    integer, intent(in) :: field
-    real(wp), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self     !! with an output under way
+    integer, intent(in) :: field                   !! its number, from 1
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
 
     call check_field(self, field, size(values), 1, error)
@@ -212,12 +241,16 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
     if (allocated(error)) call explain_output(self, error)
     self%given(field) = .not. allocated(error)
+    if (allocated(self%latest)) self%latest(field)%values = reshape(values, [size(values), 1])
   end subroutine put_scalar_at
 
+  !> A field of three components, by its number. An error outside an output, for a field given twice
+  !> or of another shape, or if it cannot be written.
   subroutine put_vector_at(self, field, values, error)
-    class(results_type), intent(inout) :: self
-    integer, intent(in) :: field
-    real(wp), intent(in) :: values(:, :)
+    class(results_type), intent(inout) :: self  !! with an output under way
+    integer, intent(in) :: field                !! its number, from 1
+    real(wp), intent(in) :: values(:, :)        !! (n_points, 3) in point order, in the field's
+                                                !! unit; unused components 0
     type(error_type), allocatable, intent(out) :: error
 
     call check_field(self, field, size(values, 1), size(values, 2), error)
@@ -226,12 +259,14 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
     if (allocated(error)) call explain_output(self, error)
     self%given(field) = .not. allocated(error)
+    if (allocated(self%latest)) self%latest(field)%values = values
   end subroutine put_vector_at
 
+  !> A field of one component, by its name. An error as by its number, and for an unknown name.
   subroutine put_scalar_named(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), contiguous, intent(in) :: values(:)
+    class(results_type), intent(inout) :: self     !! with an output under way
+    character(*), intent(in) :: name               !! of the field
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
     integer :: field
 
@@ -239,10 +274,12 @@ contains
     if (.not. allocated(error)) call self%put_field(field, values, error)
   end subroutine put_scalar_named
 
+  !> A field of three components, by its name. An error as by its number, and for an unknown name.
   subroutine put_vector_named(self, name, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), intent(in) :: values(:, :)
+    class(results_type), intent(inout) :: self  !! with an output under way
+    character(*), intent(in) :: name            !! of the field
+    real(wp), intent(in) :: values(:, :)        !! (n_points, 3) in point order, in the field's
+                                                !! unit; unused components 0
     type(error_type), allocatable, intent(out) :: error
     integer :: field
 
@@ -286,9 +323,11 @@ contains
     end if
   end subroutine check_field
 
-  !> Complete the output under way; all fields must have been given. History rows so far go with it.
+  !> Complete the output under way. History rows so far go with it. An error if a field has not been
+  !> given, if a file has been removed, or if the files cannot be written.
   subroutine end_output(self, error)
-    class(results_type), intent(inout) :: self
+    class(results_type), intent(inout) :: self  !! with an output under way, which is complete on
+                                                !! return
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: table(:, :)
     integer :: i
@@ -318,6 +357,10 @@ contains
       self%outputs = self%outputs + 1
       self%times = [self%times, self%time]
       self%in_output = .false.
+      if (allocated(self%latest)) then
+        call move_alloc(self%latest, self%complete)
+        allocate (self%latest(size(self%fields)))
+      end if
     end if
   end subroutine end_output
 
@@ -344,6 +387,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     if (self%started) return
+    self%started = .not. self%in_files
+    if (self%started) return
     call mark_unfinished(self%directory, self%stem, error)
     if (allocated(error)) return
     call remove_checkpoints(self%directory, self%stem)
@@ -364,10 +409,11 @@ contains
   end subroutine start_files
 
   !> Add a row of the history: a value for each column. Rows reach the files with each output, at
-  !> least about once a second, and with `close`.
+  !> least about once a second, and with `close`. An error if the results are not open, if values
+  !> are missing, or if the files cannot be written.
   subroutine add_row(self, values, error)
-    class(results_type), intent(inout) :: self
-    real(wp), intent(in) :: values(:)
+    class(results_type), intent(inout) :: self  !! open; has one row more on return
+    real(wp), intent(in) :: values(:)           !! (columns), in their units
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. self%open) then
@@ -382,12 +428,12 @@ contains
   !> Add a line about an iteration of a relaxation to `iterations.csv`. Of a run that goes on, lines
   !> up to step `last` stay.
   subroutine add_iteration(self, line, last, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: line
-    integer, intent(in) :: last
+    class(results_type), intent(inout) :: self  !! after the first output; earlier lines are dropped
+    character(*), intent(in) :: line  !! values in the order of the file's head, parted by commas
+    integer, intent(in) :: last                 !! step of the last line that stays
     type(error_type), allocatable, intent(out) :: error
 
-    if (.not. self%started .or. self%failed) return
+    if (.not. (self%started .and. self%in_files) .or. self%failed) return
     if (.not. self%iterations%has_begun()) call self%iterations%begin( &
       & in_directory(self%directory, 'iterations.csv'), self%resumed, last, error)
     if (.not. allocated(error)) call self%iterations%add(line, error)
@@ -398,8 +444,8 @@ contains
   !> `warnings.txt`, and in the HDF5 file when the results are complete. What goes wrong with them
   !> is no reason to end a run.
   subroutine put_warnings(self, text)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: text
+    class(results_type), intent(inout) :: self  !! after the first output; earlier calls do nothing
+    character(*), intent(in) :: text            !! a line for each warning; '' for none
     type(sink_type) :: sink
     type(error_type), allocatable :: ignored
 
@@ -408,6 +454,7 @@ contains
       if (self%warnings == text) return
     end if
     self%warnings = text
+    if (.not. self%in_files) return
     if (text == '') then
       call remove_file(in_directory(self%directory, 'warnings.txt'))
       return
@@ -457,9 +504,10 @@ contains
       & //' outputs)'
   end subroutine explain_need
 
-  !> Wait until all that was written is on the disk, with the rows that wait.
+  !> Wait until all that was written is on the disk, with the rows that wait. An error if the system
+  !> reports a failure.
   subroutine sync(self, error)
-    class(results_type), intent(inout) :: self
+    class(results_type), intent(inout) :: self  !! open; before the first output this does nothing
     type(error_type), allocatable, intent(out) :: error
 
     if (.not. (self%open .and. self%started)) return
@@ -472,8 +520,9 @@ contains
 
   !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
   pure function rows_and_times(self, but_rows, but_outputs) result(kept)
-    class(results_type), intent(in) :: self
-    integer, intent(in) :: but_rows, but_outputs
+    class(results_type), intent(in) :: self  !! the results
+    integer, intent(in) :: but_rows          !! how many of the last rows to leave out
+    integer, intent(in) :: but_outputs       !! how many of the last outputs to leave out
     type(kept_type) :: kept
 
     kept%rows = self%history%first_rows(but_rows)
@@ -483,17 +532,46 @@ contains
   !> Whether these are the files of a run that goes on, with all that was written before the first
   !> output.
   pure logical function goes_on(self)
-    class(results_type), intent(in) :: self
+    class(results_type), intent(in) :: self  !! the results
     goes_on = self%resumed
   end function goes_on
 
+  !> From now on keep the fields of each output in memory until the next one is complete.
+  subroutine keep_outputs(self, positions)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: positions(:, :)   !! of the points (point, 3) [m]
+
+    self%positions = positions
+    if (.not. allocated(self%latest)) allocate (self%latest(size(self%fields)))
+  end subroutine keep_outputs
+
+  !> The history so far, and the last complete output if it was to be kept.
+  subroutine answer(self, found)
+    class(results_type), intent(in) :: self
+    type(answer_type), intent(out) :: found
+
+    found%warnings = ''
+    if (allocated(self%warnings)) found%warnings = self%warnings
+    if (.not. allocated(self%columns)) return
+    found%columns = self%columns
+    found%history = transpose(self%history%first_rows(0))
+    found%fields = self%fields
+    found%outputs = self%outputs
+    if (self%outputs > 0) found%time = self%times(self%outputs)
+    if (allocated(self%positions)) found%positions = self%positions
+    allocate (found%values(size(self%fields)))
+    if (allocated(self%complete)) found%values = self%complete
+  end subroutine answer
+
   !> Complete the files. Those of a run that was `stopped` stay as they are, to go on another time;
   !> with `keep_mark` they stay marked as unfinished. After an error in writing they stay as they
-  !> were at the last complete output; if nothing was written, nothing is left behind.
+  !> were at the last complete output; if nothing was written, nothing is left behind. An error if
+  !> what waits cannot be written, or if a file has been removed.
   subroutine close_results(self, error, stopped, keep_mark)
-    class(results_type), intent(inout) :: self
+    class(results_type), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error
-    logical, intent(in), optional :: stopped, keep_mark
+    logical, intent(in), optional :: stopped    !! leave the files to a run that goes on; absent: no
+    logical, intent(in), optional :: keep_mark  !! keep the mark of unfinished results; absent: no
     type(error_type), allocatable :: ignored
     logical :: leave, complete
 
@@ -529,7 +607,8 @@ contains
       call self%csv%close(ignored)
       if (allocated(ignored) .and. .not. allocated(error)) call move_alloc(ignored, error)
     end if
-    if (complete .and. .not. allocated(error)) call mark_complete(self%directory, self%stem)
+    if (complete .and. self%in_files .and. .not. allocated(error)) &
+      & call mark_complete(self%directory, self%stem)
   end subroutine close_results
 
 end module pd_output_results_results

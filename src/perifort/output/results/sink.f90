@@ -1,7 +1,8 @@
 !> Text files written piece by piece, with certainty that what was written is there.
 !>
 !> The C library's streams are used because they tell whether buffered text reached the file;
-!> a Fortran runtime library may lose that news.
+!> a Fortran runtime library may lose that news. An error names the file and, where it can be found,
+!> the system's reason.
 module pd_output_results_sink
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_loc, c_null_char, &
     & c_null_ptr, c_ptr, c_size_t
@@ -66,8 +67,8 @@ contains
 
   !> Make the file, or empty one that is there.
   subroutine open_sink(self, path, error)
-    class(sink_type), intent(out) :: self
-    character(*), intent(in) :: path
+    class(sink_type), intent(out) :: self  !! open on return
+    character(*), intent(in) :: path       !! of the file; one that is there is emptied
     type(error_type), allocatable, intent(out) :: error
 
     self%path = path
@@ -78,8 +79,8 @@ contains
 
   !> Write a piece of text.
   subroutine put(self, text, error)
-    class(sink_type), intent(inout) :: self
-    character(*), target, intent(in) :: text
+    class(sink_type), intent(inout) :: self   !! open
+    character(*), target, intent(in) :: text  !! of any length; nothing is added to it
     type(error_type), allocatable, intent(out) :: error
 
     if (len(text) > 0) call self%put_bytes(c_loc(text), len(text, kind=i8), error)
@@ -87,9 +88,9 @@ contains
 
   !> Write `bytes` bytes from `place`.
   subroutine put_bytes(self, place, bytes, error)
-    class(sink_type), intent(inout) :: self
-    type(c_ptr), intent(in) :: place
-    integer(i8), intent(in) :: bytes
+    class(sink_type), intent(inout) :: self  !! open
+    type(c_ptr), intent(in) :: place         !! address of the first byte
+    integer(i8), intent(in) :: bytes         !! how many
     type(error_type), allocatable, intent(out) :: error
     integer(c_size_t) :: count
 
@@ -102,15 +103,15 @@ contains
 
   !> Write a line.
   subroutine line(self, text, error)
-    class(sink_type), intent(inout) :: self
-    character(*), intent(in) :: text
+    class(sink_type), intent(inout) :: self  !! open
+    character(*), intent(in) :: text         !! without its newline
     type(error_type), allocatable, intent(out) :: error
     call self%put(text//newline, error)
   end subroutine line
 
   !> Hand all to the system.
   subroutine flush_sink(self, error)
-    class(sink_type), intent(inout) :: self
+    class(sink_type), intent(inout) :: self  !! open; all that was written counts as safe on return
     type(error_type), allocatable, intent(out) :: error
 
     if (c_fflush(self%stream) == 0 .and. .not. self%broken) then
@@ -123,7 +124,7 @@ contains
 
   !> Hand all to the system and wait until it is on the disk.
   subroutine sync_sink(self, error)
-    class(sink_type), intent(inout) :: self
+    class(sink_type), intent(inout) :: self  !! open
     type(error_type), allocatable, intent(out) :: error
 
     call self%flush(error)
@@ -132,8 +133,8 @@ contains
 
   !> Give the open file another name, in place of an older file.
   subroutine rename_sink(self, path, error)
-    class(sink_type), intent(inout) :: self
-    character(*), intent(in) :: path
+    class(sink_type), intent(inout) :: self  !! open; goes on under the new name
+    character(*), intent(in) :: path         !! the new name, in the same file system
     type(error_type), allocatable, intent(out) :: error
 
     call rename_file(self%path, path, error)
@@ -142,7 +143,7 @@ contains
 
   !> Complete the file; after a failure it ends with the last piece that was flushed.
   subroutine close_sink(self, error)
-    class(sink_type), intent(inout) :: self
+    class(sink_type), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error
     integer(c_int) :: status
 
@@ -156,7 +157,7 @@ contains
 
   !> Whether the file is open.
   logical function is_open(self)
-    class(sink_type), intent(in) :: self
+    class(sink_type), intent(in) :: self  !! the text file
     is_open = c_associated(self%stream)
   end function is_open
 

@@ -10,14 +10,16 @@ module pd_output_results_types
   !> A quantity that every output holds at every point.
   type :: field_type
     character(label_length) :: name = ''
-    integer :: components = 1              !! 1, or 3 for vectors in any dimension (unused ones 0)
+    integer :: components = 1              !! 3 for vectors in any dimension (unused ones 0)
     character(32) :: unit = ''             !! SI, for instance 'm/s'; '1' for none
+    character(32) :: labels = ''           !! names of the components, parted by blanks: 'x y z'
   end type field_type
 
   !> A quantity that every row of the history holds.
   type :: column_type
     character(label_length) :: name = ''
     character(32) :: unit = ''             !! SI; '1' for none
+    character(16) :: origin = ''           !! 'run', 'boundary' or 'probe': what it belongs to
   end type column_type
 
   !> What of the results a checkpoint counts on.

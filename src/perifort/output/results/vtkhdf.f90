@@ -6,6 +6,9 @@
 !> output is plain data written into places that exist, and after it eight bytes that count: NSteps,
 !> the length of a history column. A file that needs more room is copied into a bigger one, which
 !> then takes its name in one step.
+!>
+!> An error is set where the file cannot be written or read; it is then as it was at its last
+!> complete output.
 module pd_output_results_vtkhdf
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, sp, i1, i4, i8
@@ -43,7 +46,7 @@ module pd_output_results_vtkhdf
     generic :: put_points => put_points_real, put_points_i4, put_points_i1
     procedure :: begin_output
     procedure, private :: put_scalar, put_vector
-    !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
+    !> Write one field of the output under way: `values(n)` or `values(n, components)`.
     generic :: put_field => put_scalar, put_vector
     procedure :: end_output
     procedure :: append_rows
@@ -64,15 +67,17 @@ contains
   !> made under another name until `publish`.
   subroutine create(self, path, positions, fields, planned_outputs, columns, planned_rows, single, &
     & scene_text, command, version, error)
-    class(vtkhdf_file), intent(out) :: self
-    character(*), intent(in) :: path
-    real(wp), intent(in) :: positions(:, :)
-    type(field_type), intent(in) :: fields(:)
-    integer, intent(in) :: planned_outputs
-    type(column_type), intent(in) :: columns(:)
-    integer, intent(in) :: planned_rows
-    logical, intent(in) :: single
-    character(*), intent(in) :: scene_text, command, version
+    class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
+    character(*), intent(in) :: path             !! of the file, with its ending
+    real(wp), intent(in) :: positions(:, :)      !! (n_points, 3) in point order [m]
+    type(field_type), intent(in) :: fields(:)    !! (any number) that every output has
+    integer, intent(in) :: planned_outputs       !! their number; 0: unknown
+    type(column_type), intent(in) :: columns(:)  !! (any number) of the history
+    integer, intent(in) :: planned_rows          !! their number; 0: unknown
+    logical, intent(in) :: single                !! fields in single precision
+    character(*), intent(in) :: scene_text       !! the resolved scene
+    character(*), intent(in) :: command          !! the command line of the run
+    character(*), intent(in) :: version          !! of the program
     type(error_type), allocatable, intent(out) :: error
 
     self%path = path
@@ -116,19 +121,22 @@ contains
   end subroutine plan_layout
 
   !> Go on with a file that was left at or after the outputs and rows in `kept`: what is beyond them
-  !> is cut off. The other arguments are those of `create`; a changed `scene_text` is written.
+  !> is cut off. The other arguments are those of `create`; a changed `scene_text` is written. An
+  !> error if the file has fewer of them, other times, or the results of another scene.
   subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
     & scene_text, command, version, kept, error)
-    class(vtkhdf_file), intent(out) :: self
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: points
-    type(field_type), intent(in) :: fields(:)
-    integer, intent(in) :: planned_outputs
-    type(column_type), intent(in) :: columns(:)
-    integer, intent(in) :: planned_rows
-    logical, intent(in) :: single
-    character(*), intent(in) :: scene_text, command, version
-    type(kept_type), intent(in) :: kept
+    class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
+    character(*), intent(in) :: path             !! of the file, with its ending
+    integer(i8), intent(in) :: points            !! their number
+    type(field_type), intent(in) :: fields(:)    !! (any number) that every output has
+    integer, intent(in) :: planned_outputs       !! of the whole run; 0: unknown
+    type(column_type), intent(in) :: columns(:)  !! (any number) of the history
+    integer, intent(in) :: planned_rows          !! of the whole run; 0: unknown
+    logical, intent(in) :: single                !! fields in single precision
+    character(*), intent(in) :: scene_text       !! the resolved scene of this run
+    character(*), intent(in) :: command          !! the command line of this run
+    character(*), intent(in) :: version          !! of this program
+    type(kept_type), intent(in) :: kept  !! rows, times and scene that the checkpoint counts on
     type(error_type), allocatable, intent(out) :: error
     type(layout_type) :: plan
     character(:), allocatable :: text
@@ -217,28 +225,33 @@ contains
     if (.not. allocated(error)) call flush_file(self%file, error)
   end subroutine cut_back
 
+  !> An array of reals over the points. An error if its length is wrong or the layout has ended.
   subroutine put_points_real(self, name, values, error)
-    class(vtkhdf_file), intent(inout) :: self
-    character(*), intent(in) :: name
-    real(wp), contiguous, intent(in) :: values(:)
+    class(vtkhdf_file), intent(inout) :: self      !! being laid out
+    character(*), intent(in) :: name               !! of the array, below `/points`
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     call check_points(self, name, size(values, kind=i8), error)
     if (.not. allocated(error)) call put_array(self%file, '/points/'//trim(name), values, error)
   end subroutine put_points_real
 
+  !> An array of 32-bit integers over the points. An error if its length is wrong or the layout has
+  !> ended.
   subroutine put_points_i4(self, name, values, error)
-    class(vtkhdf_file), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i4), contiguous, intent(in) :: values(:)
+    class(vtkhdf_file), intent(inout) :: self         !! being laid out
+    character(*), intent(in) :: name                  !! of the array, below `/points`
+    integer(i4), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     call check_points(self, name, size(values, kind=i8), error)
     if (.not. allocated(error)) call put_array(self%file, '/points/'//trim(name), values, error)
   end subroutine put_points_i4
 
+  !> An array of 8-bit integers over the points. An error if its length is wrong or the layout has
+  !> ended.
   subroutine put_points_i1(self, name, values, error)
-    class(vtkhdf_file), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(i1), contiguous, intent(in) :: values(:)
+    class(vtkhdf_file), intent(inout) :: self         !! being laid out
+    character(*), intent(in) :: name                  !! of the array, below `/points`
+    integer(i1), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
     call check_points(self, name, size(values, kind=i8), error)
     if (.not. allocated(error)) call put_array(self%file, '/points/'//trim(name), values, error)
@@ -271,7 +284,7 @@ contains
 
   !> Make room for the next output.
   subroutine begin_output(self, error)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! with room for the output on return
     type(error_type), allocatable, intent(out) :: error
 
     call seal(self, error)
@@ -282,9 +295,9 @@ contains
 
   !> Write field `i` of the output under way: `values(n)`.
   subroutine put_scalar(self, i, values, error)
-    class(vtkhdf_file), intent(inout) :: self
-    integer, intent(in) :: i
-    real(wp), contiguous, intent(in) :: values(:)
+    class(vtkhdf_file), intent(inout) :: self      !! the results file
+    integer, intent(in) :: i                       !! number of the field, from 1
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: path
     real(sp), allocatable :: short(:)
@@ -304,11 +317,11 @@ contains
     end do
   end subroutine put_scalar
 
-  !> Write field `i` of the output under way: `values(n, 3)`.
+  !> Write field `i` of the output under way: `values(n, components)`.
   subroutine put_vector(self, i, values, error)
-    class(vtkhdf_file), intent(inout) :: self
-    integer, intent(in) :: i
-    real(wp), intent(in) :: values(:, :)
+    class(vtkhdf_file), intent(inout) :: self  !! the results file
+    integer, intent(in) :: i                   !! number of the field, from 1
+    real(wp), intent(in) :: values(:, :)       !! (n_points, 3) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
 
     call write_vectors(self%file, '/VTKHDF/PointData/'//trim(self%layout%fields(i)%name), &
@@ -317,8 +330,8 @@ contains
 
   !> Complete the output under way at `time` [s]: from here on it counts.
   subroutine end_output(self, time, error)
-    class(vtkhdf_file), intent(inout) :: self
-    real(wp), intent(in) :: time
+    class(vtkhdf_file), intent(inout) :: self  !! with one complete output more on return
+    real(wp), intent(in) :: time               !! of the state [s]
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: ignored
 
@@ -338,8 +351,8 @@ contains
 
   !> Append `table(rows, columns)` to the history.
   subroutine append_rows(self, table, error)
-    class(vtkhdf_file), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: table(:, :)
+    class(vtkhdf_file), intent(inout) :: self        !! with these rows on return
+    real(wp), contiguous, intent(in) :: table(:, :)  !! (row, column) to be added
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: ignored
     integer(i8) :: rows
@@ -430,7 +443,7 @@ contains
 
   !> Give the file its final name, in place of an older one.
   subroutine publish(self, error)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! has its final name on return
     type(error_type), allocatable, intent(out) :: error
 
     if (self%current == self%path) return
@@ -443,7 +456,7 @@ contains
 
   !> Wait until all that was written is on the disk.
   subroutine sync(self, error)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! the results file
     type(error_type), allocatable, intent(out) :: error
 
     call flush_file(self%file, error)
@@ -452,7 +465,7 @@ contains
 
   !> Close the file with the room that it has, to go on with it another time.
   subroutine leave(self, error)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! not open on return
     type(error_type), allocatable, intent(out) :: error
     call close_file(self%file, error)
   end subroutine leave
@@ -460,8 +473,8 @@ contains
   !> Keep the warnings of a run as `/scene/warnings`, in place of those that are there. To be called
   !> before `finish`, since it changes HDF5's own records. A file without them is as good.
   subroutine put_warnings(self, text)
-    class(vtkhdf_file), intent(inout) :: self
-    character(*), intent(in) :: text
+    class(vtkhdf_file), intent(inout) :: self  !! the results file
+    character(*), intent(in) :: text           !! a line for each; '' for none
     type(error_type), allocatable :: ignored
 
     if (self%file%id < 0) return
@@ -472,7 +485,7 @@ contains
 
   !> Cut off room that wasn't needed and close the file.
   subroutine finish(self, error)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error
 
     if (self%file%id < 0) return
@@ -484,7 +497,7 @@ contains
   !> output: closing it would write records that belong to what failed, so its identifier is
   !> given up instead. One that never got its final name is removed.
   subroutine abandon(self)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable :: ignored
 
     if (allocated(self%current)) then
@@ -498,13 +511,13 @@ contains
 
   !> Bytes that one output takes.
   pure integer(i8) function output_bytes(self)
-    class(vtkhdf_file), intent(in) :: self
+    class(vtkhdf_file), intent(in) :: self  !! the results file
     output_bytes = self%layout%output_bytes()
   end function output_bytes
 
   !> Bytes that are written before the first output.
   pure integer(i8) function layout_bytes(self)
-    class(vtkhdf_file), intent(in) :: self
+    class(vtkhdf_file), intent(in) :: self  !! the results file
     layout_bytes = self%layout%fixed_bytes()
   end function layout_bytes
 

@@ -1,7 +1,8 @@
 !> A series of .vtu files, one for each output, with a .pvd file that lists their times: for
 !> programs that don't read VTKHDF. Arrays are base64 within the XML, which every reader knows.
 !>
-!> Each file gets its name when it is complete, and the list names only complete files.
+!> Each file gets its name when it is complete, and the list names only complete files. An error is
+!> set where one cannot be written.
 module pd_output_results_vtu
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use pd_base_error, only: error_type, fail
@@ -35,7 +36,7 @@ module pd_output_results_vtu
     procedure :: sync
     procedure :: begin_output
     procedure, private :: put_scalar, put_vector
-    !> Write one field of the output under way: `values(n)` or `values(n, 3)`.
+    !> Write one field of the output under way: `values(n)` or `values(n, components)`.
     generic :: put_field => put_scalar, put_vector
     procedure :: end_output
     procedure :: output_bytes
@@ -52,11 +53,12 @@ contains
 
   !> Begin a series `stem_000000.vtu` ... in `directory` of `fields` at `positions(n, 3)` [m].
   subroutine create(self, directory, stem, positions, fields, single)
-    class(vtu_series), intent(out) :: self
-    character(*), intent(in) :: directory, stem
-    real(wp), intent(in) :: positions(:, :)
-    type(field_type), intent(in) :: fields(:)
-    logical, intent(in) :: single
+    class(vtu_series), intent(out) :: self     !! without an output; no file is made yet
+    character(*), intent(in) :: directory      !! folder of the files, which is there
+    character(*), intent(in) :: stem           !! name of the files without number and ending
+    real(wp), intent(in) :: positions(:, :)    !! (n_points, 3) in point order [m]
+    type(field_type), intent(in) :: fields(:)  !! (any number) that every output has
+    logical, intent(in) :: single              !! fields in single precision
 
     self%directory = directory
     self%stem = stem
@@ -66,10 +68,11 @@ contains
     self%single = single
   end subroutine create
 
-  !> Go on with a series, made ready by `create`, after the outputs at `times` [s]; later ones go.
+  !> Go on with a series, made ready by `create`, after the outputs at `times` [s]; later ones are
+  !> removed. An error if the file of one of them is missing.
   subroutine resume(self, times, error)
-    class(vtu_series), intent(inout) :: self
-    real(wp), intent(in) :: times(:)
+    class(vtu_series), intent(inout) :: self  !! as `create` left it; with these outputs on return
+    real(wp), intent(in) :: times(:)          !! (outputs) that the checkpoint counts on [s]
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: name
     integer :: i
@@ -91,7 +94,7 @@ contains
 
   !> Wait until all complete outputs are on the disk.
   subroutine sync(self, error)
-    class(vtu_series), intent(inout) :: self
+    class(vtu_series), intent(inout) :: self  !! its complete outputs count as on the disk on return
     type(error_type), allocatable, intent(out) :: error
     integer :: i
 
@@ -116,7 +119,7 @@ contains
 
   !> Begin the file of the next output: points and cells.
   subroutine begin_output(self, error)
-    class(vtu_series), intent(inout) :: self
+    class(vtu_series), intent(inout) :: self  !! with a file open on return
     type(error_type), allocatable, intent(out) :: error
     character(24) :: n
 
@@ -173,20 +176,43 @@ contains
   end subroutine put_cells
 
   !> Begin an array of `bytes` bytes; its encoded bytes start with their number.
-  subroutine begin_array(sink, array, kind_name, name, components, bytes, error)
+  subroutine begin_array(sink, array, kind_name, name, components, bytes, error, labels)
     type(sink_type), intent(inout) :: sink
     type(array_type), intent(inout) :: array
     character(*), intent(in) :: kind_name, name
     integer, intent(in) :: components
     integer(i8), intent(in) :: bytes
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
+    character(:), allocatable :: named
     character(8) :: number
 
+    named = ''
+    if (present(labels)) named = component_names(labels)
     write (number, '(i0)') components
     call sink%put('<DataArray type="'//kind_name//'" Name="'//trim(name) &
-      & //'" NumberOfComponents="'//trim(number)//'" format="binary">', error)
+      & //'" NumberOfComponents="'//trim(number)//'"'//named//' format="binary">', error)
     if (.not. allocated(error)) call put_bytes(sink, array, transfer(bytes, [0_i1]), error)
   end subroutine begin_array
+
+  !> Names of components as attributes. Readers know x, y and z by themselves.
+  pure function component_names(labels) result(text)
+    character(*), intent(in) :: labels            !! parted by blanks
+    character(:), allocatable :: text, rest
+    character(8) :: number
+    integer :: c, blank
+
+    text = ''
+    rest = trim(labels)
+    c = 0
+    do while (rest /= '' .and. labels /= 'x y z')
+      blank = index(rest//' ', ' ')
+      write (number, '(i0)') c
+      text = text//' ComponentName'//trim(number)//'="'//rest(:blank - 1)//'"'
+      rest = trim(adjustl(rest(blank:)))
+      c = c + 1
+    end do
+  end function component_names
 
   subroutine put_bytes(sink, array, bytes, error)
     type(sink_type), intent(inout) :: sink
@@ -214,13 +240,14 @@ contains
     call sink%line(array%text(:length)//'</DataArray>', error)
   end subroutine end_array
 
-  !> Write `values(n, 3)` as an array of vectors, block by block.
-  subroutine put_vectors(sink, name, values, single, error)
+  !> Write `values(n, components)` as an array of vectors, block by block.
+  subroutine put_vectors(sink, name, values, single, error, labels)
     type(sink_type), intent(inout) :: sink
     character(*), intent(in) :: name
     real(wp), intent(in) :: values(:, :)
     logical, intent(in) :: single
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
     type(array_type) :: array
     real(wp), allocatable :: turned(:)
     integer :: n, first, count, width, i
@@ -229,7 +256,7 @@ contains
     width = size(values, 2)
     allocate (turned(width*min(n, block_rows)))
     call begin_array(sink, array, merge('Float32', 'Float64', single), name, width, &
-      & merge(4_i8, 8_i8, single)*n*width, error)
+      & merge(4_i8, 8_i8, single)*n*width, error, labels)
     do first = 0, n - 1, block_rows
       if (allocated(error)) return
       count = min(block_rows, n - first)
@@ -260,10 +287,11 @@ contains
     call put_bytes(sink, array, bytes, error)
   end subroutine put_reals
 
+  !> Write field `i` of the output under way: `values(n)`.
   subroutine put_scalar(self, i, values, error)
-    class(vtu_series), intent(inout) :: self
-    integer, intent(in) :: i
-    real(wp), contiguous, intent(in) :: values(:)
+    class(vtu_series), intent(inout) :: self       !! the series
+    integer, intent(in) :: i                       !! number of the field, from 1
+    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
     type(array_type) :: array
     integer :: n, first, count
@@ -279,18 +307,20 @@ contains
     if (.not. allocated(error)) call end_array(self%sink, array, error)
   end subroutine put_scalar
 
+  !> Write field `i` of the output under way: `values(n, 3)`.
   subroutine put_vector(self, i, values, error)
-    class(vtu_series), intent(inout) :: self
-    integer, intent(in) :: i
-    real(wp), intent(in) :: values(:, :)
+    class(vtu_series), intent(inout) :: self  !! the series
+    integer, intent(in) :: i                  !! number of the field, from 1
+    real(wp), intent(in) :: values(:, :)      !! (n_points, 3) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
-    call put_vectors(self%sink, trim(self%fields(i)%name), values, self%single, error)
+    call put_vectors(self%sink, trim(self%fields(i)%name), values, self%single, error, &
+      & trim(self%fields(i)%labels))
   end subroutine put_vector
 
   !> Complete the file of the output at `time` [s] and list it.
   subroutine end_output(self, time, error)
-    class(vtu_series), intent(inout) :: self
-    real(wp), intent(in) :: time
+    class(vtu_series), intent(inout) :: self  !! with one complete output more on return
+    real(wp), intent(in) :: time              !! of the state [s]
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: name
     real(wp), allocatable :: longer(:)
@@ -345,7 +375,7 @@ contains
 
   !> Bytes of one file, within some hundreds.
   pure integer(i8) function output_bytes(self)
-    class(vtu_series), intent(in) :: self
+    class(vtu_series), intent(in) :: self  !! the series
     integer(i8) :: width
 
     width = 3*8 + 2*8 + 1 + sum(self%fields%components)*merge(4, 8, self%single)
@@ -367,7 +397,7 @@ contains
         safe = safe//'&lt;'
       case ('"')
         safe = safe//'&quot;'
-      case default
+      case default  ! any other character stands for itself
         safe = safe//text(i:i)
       end select
     end do
@@ -375,7 +405,7 @@ contains
 
   !> Give up the output under way and remove what there is of it.
   subroutine abandon(self)
-    class(vtu_series), intent(inout) :: self
+    class(vtu_series), intent(inout) :: self  !! without an open file on return
     type(error_type), allocatable :: ignored
 
     if (.not. self%sink%is_open()) return
@@ -386,8 +416,9 @@ contains
   !> Remove the files of an older series from number `first` (0 = the first) on. The last goes
   !> first, so that an end in the midst leaves no gap that would hide the others.
   subroutine remove_series(directory, stem, first)
-    character(*), intent(in) :: directory, stem
-    integer, intent(in) :: first
+    character(*), intent(in) :: directory  !! folder of the files; '' for the current one
+    character(*), intent(in) :: stem       !! name of the files without number and ending
+    integer, intent(in) :: first           !! number of the first that is removed
     integer :: last, i
 
     if (first == 0) call remove_file(in_directory(directory, stem//'.pvd'))

@@ -1,4 +1,5 @@
-!> Give a key of a scanned scene another value, as if the user had written it.
+!> Give a key of a scanned scene another value, as if the user had written it: a word of `&study`,
+!> or one of the option `--set` of the command line.
 !>
 !> The new words carry the place of the text they come from, so that what is wrong with them is
 !> reported there. The scene is read anew afterwards: a changed scene obeys the same rules as any.
@@ -6,14 +7,16 @@ module pd_scene_content_change
   use pd_base_error, only: error_type
   use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_format_elements, only: find_elements, growing
-  use pd_scene_content_groups, only: describe_group, group_names, group_repeatable
+  use pd_scene_content_groups, only: list_groups, table_of
+  use pd_scene_content_types, only: group_table, name_length, path_length, scene_type
+  use pd_scene_format_file, only: line_type
+  use pd_scene_format_find, only: find_section
   use pd_scene_format_keys, only: keys_type
-  use pd_scene_content_rules, only: find_section
-  use pd_scene_format_source, only: entry_type, section_type, source_fault, source_type, token_type
-  use pd_scene_content_types, only: name_length
+  use pd_scene_format_source, only: add_option, check_text, entry_type, scan_source, section_type, &
+    & source_fault, source_type, token_type
   implicit none (type, external)
   private
-  public :: target_type, find_target, change_key, words_of, full_name
+  public :: target_type, find_target, change_key, words_of, full_name, apply_changes, scan_scene
 
   !> A key of a scene, or an element of one.
   type :: target_type
@@ -27,18 +30,157 @@ module pd_scene_content_change
 
 contains
 
+  !> The text of a scene that has been read before, scanned again, with what `--set` changes in it.
+  !> An error is set if the text cannot be scanned or a change is wrong.
+  subroutine scan_scene(scene, source, error)
+    type(scene_type), intent(in) :: scene          !! with its text
+    type(source_type), intent(out) :: source       !! the scanned text with the changes in it
+    type(error_type), allocatable, intent(out) :: error
+    type(group_table) :: table
+
+    call scan_source(scene%text, scene%file, source, error)
+    if (allocated(error) .or. .not. allocated(scene%changes)) return
+    call table_of(scene, table)
+    call apply_changes(source, scene%changes, error, table)
+  end subroutine scan_scene
+
+  !> Change a scanned scene as `--set group%key=value` asks, in this order. What is wrong with a
+  !> change has its place on the command line.
+  subroutine apply_changes(source, changes, error, table)
+    type(source_type), intent(inout) :: source
+      !! scanned; with the new values, and the options as lines of its text, on return
+    type(line_type), intent(in) :: changes(:)         !! `group%key=value`, a change each
+    type(error_type), allocatable, intent(out) :: error
+    type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
+    character(*), parameter :: option = '--set '
+    type(target_type) :: target
+    type(token_type) :: place
+    type(token_type), allocatable :: tokens(:)
+    character(path_length) :: names(size(changes))
+    integer :: i, equals
+
+    do i = 1, size(changes)
+      associate (change => changes(i)%text)
+        call add_option(source, option//change, place%line)
+        call check_text(source, error)
+        if (allocated(error)) return
+        equals = index(change, '=')
+        place%column = len(option) + 1
+        place%width = max(1, equals - 1)
+        if (equals < 2 .or. len_trim(change) == equals) then
+          place%width = max(1, len(change))
+          call source_fault(source, place%line, place%column, place%width, &
+            & 'a change without a key or a value', 'expected group%key=value', error)
+          return
+        end if
+        call find_target(source, change(:equals - 1), place, target, error, table, setting=.true.)
+        if (allocated(error)) return
+        names(i) = full_name(source, target)
+        if (any(names(:i - 1) == names(i))) then
+          call source_fault(source, place%line, place%column, place%width, "'"//trim(names(i))// &
+            & "' is set twice", 'give one of the values', error)
+          return
+        end if
+        call option_tokens(source, target, change(equals + 1:), len(option) + equals, place%line, &
+          & tokens, error)
+        if (allocated(error)) return
+        call put_tokens(source, target, tokens, place, error)
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine apply_changes
+
+  !> The tokens of a value on the command line: written as in the file, but that texts need no
+  !> quotes, which the shell takes away.
+  subroutine option_tokens(source, target, value, before, line, tokens, error)
+    type(source_type), intent(in) :: source
+    type(target_type), intent(in) :: target
+    character(*), intent(in) :: value
+    integer, intent(in) :: before        !! columns of the option before the value
+    integer, intent(in) :: line          !! of the option
+    type(token_type), allocatable, intent(out) :: tokens(:)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: frame = '&x k = '
+    type(source_type) :: inside
+    type(error_type), allocatable :: fault
+    type(token_type) :: token
+    integer :: last, i, next, first
+
+    last = len_trim(value)
+    if (index(target%kind, 'text') == 1 .and. value(:1) /= "'" .and. value(:1) /= '"') then
+      allocate (tokens(0))
+      first = 1
+      do while (first <= last)
+        next = last + 1
+        if (target%kind == 'text list' .and. .not. allocated(target%subscript)) &
+          & next = first + index(value(first:last)//',', ',') - 1
+        token%text = trim(adjustl(value(first:next - 1)))
+        token%quoted = .true.
+        token%line = line
+        token%column = before + first
+        token%width = max(1, next - first)
+        tokens = [tokens, token]
+        first = next + 1
+      end do
+      return
+    end if
+    call scan_source(frame//value//' /', '', inside, fault)
+    if (.not. allocated(fault)) then
+      i = inside%token_count
+      if (inside%entry_count == 1 .and. i > 0) then
+        ! nothing may follow, be it another key or the end of the group
+        if (inside%tokens(i)%column + inside%tokens(i)%width - 1 >= len(frame) + last) &
+          & tokens = inside%tokens
+      end if
+    end if
+    if (.not. allocated(tokens)) then
+      call source_fault(source, line, before + 1, max(1, last), "bad value '"//trim(value)// &
+        & "' for key '"//target%key//"'", 'expected what may stand behind key = in the file', error)
+      return
+    end if
+    do i = 1, size(tokens)
+      tokens(i)%line = line
+      tokens(i)%column = tokens(i)%column - len(frame) + before
+    end do
+    if (allocated(target%subscript) .and. (size(tokens) > 1 .or. any(tokens%repeat > 1))) &
+      & call source_fault(source, line, before + 1, max(1, last), "too many values for '"// &
+      & target%key//'('//target%subscript//")'", 'expected one', error)
+  end subroutine option_tokens
+
   !> The key that `name` means: `group%key`, `group.key`, or `key` alone where only one group has
   !> such a key; a group that is repeated needs its number, `group(2)%key`; `key(2)` is an element.
-  !> `place` is where the name stands, for messages.
-  subroutine find_target(source, name, place, target, error)
-    type(source_type), intent(in) :: source
-    character(*), intent(in) :: name
-    type(token_type), intent(in) :: place
-    type(target_type), intent(out) :: target
+  !> `place` is where the name stands, for messages. An error is set if no key or several keys are
+  !> meant, or if the scene has no such group.
+  subroutine find_target(source, name, place, target, error, table, setting)
+    type(source_type), intent(in) :: source           !! the scanned scene
+    character(*), intent(in) :: name  !! of the key, in any case, with or without blanks
+    type(token_type), intent(in) :: place             !! where the name stands
+    type(target_type), intent(out) :: target  !! the key with its group, number, subscript and kind
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: text, number
+    type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
+    logical, intent(in), optional :: setting          !! for `--set`; without, for `&study`
+    type(group_table) :: known
+    character(name_length), allocatable :: names(:)
+    character(:), allocatable :: text, number, verb, done
     integer :: at, status
+    logical :: repeatable
 
+    if (present(table)) then
+      known = table
+    else
+      call list_groups(known)
+    end if
+    names = known%names()
+    verb = 'vary'
+    done = 'varied'
+    if (present(setting)) then
+      if (setting) then
+        verb = 'set'
+        done = 'set'
+      end if
+    end if
+    ! a study that varies itself would have no end
+    if (verb == 'vary') names = pack(names, names /= 'study')
     text = without_blanks(lower_case(name))
     at = scan(text, '%.')
     target%group = text(:max(0, at - 1))
@@ -47,18 +189,18 @@ contains
     call cut_subscript(target%group, number)
     if (index(target%group, '&') == 1) target%group = target%group(2:)
     if (at == 0) then
-      call search_groups(source, place, target, error)
-    else if (all(group_names /= target%group) .or. target%group == 'study') then
-      call bad("no group &"//target%group//' can be varied', hint(target%group, &
-        & pack(group_names, group_names /= 'study')))
+      call search_groups(source, known, names, place, target, error)
+    else if (all(names /= target%group)) then
+      call bad("no group &"//target%group//' can be '//done, hint(target%group, names))
     end if
     if (allocated(error)) return
-    call describe(target)
+    call describe(known, target)
     if (len(target%kind) == 0) then
       call bad("&"//target%group//" has no key '"//target%key//"'", hint(target%key, &
-        & keys_of(target%group)))
+        & keys_of(known, target%group)))
       return
     end if
+    repeatable = known%entries(known%place_of(target%group))%repeatable
     target%numbered = allocated(number)
     if (target%numbered) then
       read (number, *, iostat=status) target%number
@@ -66,14 +208,15 @@ contains
       if (target%number < 1 .or. find_section(source, target%group, target%number) == 0) &
         & call bad('there is no group &'//target%group//' number '//number, &
         & 'the scene has '//to_text(groups_named(source, target%group)))
-    else if (group_repeatable(target%group) .and. target%key /= 'points') then
+    else if (repeatable .and. (target%key /= 'points' .or. verb == 'set')) then
+      ! a study varies the points of all bodies together
       if (groups_named(source, target%group) > 1) call bad('the scene has '// &
         & to_text(groups_named(source, target%group))//' groups &'//target%group, &
         & 'say which: '//target%group//'(1)%'//target%key)
     end if
     if (allocated(error)) return
-    if (group_repeatable(target%group) .and. groups_named(source, target%group) == 0) &
-      & call bad('the scene has no group &'//target%group, 'there is nothing to vary')
+    if (repeatable .and. groups_named(source, target%group) == 0) &
+      & call bad('the scene has no group &'//target%group, 'there is nothing to '//verb)
 
   contains
 
@@ -85,8 +228,10 @@ contains
   end subroutine find_target
 
   !> The group of a key that is named alone.
-  subroutine search_groups(source, place, target, error)
+  subroutine search_groups(source, table, names, place, target, error)
     type(source_type), intent(in) :: source
+    type(group_table), intent(in) :: table
+    character(*), intent(in) :: names(:)       !! of the groups to be searched
     type(token_type), intent(in) :: place
     type(target_type), intent(inout) :: target
     type(error_type), allocatable, intent(out) :: error
@@ -95,12 +240,12 @@ contains
 
     number = 0
     found = ''
-    do g = 1, size(group_names)
-      if (group_names(g) == 'study') cycle
-      target%group = trim(group_names(g))
-      call describe(target)
+    do g = 1, size(names)
+      target%group = trim(names(g))
+      call describe(table, target)
       if (len(target%kind) == 0) cycle
-      if (group_repeatable(target%group) .and. groups_named(source, target%group) == 0) cycle
+      if (table%entries(table%place_of(target%group))%repeatable .and. &
+        & groups_named(source, target%group) == 0) cycle
       number = number + 1
       if (number > 1) found = found//', '
       found = found//target%group//'%'//target%key
@@ -118,8 +263,8 @@ contains
 
   !> The name in full, `group(2)%key(1)`; the number only where the scene has several such groups.
   function full_name(source, target) result(name)
-    type(source_type), intent(in) :: source
-    type(target_type), intent(in) :: target
+    type(source_type), intent(in) :: source  !! the scanned scene
+    type(target_type), intent(in) :: target  !! as `find_target` found it
     character(:), allocatable :: name
 
     name = target%group
@@ -129,17 +274,28 @@ contains
   end function full_name
 
   !> Give the key the value that `word` says: one value as it is written, or several parted by
-  !> commas. `place` is where it stands.
+  !> commas. `place` is where it stands. An error is set if the key has no such element.
   subroutine change_key(source, target, word, place, error)
-    type(source_type), intent(inout) :: source
-    type(target_type), intent(in) :: target
-    character(*), intent(in) :: word
-    type(token_type), intent(in) :: place
+    type(source_type), intent(inout) :: source  !! scanned; with the new value on return
+    type(target_type), intent(in) :: target     !! as `find_target` found it
+    character(*), intent(in) :: word            !! the value, as in a scene file
+    type(token_type), intent(in) :: place       !! gets the blame for what is wrong with the value
     type(error_type), allocatable, intent(out) :: error
     type(token_type), allocatable :: tokens(:)
-    integer :: section
 
     call words_of(word, place, tokens)
+    call put_tokens(source, target, tokens, place, error)
+  end subroutine change_key
+
+  !> Give the key the value that the tokens say, or an element that the first of them says.
+  subroutine put_tokens(source, target, tokens, place, error)
+    type(source_type), intent(inout) :: source
+    type(target_type), intent(in) :: target
+    type(token_type), intent(in) :: tokens(:)
+    type(token_type), intent(in) :: place      !! of the key
+    type(error_type), allocatable, intent(out) :: error
+    integer :: section
+
     section = find_section(source, target%group, target%number)
     if (section == 0) then
       call append_section(source, target%group, place)
@@ -150,13 +306,13 @@ contains
     else
       call replace_entries(source, section, target%key, [''], [1], tokens, place)
     end if
-  end subroutine change_key
+  end subroutine put_tokens
 
   !> The tokens of a word as it is written: a text in quotes, or values parted by commas.
   subroutine words_of(word, place, tokens)
-    character(*), intent(in) :: word
-    type(token_type), intent(in) :: place
-    type(token_type), allocatable, intent(out) :: tokens(:)
+    character(*), intent(in) :: word                         !! the value, as in a scene file
+    type(token_type), intent(in) :: place                    !! given to all tokens
+    type(token_type), allocatable, intent(out) :: tokens(:)  !! (values) each without quotes
     character(:), allocatable :: rest
     integer :: number, i, comma
 
@@ -316,26 +472,28 @@ contains
   end subroutine append_section
 
   !> The kind of a key, '' if its group has none of that name.
-  subroutine describe(target)
+  subroutine describe(table, target)
+    type(group_table), intent(in) :: table
     type(target_type), intent(inout) :: target
     type(keys_type) :: keys
     integer :: k
 
     target%kind = ''
-    call describe_group(keys, target%group)
+    call table%describe(target%group, keys)
     do k = 1, keys%count
       if (keys%known(k)%name == target%key) target%kind = keys%known(k)%kind
     end do
   end subroutine describe
 
   !> The names of all keys of a group.
-  function keys_of(group) result(names)
+  function keys_of(table, group) result(names)
+    type(group_table), intent(in) :: table
     character(*), intent(in) :: group
     character(name_length), allocatable :: names(:)
     type(keys_type) :: keys
     integer :: k
 
-    call describe_group(keys, group)
+    call table%describe(group, keys)
     allocate (names(keys%count))
     do k = 1, keys%count
       names(k) = keys%known(k)%name

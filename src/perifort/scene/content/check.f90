@@ -6,10 +6,11 @@ module pd_scene_content_check
   use pd_base_text, only: to_text
   use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
   use pd_scene_content_check_bodies, only: check_body, check_shape, check_material, check_crack
-  use pd_scene_content_groups, only: default_fields, default_probe_fields
+  use pd_scene_content_defaults, only: fill_defaults
+  use pd_scene_content_groups, only: default_fields, default_probe_fields, table_of
   use pd_scene_content_rules, only: rule_fault, given, check_known, check_unique, check_vector
   use pd_scene_format_source, only: source_type
-  use pd_scene_content_types, only: scene_type, is_set, name_length
+  use pd_scene_content_types, only: group_table, scene_type, is_set, name_length
   implicit none (type, external)
   private
   public :: check_scene, allocate_groups
@@ -19,14 +20,17 @@ contains
   !> Check a scene and complete it: afterwards every list is allocated, every body has its
   !> material, Poisson's ratios, ramps, the factor of relaxation and the lists of fields are the
   !> ones to compute with. `source` gives the messages their places. A complete scene stays as it
-  !> is.
+  !> is. An error is set at the first broken rule.
   subroutine check_scene(scene, error, source)
-    type(scene_type), intent(inout) :: scene
+    type(scene_type), intent(inout) :: scene           !! as read or built; complete on return
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
+      !! the scanned file; without, messages name group and key only
     integer :: i
 
     call allocate_groups(scene)
+    call fill_defaults(scene, error, source)
+    if (allocated(error)) return
     call check_numbers(scene, error, source)
     if (allocated(error)) return
     call check_settings(scene, error, source)
@@ -79,20 +83,14 @@ contains
   !> Lists that nobody has filled get size 0, so that loops need no question.
   subroutine allocate_groups(scene)
     type(scene_type), intent(inout) :: scene
+      !! every list of groups, the text and the name of the file are allocated on return
+    type(group_table) :: table
 
     if (.not. allocated(scene%file)) scene%file = ''
     if (.not. allocated(scene%text)) scene%text = ''
-    if (.not. allocated(scene%bodies)) allocate (scene%bodies(0))
-    if (.not. allocated(scene%removed)) allocate (scene%removed(0))
-    if (.not. allocated(scene%regions)) allocate (scene%regions(0))
-    if (.not. allocated(scene%materials)) allocate (scene%materials(0))
-    if (.not. allocated(scene%cracks)) allocate (scene%cracks(0))
-    if (.not. allocated(scene%no_fail)) allocate (scene%no_fail(0))
-    if (.not. allocated(scene%initial)) allocate (scene%initial(0))
-    if (.not. allocated(scene%boundaries)) allocate (scene%boundaries(0))
-    if (.not. allocated(scene%loads)) allocate (scene%loads(0))
-    if (.not. allocated(scene%probes)) allocate (scene%probes(0))
-    if (.not. allocated(scene%studies)) allocate (scene%studies(0))
+    if (.not. allocated(scene%changes)) allocate (scene%changes(0))
+    call table_of(scene, table)
+    call table%complete(scene)
   end subroutine allocate_groups
 
   !> Bodies, materials and layers have numbers of 16 bits.

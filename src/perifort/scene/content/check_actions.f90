@@ -14,12 +14,12 @@ module pd_scene_content_check_actions
 contains
 
   !> One `&initial`; in relaxation its temperature change grows over the load steps unless it says
-  !> otherwise.
+  !> otherwise. An error is set if a rule is broken.
   subroutine check_initial(scene, number, error, source)
-    type(scene_type), intent(inout) :: scene
-    integer, intent(in) :: number
+    type(scene_type), intent(inout) :: scene           !! gets the default of `ramp_time`
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: d
 
     d = scene%header%dimension
@@ -77,12 +77,13 @@ contains
 
   end subroutine check_initial
 
-  !> One `&boundary`; in relaxation its ramp goes over the load steps unless it says otherwise.
+  !> One `&boundary`; in relaxation its ramp goes over the load steps unless it says otherwise. An
+  !> error is set if a rule is broken.
   subroutine check_boundary(scene, number, error, source)
-    type(scene_type), intent(inout) :: scene
-    integer, intent(in) :: number
+    type(scene_type), intent(inout) :: scene           !! gets the default of `ramp_time`
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
     integer :: i, d
 
@@ -121,11 +122,12 @@ contains
   end subroutine check_boundary
 
   !> One `&load`; the only body and, in relaxation, the ramp over the load steps go without saying.
+  !> An error is set if a rule is broken.
   subroutine check_load(scene, number, error, source)
-    type(scene_type), intent(inout) :: scene
-    integer, intent(in) :: number
+    type(scene_type), intent(inout) :: scene  !! gets the defaults of `body` and `ramp_time`
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: d
 
     d = scene%header%dimension

@@ -22,12 +22,13 @@ module pd_scene_content_check_bodies
 
 contains
 
-  !> One `&body`: its material, and its lattice or its file. The only material is the default.
+  !> One `&body`: its material, and its lattice or its file. The only material is the default. An
+  !> error is set if a rule is broken, such as unequal spacings.
   subroutine check_body(scene, number, error, source)
-    type(scene_type), intent(inout) :: scene
-    integer, intent(in) :: number
+    type(scene_type), intent(inout) :: scene           !! gets the default of the body's `material`
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: i, d
     logical :: lattice
 
@@ -158,14 +159,15 @@ contains
     end do
   end function listed
 
-  !> A file that a group names must be there.
+  !> A file that a group names must be there. An error is set if it is not.
   subroutine check_file(name, scene_file, group, number, error, source)
-    character(*), intent(in) :: name
+    character(*), intent(in) :: name                     !! of the file, as the scene says it
     character(:), allocatable, intent(in) :: scene_file
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
+      !! path of the scene file, whose folder is looked in first; may be unallocated
+    character(*), intent(in) :: group                    !! name of the group that names the file
+    integer, intent(in) :: number                        !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source    !! the scanned file, for places
     character(:), allocatable :: path
     logical :: exists
 
@@ -177,14 +179,15 @@ contains
       & source)
   end subroutine check_file
 
-  !> The shape keys of `&remove`, `&region` and `&no_fail`: those of its kind and no others.
+  !> The shape keys of `&remove`, `&region` and `&no_fail`: those of its kind and no others. An
+  !> error is set if a rule is broken.
   subroutine check_shape(shape, dimension, group, number, error, source)
-    type(shape_group), intent(in) :: shape
-    integer, intent(in) :: dimension
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
+    class(shape_group), intent(in) :: shape            !! the group, or its part that is a shape
+    integer, intent(in) :: dimension                   !! of the scene
+    character(*), intent(in) :: group                  !! name of the group
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
 
     select case (shape%shape)
     case ('box')
@@ -230,21 +233,23 @@ contains
 
   end subroutine check_shape
 
-  !> The Poisson's ratio of the bond-based model.
+  !> The Poisson's ratio of the bond-based model. It is 1/3 in plane stress, 1/4 in plane strain and
+  !> in 3D [-].
   pure real(wp) function needed_ratio(dimension, plane) result(ratio)
-    integer, intent(in) :: dimension
-    character(*), intent(in) :: plane
+    integer, intent(in) :: dimension   !! of the scene: 2 or 3
+    character(*), intent(in) :: plane  !! 'stress' or 'strain'; counts in 2D only
 
     ratio = 0.25_wp
     if (dimension == 2 .and. plane == 'stress') ratio = 1.0_wp/3.0_wp
   end function needed_ratio
 
-  !> One `&material`; fills in the Poisson's ratio and the density that go without saying.
+  !> One `&material`; fills in the Poisson's ratio and the density that go without saying. An error
+  !> is set if a rule is broken.
   subroutine check_material(scene, number, error, source)
-    type(scene_type), intent(inout) :: scene
-    integer, intent(in) :: number
+    type(scene_type), intent(inout) :: scene           !! gets the material's defaults
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
 
     associate (material => scene%materials(number))
       if (.not. is_set(material%youngs_modulus)) then
@@ -308,13 +313,14 @@ contains
     end if
   end subroutine check_ratio
 
-  !> One `&crack`: one kind, the one of the dimension, complete and not degenerate.
+  !> One `&crack`: one kind, the one of the dimension, complete and not degenerate. An error is set
+  !> if a rule is broken.
   subroutine check_crack(crack, dimension, number, error, source)
-    type(crack_group), intent(in) :: crack
-    integer, intent(in) :: dimension
-    integer, intent(in) :: number
+    type(crack_group), intent(in) :: crack             !! the group
+    integer, intent(in) :: dimension                   !! of the scene
+    integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     logical :: segment, parallelogram, disc
     character(:), allocatable :: kinds
     real(wp) :: cross(3)

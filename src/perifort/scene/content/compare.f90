@@ -26,7 +26,8 @@ contains
   !> the first,
   !> then what only the second has.
   function scene_differences(before, now) result(differences)
-    character(*), intent(in) :: before, now
+    character(*), intent(in) :: before  !! text of the first scene
+    character(*), intent(in) :: now     !! text of the second scene
     type(difference_type), allocatable :: differences(:)
     type(entry_type), allocatable :: old(:), new(:)
     integer :: i, j

@@ -2,7 +2,8 @@
 module pd_scene_content_reference
   use pd_base_error, only: error_type, fail, status_usage
   use pd_base_text, only: join, lower_case, nearest_name
-  use pd_scene_content_groups, only: group_names, group_repeatable, group_purpose, describe_group
+  use pd_scene_content_groups, only: list_groups
+  use pd_scene_content_types, only: group_table
   use pd_scene_format_keys, only: keys_type, key_info
   implicit none (type, external)
   private
@@ -16,29 +17,37 @@ contains
 
   !> Write the reference of one group, or of all with a heading if `group` is ''. The group may be
   !> given with or without `&`. An error if there is no such group.
-  subroutine write_reference(unit, group, error)
-    integer, intent(in) :: unit
-    character(*), intent(in) :: group
+  subroutine write_reference(unit, group, error, fields, table)
+    integer, intent(in) :: unit                       !! open for formatted writing
+    character(*), intent(in) :: group                 !! its name in any case, or ''
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)   !! names of the fields of the output
+    type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
+    type(group_table) :: known
     character(:), allocatable :: name, nearest, note
     integer :: g
 
+    if (present(table)) then
+      known = table
+    else
+      call list_groups(known)
+    end if
     name = lower_case(trim(adjustl(group)))
     if (index(name, '&') == 1) name = name(2:)
     if (len(name) == 0) then
       call write_heading(unit)
-      do g = 1, size(group_names)
+      do g = 1, known%count
         write (unit, '(a)') ''
-        call write_group(unit, trim(group_names(g)))
+        call write_group(unit, known, g, fields)
       end do
-    else if (any(group_names == name)) then
-      call write_group(unit, name)
+    else if (known%place_of(name) > 0) then
+      call write_group(unit, known, known%place_of(name), fields)
     else
-      nearest = nearest_name(name, group_names)
+      nearest = nearest_name(name, known%names())
       note = ''
       if (len(nearest) > 0) note = " did you mean '"//nearest//"'? "
       call fail(error, "no group is named '"//name//"';"//note//' known: '// &
-        & join(group_names, ', '), status_usage)
+        & join(known%names(), ', '), status_usage)
     end if
   end subroutine write_reference
 
@@ -58,15 +67,18 @@ contains
   end subroutine write_heading
 
   !> One group: purpose and a table of its keys.
-  subroutine write_group(unit, name)
+  subroutine write_group(unit, table, place, fields)
     integer, intent(in) :: unit
-    character(*), intent(in) :: name
+    type(group_table), intent(in) :: table
+    integer, intent(in) :: place            !! of the group in the table
+    character(*), intent(in), optional :: fields(:)
     type(keys_type) :: keys
     integer :: widths(columns), c, k
 
-    call describe_group(keys, name)
-    write (unit, '(a)') '## &'//name, '', group_purpose(name)
-    if (group_repeatable(name)) then
+    call keys%describe_fields(fields)
+    call table%describe(trim(table%entries(place)%name), keys)
+    write (unit, '(a)') '## &'//trim(table%entries(place)%name), '', table%entries(place)%purpose
+    if (table%entries(place)%repeatable) then
       write (unit, '(a)') 'May be given several times.'
     else
       write (unit, '(a)') 'Given at most once.'

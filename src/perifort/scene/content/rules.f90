@@ -5,8 +5,10 @@
 module pd_scene_content_rules
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail
-  use pd_base_text, only: join, nearest_name, newline, to_text
-  use pd_scene_format_source, only: source_type, scan_source, source_fault
+  use pd_base_text, only: join, lower_case, nearest_name, newline, to_text
+  use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_find, only: find_entry, find_section, given
+  use pd_scene_format_source, only: source_type, source_fault
   use pd_scene_content_types, only: scene_type, is_set, name_length
   implicit none (type, external)
   private
@@ -16,15 +18,20 @@ module pd_scene_content_rules
 contains
 
   !> A broken rule, at the key of the `number`-th group of this name, or at the group itself if
-  !> the key is not given or ''.
-  subroutine rule_fault(error, group, number, key, message, note, source)
+  !> the key is not given or ''. With `value`, at that value of the key.
+  subroutine rule_fault(error, group, number, key, message, note, source, value)
     type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key, message, note
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
+    character(*), intent(in) :: key                    !! name of the key, or ''
+    character(*), intent(in) :: message                !! what is wrong
+    character(*), intent(in) :: note                   !! what was expected instead; '' for none
     type(source_type), intent(in), optional :: source
+      !! the scanned file; without, the message names group, number and key
+    character(*), intent(in), optional :: value
+      !! the word that is wrong; without it, or if it is not there, the key is the place
     character(:), allocatable :: text
-    integer :: section, entry
+    integer :: section, entry, token
 
     if (.not. present(source)) then
       text = message//newline//' --> group &'//group//' number '//to_text(number)
@@ -36,6 +43,14 @@ contains
     section = find_section(source, group, number)
     if (section == 0) then
       call source_fault(source, 0, 0, 0, message, note, error)
+      return
+    end if
+    token = 0
+    if (present(value)) token = find_value(source, section, key, value)
+    if (token > 0) then
+      associate (place => source%tokens(token))
+        call source_fault(source, place%line, place%column, place%width, message, note, error)
+      end associate
       return
     end if
     entry = find_entry(source, section, key)
@@ -53,20 +68,25 @@ contains
   !> A fault that only the points of a scene show, at the place of the key that is to blame: as
   !> `rule_fault`, for a scene that has been read before. Its text is scanned again, which costs
   !> nothing that matters once something is wrong.
-  subroutine scene_fault(error, scene, group, number, key, message, note)
+  subroutine scene_fault(error, scene, group, number, key, message, note, value)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key, message, note
+      !! whose text gives the place; built in memory it gives none
+    character(*), intent(in) :: group            !! name of the group, without `&`
+    integer, intent(in) :: number                !! which group of this name, from 1
+    character(*), intent(in) :: key              !! name of the key, or ''
+    character(*), intent(in) :: message          !! what is wrong
+    character(*), intent(in) :: note             !! what was expected instead; '' for none
+    character(*), intent(in), optional :: value
+      !! the word that is wrong; without it, or if it is not there, the key is the place
     type(source_type) :: source
     type(error_type), allocatable :: ignored
 
     if (allocated(scene%text)) then
       if (len(scene%text) > 0) then
-        call scan_source(scene%text, scene%file, source, ignored)
+        call scan_scene(scene, source, ignored)
         if (.not. allocated(ignored)) then
-          call rule_fault(error, group, number, key, message, note, source)
+          call rule_fault(error, group, number, key, message, note, source, value)
           return
         end if
       end if
@@ -78,10 +98,10 @@ contains
   !> blames, or of the one named here. One that has a place keeps it.
   subroutine place_fault(error, scene, group, number, key)
     type(error_type), allocatable, intent(inout) :: error
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
+    type(scene_type), intent(in) :: scene  !! whose text gives the place
+    character(*), intent(in) :: group      !! to blame if the error names none
+    integer, intent(in) :: number          !! which group of this name, from 1
+    character(*), intent(in) :: key        !! of that group, or ''
     type(error_type), allocatable :: placed
 
     if (.not. allocated(error)) return
@@ -95,58 +115,32 @@ contains
     call move_alloc(placed, error)
   end subroutine place_fault
 
-  !> Whether the file gives this key; false for a scene built in memory.
-  pure logical function given(group, number, key, source)
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
-    type(source_type), intent(in), optional :: source
-    integer :: section
-
-    given = .false.
-    if (.not. present(source)) return
-    section = find_section(source, group, number)
-    if (section > 0) given = find_entry(source, section, key) > 0
-  end function given
-
-  !> The place of the `number`-th group of a name, 0 if there is none.
-  pure integer function find_section(source, group, number) result(section)
-    type(source_type), intent(in) :: source
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
-    integer :: i, found
-
-    section = 0
-    found = 0
-    do i = 1, source%section_count
-      if (source%sections(i)%name /= group) cycle
-      found = found + 1
-      if (found == number) section = i
-    end do
-  end function find_section
-
-  !> The place of a key in a group, 0 if it is not given.
-  pure integer function find_entry(source, section, key) result(entry)
+  !> The token of a value of a key in a group, whatever its case; 0 if it is not given.
+  pure integer function find_value(source, section, key, value) result(token)
     type(source_type), intent(in) :: source
     integer, intent(in) :: section
-    character(*), intent(in) :: key
+    character(*), intent(in) :: key, value
     integer :: i
 
-    entry = 0
-    do i = source%sections(section)%last, source%sections(section)%first, -1
-      if (source%entries(i)%key == key) entry = i
+    do i = source%sections(section)%first, source%sections(section)%last
+      if (source%entries(i)%key /= key) cycle
+      do token = source%entries(i)%first, source%entries(i)%last
+        if (lower_case(source%tokens(token)%text) == lower_case(value)) return
+      end do
     end do
-  end function find_entry
+    token = 0
+  end function find_value
 
   !> A name must be one of `names`; blank ones among these do not count.
   subroutine check_known(name, names, kind, group, number, key, error, source)
-    character(*), intent(in) :: name
-    character(*), intent(in) :: names(:)
-    character(*), intent(in) :: kind, group
-    integer, intent(in) :: number
-    character(*), intent(in) :: key
+    character(*), intent(in) :: name                   !! to be found; a blank one is right
+    character(*), intent(in) :: names(:)               !! (any number) the known ones
+    character(*), intent(in) :: kind                   !! what they are names of, for the message
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
+    character(*), intent(in) :: key                    !! that has the name as its value
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(name_length), allocatable :: known(:)
     character(:), allocatable :: note, nearest
 
@@ -166,10 +160,10 @@ contains
 
   !> Names must differ; blank ones do not count.
   subroutine check_unique(names, group, error, source)
-    character(*), intent(in) :: names(:)
-    character(*), intent(in) :: group
+    character(*), intent(in) :: names(:)               !! (groups) of all groups of a kind
+    character(*), intent(in) :: group                  !! the kind, without `&`
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: i
 
     do i = 2, size(names)
@@ -182,12 +176,13 @@ contains
 
   !> Keys `<key>_x`.. of directions that the dimension does not have must not be given.
   subroutine check_components(value, dimension, key, group, number, error, source)
-    real(wp), intent(in) :: value(3)
-    integer, intent(in) :: dimension
-    character(*), intent(in) :: key, group
-    integer, intent(in) :: number
+    real(wp), intent(in) :: value(3)  !! of <key>_x, <key>_y and <key>_z, `unset` where not given
+    integer, intent(in) :: dimension                   !! of the scene
+    character(*), intent(in) :: key                    !! name of the three keys, without _x
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
     integer :: i
 
@@ -200,14 +195,16 @@ contains
     end do
   end subroutine check_components
 
-  !> A position or direction: all components of the dimension given, none other but zeros.
+  !> A position or direction: all components of the dimension given, none other but zeros. Else, and
+  !> if the key is not given at all, an error is set.
   subroutine check_vector(value, dimension, key, group, number, error, source)
-    real(wp), intent(in) :: value(3)
-    integer, intent(in) :: dimension
-    character(*), intent(in) :: key, group
-    integer, intent(in) :: number
+    real(wp), intent(in) :: value(3)                   !! the vector, `unset` where not given
+    integer, intent(in) :: dimension                   !! of the scene
+    character(*), intent(in) :: key                    !! name of the key
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: i
 
     if (.not. any(is_set(value))) then
@@ -229,11 +226,11 @@ contains
 
   !> Where both corners bound a direction, the lower one must be below the upper.
   subroutine check_finite_box(lower, upper, group, number, error, source)
-    real(wp), intent(in) :: lower(:), upper(:)
-    character(*), intent(in) :: group
-    integer, intent(in) :: number
+    real(wp), intent(in) :: lower(:), upper(:)  !! (up to 3) corners, `unset` where unbounded [m]
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
     type(error_type), allocatable, intent(out) :: error
-    type(source_type), intent(in), optional :: source
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
     integer :: i
 

@@ -8,6 +8,7 @@ module pd_scene_content_template
   use pd_base_text, only: join, nearest_name, newline
   use pd_scene_content_check, only: allocate_groups
   use pd_scene_content_types, only: scene_type
+  use pd_scene_groups_header, only: own_defaults
   use pd_scene_content_write, only: commented_text
   implicit none (type, external)
   private
@@ -19,22 +20,24 @@ module pd_scene_content_template
 contains
 
   !> Write the template `name`, the first one if it is ''. An error if there is no such template.
-  subroutine write_template(unit, name, error)
-    integer, intent(in) :: unit
-    character(*), intent(in) :: name
+  subroutine write_template(unit, name, error, fields)
+    integer, intent(in) :: unit                      !! open for formatted writing
+    character(*), intent(in) :: name                 !! one of `template_names`, or ''
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
 
-    call template_text(name, text, error)
+    call template_text(name, text, error, fields)
     if (allocated(error)) return
     write (unit, '(a)', advance='no') text
   end subroutine write_template
 
   !> The text of the template `name`, as `write_template` prints it.
-  subroutine template_text(name, text, error)
-    character(*), intent(in) :: name
-    character(:), allocatable, intent(out) :: text
+  subroutine template_text(name, text, error, fields)
+    character(*), intent(in) :: name                 !! one of `template_names`, or ''
+    character(:), allocatable, intent(out) :: text   !! a scene file; '' on an error
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     type(scene_type) :: scene
     character(:), allocatable :: nearest, note
 
@@ -58,10 +61,12 @@ contains
         & join(template_names, ', '), status_usage)
       return
     end select
+    ! a scene that says so has the same defaults in every version to come
+    scene%header%defaults = own_defaults
     text = '! '//trim(scene%header%title)//newline// &
       & "! Values are in SI units. Keys behind a '!' are at the default that is shown, or not "// &
       & 'needed.'//newline// &
-      & '! Templates: '//join(template_names, ', ')//newline//newline//commented_text(scene)
+      & '! Templates: '//join(template_names, ', ')//newline//newline//commented_text(scene, fields)
   end subroutine template_text
 
   !> 1D: a stretched bar, fixed at one end, let go.

@@ -1,188 +1,82 @@
-!> What the user asked for: one type per namelist group, every component with its default and unit.
+!> What the user asked for: a scene, which holds the groups of a scene file, and the table of the
+!> groups that there are.
 !>
-!> Pure data. Whoever builds a scene without a file fills these types directly.
+!> The groups themselves are the types in `scene/groups`, every component with its default and unit.
+!> Whoever builds a scene without a file fills these types directly.
 module pd_scene_content_types
-  use pd_base_kinds, only: wp
+  use pd_base_error, only: internal_fault
+  use pd_scene_format_file, only: line_type
   use pd_scene_format_given, only: is_set, name_length, path_length, unset
+  use pd_scene_format_keys, only: keys_type, mode_describe
+  use pd_scene_groups_body, only: body_group
+  use pd_scene_groups_boundary, only: boundary_group
+  use pd_scene_groups_crack, only: crack_group
+  use pd_scene_groups_group, only: group_type
+  use pd_scene_groups_header, only: header_type
+  use pd_scene_groups_horizon, only: horizon_group
+  use pd_scene_groups_initial, only: initial_group
+  use pd_scene_groups_load, only: load_group
+  use pd_scene_groups_material, only: material_group
+  use pd_scene_groups_output, only: output_group
+  use pd_scene_groups_probe, only: probe_group
+  use pd_scene_groups_relaxation, only: relaxation_group
+  use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
+  use pd_scene_groups_study, only: study_group
+  use pd_scene_groups_time, only: time_group
   implicit none (type, external)
   private
-  public :: scene_type, header_type, body_group, shape_group, material_group, horizon_group, &
-    & crack_group, initial_group, boundary_group, load_group, time_group, relaxation_group, &
-    & output_group, probe_group, study_group, name_length, path_length, unset, is_set
+  public :: scene_type, header_type, body_group, shape_group, region_group, no_fail_group, &
+    & material_group, horizon_group, crack_group, initial_group, boundary_group, load_group, &
+    & time_group, relaxation_group, output_group, probe_group, study_group, name_length, &
+    & path_length, unset, is_set
+  public :: added_type, group_entry, group_table, group_interface, groups_interface
 
-  !> `&scene`
-  type :: header_type
-    character(path_length) :: title = ''
-    integer :: dimension = 0                     !! 1, 2 or 3
-    character(name_length) :: plane = 'stress'   !! 2D: 'stress' or 'strain'
-    real(wp) :: thickness = 1.0_wp               !! 2D: h [m]
-    real(wp) :: area = 1.0_wp                    !! 1D: cross section A [m2]
-    character(name_length) :: precision = 'double' !! of bonds: 'double' or 'mixed'
-  end type header_type
-
-  !> `&body`
-  type :: body_group
+  !> A group that the scene has no component for.
+  type :: added_type
     character(name_length) :: name = ''
-    character(name_length) :: material = ''      !! '' = the only material
-    real(wp) :: lower(3) = unset                 !! corner of the lattice's box [m]
-    real(wp) :: upper(3) = unset                 !! opposite corner [m]
-    integer :: points(3) = 0                     !! points along each direction
-    character(path_length) :: file = ''          !! cloud: columns x y z volume
-  end type body_group
+    class(group_type), allocatable :: group
+  end type added_type
 
-  !> `&remove`, `&region`, and the shape keys of `&no_fail`
-  type :: shape_group
-    character(name_length) :: name = ''          !! `&region` only
-    character(name_length) :: region = ''        !! `&no_fail` only: instead of a shape
-    character(name_length) :: shape = ''         !! 'box', 'sphere', 'cylinder'
-    real(wp) :: lower(3) = unset                 !! box, cylinder's ends: unset = unbounded [m]
-    real(wp) :: upper(3) = unset                 !! [m]
-    real(wp) :: centre(3) = 0.0_wp               !! sphere, cylinder [m]
-    real(wp) :: radius = unset                   !! sphere, cylinder [m]
-    character(name_length) :: axis = 'z'         !! cylinder: 'x', 'y', 'z'
-  end type shape_group
+  !> One line of the table of groups.
+  type :: group_entry
+    character(name_length) :: name = ''          !! as in the file, without `&`
+    character(:), allocatable :: purpose         !! what it is for, in one or two sentences
+    logical :: repeatable = .false.              !! may be given more than once
+    class(group_type), allocatable :: fresh      !! one with all keys at their defaults
+    procedure(group_interface), pointer, nopass :: one => null()   !! where the scene has it, ...
+    procedure(groups_interface), pointer, nopass :: all => null()  !! ... or has all of them;
+                                                                   !! none: in `scene%added`
+  end type group_entry
 
-  !> `&material`
-  type :: material_group
-    character(name_length) :: name = ''
-    character(name_length) :: model = 'state_based'        !! or 'bond_based'
-    real(wp) :: youngs_modulus = unset                     !! E [Pa]
-    real(wp) :: poissons_ratio = unset                     !! nu [-]
-    logical :: ignore_poissons_ratio = .false.             !! bond-based with another nu: accept
-    real(wp) :: density = unset                            !! rho [kg/m3]
-    real(wp) :: critical_stretch = unset                   !! s_c [-]
-    real(wp) :: critical_energy_release_rate = unset       !! Gc [J/m2]
-    logical :: break_in_compression = .false.
-    real(wp) :: thermal_expansion = 0.0_wp                 !! alpha [1/K]
-  end type material_group
-
-  !> `&horizon`
-  type :: horizon_group
-    real(wp) :: ratio = 3.015_wp                           !! delta over the largest spacing [-]
-    real(wp) :: length = unset                             !! delta [m], instead of ratio
-    character(name_length) :: volume_correction = 'linear' !! 'linear_extended', 'exact', 'none'
-    character(name_length) :: surface_correction = 'energy'!! 'none'
-    character(name_length) :: dilatation = 'unprojected'   !! 'projected': Lambda as printed
-    character(name_length) :: family = 'automatic'         !! 'lattice', 'list'
-  end type horizon_group
-
-  !> `&crack`: a segment (2D), a parallelogram or a disc (3D)
-  type :: crack_group
-    real(wp) :: from(3) = unset
-    real(wp) :: to(3) = unset
-    real(wp) :: corner(3) = unset
-    real(wp) :: edge_1(3) = unset
-    real(wp) :: edge_2(3) = unset
-    real(wp) :: centre(3) = unset
-    real(wp) :: normal(3) = unset
-    real(wp) :: radius = unset
-  end type crack_group
-
-  !> `&initial`
-  type :: initial_group
-    character(name_length) :: region = ''        !! '' = all points
-    real(wp) :: displacement(3) = unset          !! displacement_x, _y, _z [m]
-    real(wp) :: velocity(3) = unset              !! velocity_x, _y, _z [m/s]
-    real(wp) :: displacement_gradient(3, 3) = 0.0_wp  !! H(i,j) = du_i/dx_j [-]
-    real(wp) :: velocity_gradient(3, 3) = 0.0_wp      !! [1/s]
-    real(wp) :: temperature_change = unset       !! [K]
-    real(wp) :: ramp_time = unset                !! of the temperature change [s]
-    real(wp), allocatable :: times(:)            !! of the temperature change [s]
-    real(wp), allocatable :: values(:)           !! factors at `times` [-]
-    character(path_length) :: file = ''          !! a table of columns, a row per point
-  end type initial_group
-
-  !> `&boundary`
-  type :: boundary_group
-    character(name_length) :: name = ''
-    character(name_length) :: body = ''          !! '' = all bodies together
-    character(name_length) :: side = ''          !! 'x_min' .. 'z_max': adds a layer
-    character(name_length) :: region = ''        !! existing points instead
-    real(wp) :: displacement(3) = unset          !! imposed, unset = free [m]
-    real(wp) :: velocity(3) = unset              !! imposed, unset = free [m/s]
-    real(wp) :: ramp_time = unset                !! [s]
-    real(wp), allocatable :: times(:)            !! [s]
-    real(wp), allocatable :: values(:)           !! factors at `times` [-]
-  end type boundary_group
-
-  !> `&load`
-  type :: load_group
-    character(name_length) :: body = ''
-    character(name_length) :: side = ''
-    character(name_length) :: region = ''
-    real(wp) :: pressure = unset                 !! [Pa], positive pushes
-    real(wp) :: force(3) = unset                 !! total over the points: force_x, _y, _z [N]
-    real(wp) :: body_force(3) = unset            !! density: body_force_x, _y, _z [N/m3]
-    real(wp) :: ramp_time = unset                !! [s]
-    real(wp), allocatable :: times(:)            !! [s]
-    real(wp), allocatable :: values(:)           !! factors at `times` [-]
-  end type load_group
-
-  !> `&time`
-  type :: time_group
-    character(name_length) :: method = 'explicit'             !! 'relaxation'
-    character(name_length) :: integrator = 'forward_backward'
-    real(wp) :: step = unset                     !! [s], instead of safety
-    real(wp) :: safety = 0.8_wp                  !! fraction of the limit [-]
-    character(name_length) :: limit = 'equation' !! 7.25, or 'spectral'
-    integer :: steps = 0
-    real(wp) :: duration = unset                 !! [s], instead of steps
-    character(name_length) :: breaking = 'before_forces'      !! 'after_forces'
-  end type time_group
-
-  !> `&relaxation`
-  type :: relaxation_group
-    character(name_length) :: solver = 'conjugate_gradient'      !! 'dynamic_relaxation'
-    character(name_length) :: density_matrix = 'frame_invariant' !! 'chapter', 'constant'
-    real(wp) :: safety = unset                   !! on the mass; 1, or 5 for 'chapter', 'constant'
-    real(wp) :: tolerance = 1.0e-6_wp            !! of residual force and of displacement change [-]
-    integer :: maximum_iterations = 100000       !! of each relaxation
-    integer :: load_steps = 1
-  end type relaxation_group
-
-  !> `&output`
-  type :: output_group
-    integer :: every = 0                         !! steps (load steps in relaxation); 0 = steps/10
-    real(wp) :: interval = unset                 !! [s], instead of every
-    integer :: history_every = 0                 !! 0 = by their cost, at most about 2000
-    character(name_length), allocatable :: fields(:)
-    character(name_length) :: precision = 'double'   !! 'single'
-    character(name_length) :: format = 'vtkhdf'      !! 'vtu', 'both'
-    integer :: checkpoint_every = 0              !! steps (relaxation: iterations); 0 = none so
-    real(wp) :: checkpoint_minutes = 15.0_wp     !! of wall time; 0 = not by time
-  end type output_group
-
-  !> `&probe`
-  type :: probe_group
-    character(name_length) :: name = ''
-    real(wp) :: point(3) = unset                 !! [m]
-    character(name_length), allocatable :: fields(:)
-  end type probe_group
-
-  !> `&study`: one key that a study varies; what is measured stands in the first group that says so.
-  type :: study_group
-    character(name_length) :: vary = ''          !! `group%key`, `group(2)%key`, `key(1)`, ...
-    character(path_length), allocatable :: values(:)  !! as written, texts with their quotes
-    logical :: together = .false.                !! in step with the group before
-    character(name_length) :: measure = ''       !! a probe, a column of the history or a field
-    character(path_length) :: against = ''       !! 'analytic', 'finest' or the name of a file
-    character(name_length) :: analytic = ''      !! name of a closed form; '' = the one that fits
-    character(name_length) :: norm = ''          !! '' = 'relative'
-    character(name_length) :: region = ''        !! a field is measured here; '' = all body points
-  end type study_group
+  !> The groups that a scene may have, in the order of the reference. It serves reading, writing,
+  !> the reference, templates, changes of keys and their meaning to a restart.
+  type :: group_table
+    type(group_entry), allocatable :: entries(:) !! with room at the end
+    integer :: count = 0
+  contains
+    procedure :: add
+    procedure :: names
+    procedure :: place_of
+    procedure :: describe
+    procedure :: number_in
+    procedure :: make_room
+    procedure :: complete
+    procedure :: visit
+  end type group_table
 
   !> Everything a scene file says.
   type :: scene_type
     character(:), allocatable :: file            !! where it was read from ('' = built in memory)
     character(:), allocatable :: text            !! the file's text
+    type(line_type), allocatable :: changes(:)   !! `group%key=value`: what `--set` changes in it
     type(header_type) :: header
     type(body_group), allocatable :: bodies(:)
     type(shape_group), allocatable :: removed(:)
-    type(shape_group), allocatable :: regions(:)
+    type(region_group), allocatable :: regions(:)
     type(material_group), allocatable :: materials(:)
     type(horizon_group) :: horizon
     type(crack_group), allocatable :: cracks(:)
-    type(shape_group), allocatable :: no_fail(:)
+    type(no_fail_group), allocatable :: no_fail(:)
     type(initial_group), allocatable :: initial(:)
     type(boundary_group), allocatable :: boundaries(:)
     type(load_group), allocatable :: loads(:)
@@ -191,6 +85,195 @@ module pd_scene_content_types
     type(output_group) :: output
     type(probe_group), allocatable :: probes(:)
     type(study_group), allocatable :: studies(:)
+    type(added_type), allocatable :: added(:)    !! groups of a table with more than these
+    type(group_table), allocatable :: table      !! that table; without, the program's own
   end type scene_type
+
+  abstract interface
+    !> Where a scene has a group that is given once.
+    subroutine group_interface(scene, group)
+      import :: group_type, scene_type
+      implicit none (type, external)
+      type(scene_type), intent(inout), target :: scene  !! the scene
+      class(group_type), pointer, intent(out) :: group  !! its group, not a copy
+    end subroutine group_interface
+
+    !> Where a scene has all groups of a kind, of size 0 if nobody has filled them. With `room` they
+    !> are made anew, so many.
+    subroutine groups_interface(scene, groups, room)
+      import :: group_type, scene_type
+      implicit none (type, external)
+      type(scene_type), intent(inout), target :: scene
+        !! whose list is allocated on return, and new with `room`
+      class(group_type), pointer, intent(out) :: groups(:)  !! (any number) its groups, not copies
+      integer, intent(in), optional :: room
+        !! number of new groups; without, the groups stay as they are
+    end subroutine groups_interface
+  end interface
+
+contains
+
+  !> Add a group. Without `one` or `all` the scene holds it among `added`.
+  subroutine add(table, name, purpose, repeatable, fresh, one, all)
+    class(group_table), intent(inout) :: table  !! with one more line at its end on return
+    character(*), intent(in) :: name        !! as in the file, lower case, without `&`
+    character(*), intent(in) :: purpose     !! what it is for, in one or two sentences
+    logical, intent(in) :: repeatable       !! may be given more than once
+    class(group_type), intent(in) :: fresh  !! one with all keys at their defaults
+    procedure(group_interface), optional :: one   !! where a scene has it
+    procedure(groups_interface), optional :: all  !! where a scene has all of them
+    type(group_entry), allocatable :: longer(:)
+    integer, parameter :: room = 24
+    integer :: i
+
+    if (.not. allocated(table%entries)) allocate (table%entries(room))
+    if (table%place_of(name) > 0) call internal_fault('the group '//name//' is added twice')
+    if (table%count == size(table%entries)) then
+      allocate (longer(2*table%count))
+      do i = 1, table%count
+        longer(i) = table%entries(i)
+      end do
+      call move_alloc(longer, table%entries)
+    end if
+    table%count = table%count + 1
+    associate (entry => table%entries(table%count))
+      entry%name = name
+      entry%purpose = purpose
+      entry%repeatable = repeatable
+      allocate (entry%fresh, source=fresh)
+      if (present(one)) entry%one => one
+      if (present(all)) entry%all => all
+    end associate
+  end subroutine add
+
+  !> The names of all groups, in the order of the table.
+  pure function names(table)
+    class(group_table), intent(in) :: table  !! the table
+    character(name_length) :: names(table%count)
+
+    names(:) = table%entries(:table%count)%name
+  end function names
+
+  !> The line of a group in the table, 0 if there is no such group.
+  pure integer function place_of(table, name) result(place)
+    class(group_table), intent(in) :: table  !! the table
+    character(*), intent(in) :: name         !! as in the file, lower case, without `&`
+
+    do place = table%count, 1, -1
+      if (table%entries(place)%name == name) return
+    end do
+  end function place_of
+
+  !> Let `keys` know all keys of a group with their defaults.
+  subroutine describe(table, name, keys)
+    class(group_table), intent(in) :: table
+      !! with this group; another name is a fault of the program
+    character(*), intent(in) :: name         !! as in the file, lower case, without `&`
+    type(keys_type), intent(inout) :: keys   !! started anew; describes the group on return
+    class(group_type), allocatable :: fresh
+
+    if (table%place_of(name) == 0) call internal_fault('there is no group '//name)
+    call keys%start(mode_describe)
+    ! the visitor may change what it visits
+    allocate (fresh, source=table%entries(table%place_of(name))%fresh)
+    call fresh%visit(keys)
+  end subroutine describe
+
+  !> How many groups of line `place` a scene has.
+  integer function number_in(table, scene, place) result(number)
+    class(group_table), intent(in) :: table           !! of the scene's groups
+    type(scene_type), intent(inout), target :: scene
+      !! whose list is allocated, if empty, on return
+    integer, intent(in) :: place                      !! line of the table
+    class(group_type), pointer :: groups(:)
+
+    associate (entry => table%entries(place))
+      number = 1
+      if (associated(entry%all)) then
+        call entry%all(scene, groups)
+        number = size(groups)
+      else if (.not. associated(entry%one)) then
+        number = 0
+        if (allocated(scene%added)) number = count(scene%added%name == entry%name)
+      end if
+    end associate
+  end function number_in
+
+  !> Give a scene so many new groups of line `place`.
+  subroutine make_room(table, scene, place, number)
+    class(group_table), intent(in) :: table           !! of the scene's groups
+    type(scene_type), intent(inout), target :: scene
+      !! with new groups of this line, at their defaults, on return; those before are lost
+    integer, intent(in) :: place                      !! line of the table
+    integer, intent(in) :: number
+      !! of new groups; counts only where the group may be repeated or is among `added`
+    class(group_type), pointer :: groups(:)
+    type(added_type), allocatable :: added(:)
+    integer :: i, kept
+
+    associate (entry => table%entries(place))
+      if (associated(entry%all)) then
+        call entry%all(scene, groups, number)
+      else if (.not. associated(entry%one)) then
+        if (.not. allocated(scene%added)) allocate (scene%added(0))
+        kept = count(scene%added%name /= entry%name)
+        allocate (added(kept + number))
+        kept = 0
+        do i = 1, size(scene%added)
+          if (scene%added(i)%name == entry%name) cycle
+          kept = kept + 1
+          added(kept)%name = scene%added(i)%name
+          call move_alloc(scene%added(i)%group, added(kept)%group)
+        end do
+        do i = kept + 1, size(added)
+          added(i)%name = entry%name
+          allocate (added(i)%group, source=entry%fresh)
+        end do
+        call move_alloc(added, scene%added)
+      end if
+    end associate
+  end subroutine make_room
+
+  !> Give a scene an empty list where it has none, so that loops need no question.
+  subroutine complete(table, scene)
+    class(group_table), intent(in) :: table           !! of the scene's groups
+    type(scene_type), intent(inout), target :: scene  !! with all lists allocated on return
+    class(group_type), pointer :: groups(:)
+    integer :: g
+
+    if (.not. allocated(scene%added)) allocate (scene%added(0))
+    do g = 1, table%count
+      if (associated(table%entries(g)%all)) call table%entries(g)%all(scene, groups)
+    end do
+  end subroutine complete
+
+  !> Show the keys of a scene's `number`-th group of line `place` to a visitor.
+  subroutine visit(table, scene, place, number, keys)
+    class(group_table), intent(in) :: table           !! of the scene's groups
+    type(scene_type), intent(inout), target :: scene  !! whose group the visitor may read or set
+    integer, intent(in) :: place                      !! line of the table
+    integer, intent(in) :: number                     !! which group of this line, from 1
+    type(keys_type), intent(inout) :: keys
+      !! the visitor, started for reading, writing or describing
+    class(group_type), pointer :: group, groups(:)
+    integer :: i, found
+
+    associate (entry => table%entries(place))
+      if (associated(entry%one)) then
+        call entry%one(scene, group)
+        call group%visit(keys)
+      else if (associated(entry%all)) then
+        call entry%all(scene, groups)
+        call groups(number)%visit(keys)
+      else
+        found = 0
+        do i = 1, size(scene%added)
+          if (scene%added(i)%name /= entry%name) cycle
+          found = found + 1
+          if (found == number) call scene%added(i)%group%visit(keys)
+        end do
+      end if
+    end associate
+  end subroutine visit
 
 end module pd_scene_content_types

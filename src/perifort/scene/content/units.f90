@@ -21,7 +21,7 @@ contains
   !> Warn of stiffness and density that no solid has, of megapascals beside millimetres, and of
   !> loads, displacements and velocities that predict a strain above 1.
   subroutine warn_of_units(scene, edges, warnings)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene            !! checked
     real(wp), intent(in) :: edges(:)                 !! of the box around all bodies (dim) [m]
     type(warnings_type), intent(inout) :: warnings   !! added to
     real(wp) :: stiffness, speed

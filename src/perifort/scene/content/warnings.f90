@@ -6,7 +6,8 @@ module pd_scene_content_warnings
   use pd_base_text, only: to_text
   use pd_base_warnings, only: warnings_type
   use pd_scene_content_rules, only: given
-  use pd_scene_format_source, only: source_type, scan_source
+  use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: scene_type
   use pd_scene_content_units, only: warn_of_units
   implicit none (type, external)
@@ -18,9 +19,9 @@ contains
   !> Add the warnings about a checked scene to `warnings`. Keys are looked for in its text; a scene
   !> built in memory has none.
   subroutine warnings_of_scene(scene, edges, warnings)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene           !! checked
     real(wp), intent(in) :: edges(:)   !! of the box around all bodies (dim) [m]
-    type(warnings_type), intent(inout) :: warnings
+    type(warnings_type), intent(inout) :: warnings  !! added to
     type(source_type) :: source
     type(error_type), allocatable :: ignored
     integer :: i, b
@@ -35,7 +36,7 @@ contains
     call warn_of_units(scene, edges, warnings)
     if (.not. allocated(scene%text)) return
     if (len(scene%text) == 0) return
-    call scan_source(scene%text, scene%file, source, ignored)
+    call scan_scene(scene, source, ignored)
     if (allocated(ignored)) return
     associate (d => scene%header%dimension)
       call warn_of_keys('scene', [character(20) :: 'plane', 'thickness'], d /= 2, &

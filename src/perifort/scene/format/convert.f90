@@ -21,11 +21,16 @@ contains
   !> `at_most`.
   subroutine to_real(token, name, unit, value, message, note, above, below, at_least, at_most, &
     & tiny_is_zero)
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name, unit
-    real(wp), intent(inout) :: value
-    character(:), allocatable, intent(out) :: message, note
-    real(wp), intent(in), optional :: above, below, at_least, at_most
+    type(token_type), intent(in) :: token           !! the word with its place in the file
+    character(*), intent(in) :: name                !! of the key, for the message
+    character(*), intent(in) :: unit                !! SI symbol, for the note; '' or '-' for none
+    real(wp), intent(inout) :: value                !! set if the word is good, else unchanged
+    character(:), allocatable, intent(out) :: message  !! what was wrong; '' if the value is good
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the value is good
+    real(wp), intent(in), optional :: above  !! the value must be larger; absent: no such bound
+    real(wp), intent(in), optional :: below  !! the value must be smaller; absent: no such bound
+    real(wp), intent(in), optional :: at_least      !! smallest value; absent: no such bound
+    real(wp), intent(in), optional :: at_most       !! largest value; absent: no such bound
     logical, intent(in), optional :: tiny_is_zero  !! see `parse_real`
     real(wp) :: found
     logical :: inside
@@ -53,11 +58,13 @@ contains
 
   !> A whole number within closed bounds.
   subroutine to_integer(token, name, value, message, note, at_least, at_most)
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value
-    character(:), allocatable, intent(out) :: message, note
-    integer, intent(in), optional :: at_least, at_most
+    type(token_type), intent(in) :: token           !! the word with its place in the file
+    character(*), intent(in) :: name                !! of the key, for the message
+    integer, intent(inout) :: value                 !! set if the word is good, else unchanged
+    character(:), allocatable, intent(out) :: message  !! what was wrong; '' if the value is good
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the value is good
+    integer, intent(in), optional :: at_least       !! smallest value; absent: no such bound
+    integer, intent(in), optional :: at_most        !! largest value; absent: no such bound
     integer :: found
     logical :: inside
 
@@ -81,10 +88,11 @@ contains
 
   !> True or false.
   subroutine to_logical(token, name, value, message, note)
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
-    logical, intent(inout) :: value
-    character(:), allocatable, intent(out) :: message, note
+    type(token_type), intent(in) :: token           !! the word with its place in the file
+    character(*), intent(in) :: name                !! of the key, for the message
+    logical, intent(inout) :: value                 !! set if the word is good, else unchanged
+    character(:), allocatable, intent(out) :: message  !! what was wrong; '' if the value is good
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the value is good
     logical :: found
 
     message = ''
@@ -99,11 +107,12 @@ contains
 
   !> Any value as it is written, a text with its quotes.
   subroutine to_word(token, name, value, message, note)
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
+    type(token_type), intent(in) :: token           !! the word with its place in the file
+    character(*), intent(in) :: name                !! of the key, for the message
     ! allow(C072): a text is assigned only after its length has been checked.
-    character(*), intent(inout) :: value
-    character(:), allocatable, intent(out) :: message, note
+    character(*), intent(inout) :: value            !! set if the word fits into it, else unchanged
+    character(:), allocatable, intent(out) :: message  !! what was wrong; '' if the value is good
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the value is good
     character(:), allocatable :: word
 
     message = ''
@@ -121,13 +130,15 @@ contains
   !> A text in quotes: one of `allowed` in any case, or, with `word`, a name that can stand in
   !> column headers. It must fit into `value`.
   subroutine to_string(token, name, value, message, note, allowed, word)
-    type(token_type), intent(in) :: token
-    character(*), intent(in) :: name
+    type(token_type), intent(in) :: token             !! the word with its place in the file
+    character(*), intent(in) :: name                  !! of the key, for the message
     ! allow(C072): a text is assigned only after its length has been checked.
-    character(*), intent(inout) :: value
-    character(:), allocatable, intent(out) :: message, note
-    character(*), intent(in), optional :: allowed(:)
-    logical, intent(in), optional :: word
+    character(*), intent(inout) :: value              !! set if the text is good, else unchanged
+    character(:), allocatable, intent(out) :: message  !! what was wrong; '' if the value is good
+    character(:), allocatable, intent(out) :: note    !! what was expected; '' if the value is good
+    character(*), intent(in), optional :: allowed(:)  !! (any number), the only values; absent: any
+                                                      !! text
+    logical, intent(in), optional :: word             !! letters, digits, _ and - only; absent: no
     character(:), allocatable :: nearest
     logical :: plain
     integer :: i
@@ -173,7 +184,7 @@ contains
 
   !> ` [Pa]`, or nothing without a unit.
   pure function unit_note(unit) result(note)
-    character(*), intent(in) :: unit
+    character(*), intent(in) :: unit  !! SI symbol; '' or '-' for none
     character(:), allocatable :: note
     note = ''
     if (len(unit) > 0 .and. unit /= '-') note = ' ['//unit//']'
@@ -181,7 +192,10 @@ contains
 
   !> Bounds of a real in words, '' without any.
   pure function real_range(above, below, at_least, at_most) result(range)
-    real(wp), intent(in), optional :: above, below, at_least, at_most
+    real(wp), intent(in), optional :: above     !! the value must be larger; absent: no such bound
+    real(wp), intent(in), optional :: below     !! the value must be smaller; absent: no such bound
+    real(wp), intent(in), optional :: at_least  !! smallest value; absent: no such bound
+    real(wp), intent(in), optional :: at_most   !! largest value; absent: no such bound
     character(:), allocatable :: range
 
     range = ''
@@ -194,7 +208,8 @@ contains
 
   !> Bounds of a whole number in words, '' without any.
   pure function integer_range(at_least, at_most) result(range)
-    integer, intent(in), optional :: at_least, at_most
+    integer, intent(in), optional :: at_least  !! smallest value; absent: no such bound
+    integer, intent(in), optional :: at_most   !! largest value; absent: no such bound
     character(:), allocatable :: range
 
     range = ''

@@ -19,13 +19,15 @@ contains
   !>
   !> `extents` is the key's shape, of size 0 for a scalar; `slots` runs in the order of the
   !> elements in memory and ends with the last element given. `used` marks the entries taken.
+  !> An error, with its place, for a wrong subscript, an element given twice or too many values.
   subroutine find_elements(source, section, key, extents, slots, used, error)
-    type(source_type), intent(in) :: source
-    integer, intent(in) :: section
-    character(*), intent(in) :: key
-    integer, intent(in) :: extents(:)
-    integer, allocatable, intent(out) :: slots(:)
-    logical, intent(inout) :: used(:)
+    type(source_type), intent(in) :: source        !! the scanned file
+    integer, intent(in) :: section                 !! number of the group in it
+    character(*), intent(in) :: key                !! in lower case
+    integer, intent(in) :: extents(:)  !! (rank), shape of the key; of size 0 for a scalar
+    integer, allocatable, intent(out) :: slots(:)  !! (elements), number of the token of each; 0:
+                                                   !! not given
+    logical, intent(inout) :: used(:)              !! (entries of the file), marks those of the key
     type(error_type), allocatable, intent(out) :: error
     integer :: e
 

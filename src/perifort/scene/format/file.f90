@@ -19,8 +19,8 @@ contains
   !> if it is empty, or far larger than what memory has room for. A pipe, which has no size, counts
   !> as empty: to open it could mean to wait for ever.
   subroutine read_text_file(path, text, error)
-    character(*), intent(in) :: path
-    character(:), allocatable, intent(out) :: text
+    character(*), intent(in) :: path                !! of the file
+    character(:), allocatable, intent(out) :: text  !! all of it; '' after an error
     type(error_type), allocatable, intent(out) :: error
     integer(i8), parameter :: copies = 8_i8  !! of the text, as it is cut into lines and words
     integer :: unit, status
@@ -61,8 +61,9 @@ contains
   !> folder of `scene_file`, then in the working directory. If it is in neither, the name in the
   !> scene's folder is returned, so that a message names the place where it should be.
   function resolve_path(name, scene_file) result(path)
-    character(*), intent(in) :: name
-    character(*), intent(in) :: scene_file
+    character(*), intent(in) :: name        !! as the scene gives it; blanks at its end do not count
+    character(*), intent(in) :: scene_file  !! path of the scene; without a folder it is the working
+                                            !! directory
     character(:), allocatable :: path
     integer :: slash
     logical :: exists
@@ -81,8 +82,8 @@ contains
   !> The lines of a text, which end with a line feed, a carriage return or both. A byte order mark
   !> is dropped.
   subroutine split_lines(text, lines)
-    character(*), intent(in) :: text
-    type(line_type), allocatable, intent(out) :: lines(:)
+    character(*), intent(in) :: text  !! of a file, with its line ends
+    type(line_type), allocatable, intent(out) :: lines(:)  !! (lines), without their ends
     character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
     character(*), parameter :: line_feed = achar(10), carriage_return = achar(13)
     integer(i8) :: i, first, begin

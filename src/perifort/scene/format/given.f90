@@ -1,5 +1,6 @@
 !> What a value looks like that the user has not given, and how long names may be.
 module pd_scene_format_given
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
@@ -11,10 +12,12 @@ module pd_scene_format_given
 
 contains
 
-  !> Whether the user has given this value.
+  !> Whether the user has given this value. A value that is no number has been given, so that it is
+  !> refused where it matters.
   elemental logical function is_set(value)
-    real(wp), intent(in) :: value
-    is_set = value > unset
+    real(wp), intent(in) :: value  !! of a real key
+    is_set = ieee_is_nan(value)
+    if (.not. is_set) is_set = value > unset .or. value < unset
   end function is_set
 
 end module pd_scene_format_given

@@ -6,14 +6,15 @@
 !> allowed values and the default, which is the component's own initial value; writing puts the
 !> present value down as namelist text; a template does so with comments.
 module pd_scene_format_keys
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
-  use pd_base_text, only: join, nearest_name, to_text
+  use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_format_convert, only: to_real, to_integer, to_logical, to_string, to_word, &
     & real_range, integer_range, unit_note
   use pd_scene_format_elements, only: find_elements, growing
   use pd_scene_format_source, only: source_type, source_fault
-  use pd_scene_format_given, only: is_set
+  use pd_scene_format_given, only: is_set, name_length
   use pd_scene_format_values, only: exact_text, list_text, quoted_text, vector_text
   implicit none (type, external)
   private
@@ -44,7 +45,10 @@ module pd_scene_format_keys
     type(error_type), allocatable :: fault          !! reading: the first faulty value
     type(error_type), allocatable :: missing        !! reading: the first missing key
     logical, allocatable :: used(:)                 !! reading: entries that a key has taken
+    character(name_length), allocatable :: fields(:)  !! describing: those of the output
   contains
+    procedure :: describe_fields
+    procedure :: field_names
     procedure :: start
     procedure :: start_reading
     procedure :: finish_reading
@@ -63,8 +67,9 @@ contains
 
   !> Begin a group in a mode that needs no file.
   subroutine start(keys, mode)
-    class(keys_type), intent(inout) :: keys
-    integer, intent(in) :: mode
+    class(keys_type), intent(inout) :: keys  !! the visitor, without a key on return
+    integer, intent(in) :: mode              !! `mode_describe` or `mode_write`; `mode_read` needs
+                                             !! `start_reading`
 
     keys%mode = mode
     keys%count = 0
@@ -72,11 +77,32 @@ contains
     allocate (keys%known(24))
   end subroutine start
 
+  !> Let descriptions list the fields of the output, which the scene does not know by itself.
+  pure subroutine describe_fields(keys, names)
+    class(keys_type), intent(inout) :: keys  !! the visitor, with these names on return
+    character(*), intent(in), optional :: names(:)
+      !! (any number) of the fields of the output; without, descriptions list none
+
+    if (.not. present(names)) return
+    allocate (keys%fields(size(names)))
+    keys%fields(:) = names
+  end subroutine describe_fields
+
+  !> Names of the fields of the output, none if they are not known.
+  pure function field_names(keys) result(names)
+    class(keys_type), intent(in) :: keys  !! the visitor
+    character(name_length), allocatable :: names(:)
+
+    allocate (names(0))
+    if (allocated(keys%fields)) names = keys%fields
+  end function field_names
+
   !> Begin to read group number `section` of a scanned file.
   subroutine start_reading(keys, source, section)
-    class(keys_type), intent(inout) :: keys
-    type(source_type), intent(in), target :: source
-    integer, intent(in) :: section
+    class(keys_type), intent(inout) :: keys  !! the visitor, without a key or an error on return
+    type(source_type), intent(in), target :: source  !! the scanned file; it must stay in its place
+                                                     !! until the group is read
+    integer, intent(in) :: section                   !! number of the group in it
 
     call keys%start(mode_read)
     keys%source => source
@@ -87,9 +113,10 @@ contains
     allocate (keys%used(source%entry_count), source=.false.)
   end subroutine start_reading
 
-  !> After the last key: an unknown key first, then a faulty value, then a missing key.
+  !> After the last key: the error of an unknown key first, then of a faulty value, then of a
+  !> missing key.
   subroutine finish_reading(keys, error)
-    class(keys_type), intent(inout) :: keys
+    class(keys_type), intent(inout) :: keys  !! the visitor after the last key; keeps no error
     type(error_type), allocatable, intent(out) :: error
     character(64), allocatable :: names(:)
     character(:), allocatable :: nearest, note
@@ -121,15 +148,20 @@ contains
   !> A text. `allowed`: the only values, matched in any case; `word`: a name that may stand in
   !> column headers, so letters, digits, `_` and `-` only; `hidden`: not to be written.
   subroutine text_key(keys, name, value, meaning, required, allowed, default, word, hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
+    class(keys_type), intent(inout) :: keys           !! the visitor; notes the key, and in reading
+                                                      !! what is wrong with it
+    character(*), intent(in) :: name                  !! of the key, in lower case
     ! allow(C072): a text is assigned only after its length has been checked.
-    character(*), intent(inout) :: value
-    character(*), intent(in) :: meaning
-    logical, intent(in), optional :: required
-    character(*), intent(in), optional :: allowed(:)
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: word, hidden
+    character(*), intent(inout) :: value              !! component of the group; set in reading
+                                                      !! where the file gives it
+    character(*), intent(in) :: meaning               !! what the reference says of the key
+    logical, intent(in), optional :: required         !! the file must give it; absent: no
+    character(*), intent(in), optional :: allowed(:)  !! (any number), the only values, matched in
+                                                      !! any case; absent: any text
+    character(*), intent(in), optional :: default     !! how the reference calls the default;
+                                                      !! absent: by the value
+    logical, intent(in), optional :: word             !! letters, digits, _ and - only; absent: no
+    logical, intent(in), optional :: hidden           !! the value is not written; absent: it is
     character(:), allocatable :: choice, shown, message, note
     integer, allocatable :: slots(:)
 
@@ -152,14 +184,19 @@ contains
   !> A whole number within `at_least` and `at_most`.
   subroutine integer_key(keys, name, value, unit, meaning, required, at_least, at_most, default, &
       & hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    integer, intent(in), optional :: at_least, at_most
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: hidden
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    integer, intent(inout) :: value                !! component of the group; set in reading where
+                                                   !! the file gives it
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    integer, intent(in), optional :: at_least      !! smallest value; absent: no such bound
+    integer, intent(in), optional :: at_most       !! largest value; absent: no such bound
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
 
@@ -180,14 +217,21 @@ contains
   !> A real within the open bounds `above`, `below` and the closed ones `at_least`, `at_most`.
   subroutine real_key(keys, name, value, unit, meaning, required, above, below, at_least, at_most, &
       & default, hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    real(wp), intent(in), optional :: above, below, at_least, at_most
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: hidden
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    real(wp), intent(inout) :: value               !! component of the group; set in reading where
+                                                   !! the file gives it
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    real(wp), intent(in), optional :: above  !! the value must be larger; absent: no such bound
+    real(wp), intent(in), optional :: below  !! the value must be smaller; absent: no such bound
+    real(wp), intent(in), optional :: at_least     !! smallest value; absent: no such bound
+    real(wp), intent(in), optional :: at_most      !! largest value; absent: no such bound
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
 
@@ -209,10 +253,12 @@ contains
 
   !> True or false.
   subroutine logical_key(keys, name, value, meaning)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    logical, intent(inout) :: value
-    character(*), intent(in) :: meaning
+    class(keys_type), intent(inout) :: keys  !! the visitor; notes the key, and in reading what is
+                                             !! wrong with it
+    character(*), intent(in) :: name         !! of the key, in lower case
+    logical, intent(inout) :: value          !! component of the group; set in reading where the
+                                             !! file gives it
+    character(*), intent(in) :: meaning      !! what the reference says of the key
     integer, allocatable :: slots(:)
     character(:), allocatable :: message, note
 
@@ -226,13 +272,17 @@ contains
 
   !> Whole numbers along the directions.
   subroutine integers_key(keys, name, value, unit, meaning, required, at_least, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    integer, intent(inout) :: value(:)
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    integer, intent(in), optional :: at_least
-    character(*), intent(in), optional :: default
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    integer, intent(inout) :: value(:)             !! (directions); elements are set in reading
+                                                   !! where the file gives them
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    integer, intent(in), optional :: at_least      !! smallest value of each; absent: no such bound
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i
@@ -252,13 +302,17 @@ contains
 
   !> Reals along the directions; elements that are not given keep their defaults.
   subroutine reals_key(keys, name, value, unit, meaning, required, default, hidden)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value(:)
-    character(*), intent(in) :: unit, meaning
-    logical, intent(in), optional :: required
-    character(*), intent(in), optional :: default
-    logical, intent(in), optional :: hidden
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! of the key, in lower case
+    real(wp), intent(inout) :: value(:)            !! (directions); elements are set in reading
+                                                   !! where the file gives them
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning            !! what the reference says of the key
+    logical, intent(in), optional :: required      !! the file must give it; absent: no
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     integer :: i
     character(:), allocatable :: shown, message, note
@@ -281,17 +335,23 @@ contains
 
   !> A matrix, its elements in column order if no subscripts are given.
   subroutine matrix_key(keys, name, value, unit, meaning)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value(:, :)
-    character(*), intent(in) :: unit, meaning
+    class(keys_type), intent(inout) :: keys  !! the visitor; notes the key, and in reading what is
+                                             !! wrong with it
+    character(*), intent(in) :: name         !! of the key, in lower case
+    real(wp), intent(inout) :: value(:, :)   !! (rows, columns); elements are set in reading where
+                                             !! the file gives them
+    character(*), intent(in) :: unit         !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning      !! what the reference says of the key
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
+    logical :: given
     integer :: i, j, k
 
     shown = ''
     if (keys%mode == mode_describe) shown = '0.0'
-    if (any(abs(value) > 0.0_wp)) shown = list_text([value])
+    given = any(ieee_is_nan(value))
+    if (.not. given) given = any(abs(value) > 0.0_wp)
+    if (given) shown = list_text([value])
     call keys%note_key(name, 'real('//to_text(size(value, 1))//','//to_text(size(value, 2))//')', &
       & unit, meaning, shown, '')
     if (keys%mode /= mode_read) return
@@ -307,11 +367,14 @@ contains
 
   !> Three keys `<name>_x`, `<name>_y`, `<name>_z` for the components of one vector.
   subroutine triple(keys, name, value, unit, meaning, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), intent(inout) :: value(3)
-    character(*), intent(in) :: unit, meaning
-    character(*), intent(in), optional :: default
+    class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
+                                                   !! what is wrong with it
+    character(*), intent(in) :: name               !! what the three names begin with
+    real(wp), intent(inout) :: value(3)  !! (3), x, y, z; set in reading where the file gives them
+    character(*), intent(in) :: unit               !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning  !! what the reference says of them, before `along x`
+    character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
+                                                   !! by the value
     character(*), parameter :: directions = 'xyz'
     integer :: i
 
@@ -323,11 +386,15 @@ contains
 
   !> Reals, as many as are given.
   subroutine real_list(keys, name, value, unit, meaning, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
-    real(wp), allocatable, intent(inout) :: value(:)
-    character(*), intent(in) :: unit, meaning
-    character(*), intent(in), optional :: default
+    class(keys_type), intent(inout) :: keys           !! the visitor; notes the key, and in reading
+                                                      !! what is wrong with it
+    character(*), intent(in) :: name                  !! of the key, in lower case
+    real(wp), allocatable, intent(inout) :: value(:)  !! (any number); in reading made anew if the
+                                                      !! file gives the key
+    character(*), intent(in) :: unit                  !! SI symbol; '' or '-' for none
+    character(*), intent(in) :: meaning               !! what the reference says of the key
+    character(*), intent(in), optional :: default     !! how the reference calls the default;
+                                                      !! absent: by the value
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i
@@ -349,22 +416,27 @@ contains
     end do
   end subroutine real_list
 
-  !> Texts, as many as are given, each one of `allowed`.
-  subroutine text_list(keys, name, value, meaning, allowed, default)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
+  !> Names, as many as are given, kept in lower case. `known` is what descriptions list; whether a
+  !> name is known is checked where the whole list is.
+  subroutine text_list(keys, name, value, meaning, known, default)
+    class(keys_type), intent(inout) :: keys  !! the visitor
+    character(*), intent(in) :: name         !! of the key
     ! allow(C072): a text is assigned only after its length has been checked.
     character(*), allocatable, intent(inout) :: value(:)
-    character(*), intent(in) :: meaning
-    character(*), intent(in) :: allowed(:)
+      !! (any number); in reading made anew if the file gives the key
+    character(*), intent(in) :: meaning      !! what it is, for the reference
+    character(*), intent(in) :: known(:)     !! (any number) names that descriptions list
     character(*), intent(in), optional :: default
+      !! what descriptions show for it; the value if absent
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown, message, note
+    character(:), allocatable :: shown, listed, message, note
     integer :: i
 
     shown = ''
     if (allocated(value)) shown = list_text(value)
-    call keys%note_key(name, 'text list', '', meaning, shown, list_text(allowed), default=default)
+    listed = ''
+    if (size(known) > 0) listed = list_text(known)
+    call keys%note_key(name, 'text list', '', meaning, shown, listed, default=default)
     if (keys%mode /= mode_read) return
     call keys%find(name, growing, slots)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
@@ -372,9 +444,10 @@ contains
     allocate (value(size(slots)))
     do i = 1, size(slots)
       value(i) = ''
-      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, allowed)
+      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, word=.true.)
       call keys%complain(slots(i), message, note)
       if (allocated(keys%fault)) return
+      value(i) = lower_case(value(i))
       if (any(value(:i - 1) == value(i))) then
         call keys%complain(slots(i), "'"//trim(value(i))//"' stands twice in '"//name//"'", &
           & 'once is enough')
@@ -385,12 +458,14 @@ contains
 
   !> Values of any kind, as many as are given, kept as they are written: texts with their quotes.
   subroutine words(keys, name, value, meaning, required)
-    class(keys_type), intent(inout) :: keys
-    character(*), intent(in) :: name
+    class(keys_type), intent(inout) :: keys    !! the visitor; notes the key, and in reading what is
+                                               !! wrong with it
+    character(*), intent(in) :: name           !! of the key, in lower case
     ! allow(C072): a text is assigned only after its length has been checked.
-    character(*), allocatable, intent(inout) :: value(:)
-    character(*), intent(in) :: meaning
-    logical, intent(in), optional :: required
+    character(*), allocatable, intent(inout) :: value(:)  !! (any number); in reading made anew if
+                                                          !! the file gives the key
+    character(*), intent(in) :: meaning        !! what the reference says of the key
+    logical, intent(in), optional :: required  !! the file must give it; absent: no
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i

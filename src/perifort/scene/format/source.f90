@@ -10,7 +10,7 @@ module pd_scene_format_source
   implicit none (type, external)
   private
   public :: source_type, section_type, entry_type, token_type, scan_source, source_fault, &
-    & check_text
+    & add_option, check_text
 
   !> One value as written: a word or the inside of a quoted text.
   type :: token_type
@@ -44,6 +44,8 @@ module pd_scene_format_source
     type(entry_type), allocatable :: entries(:)
     type(token_type), allocatable :: tokens(:)
     integer :: section_count = 0, entry_count = 0, token_count = 0
+    integer :: option_count = 0  !! lines at the end that are options of the command line
+    logical :: in_memory = .false.     !! the text of a scene in memory: places are groups and keys
   end type source_type
 
   character(*), parameter :: tab = achar(9)
@@ -59,16 +61,21 @@ module pd_scene_format_source
 
 contains
 
-  !> Scan `text`; `file` is the name used in messages.
-  subroutine scan_source(text, file, source, error)
-    character(*), intent(in) :: text
-    character(*), intent(in) :: file
-    type(source_type), intent(out) :: source
+  !> Find groups, keys and values in `text`; `file` is the name used in messages. An error, with its
+  !> place, if text stands outside of groups, if a group or quote is not closed, if a key or value
+  !> is missing, or for a control character. With `in_memory` the text is of no file, and messages
+  !> name groups and keys in place of lines.
+  subroutine scan_source(text, file, source, error, in_memory)
+    character(*), intent(in) :: text          !! of the scene file
+    character(*), intent(in) :: file          !! name of the file, for messages
+    type(source_type), intent(out) :: source  !! its groups, keys and values with their places
     type(error_type), allocatable, intent(out) :: error
+    logical, intent(in), optional :: in_memory
     integer :: line, column, state
     logical :: inside
 
     source%file = file
+    if (present(in_memory)) source%in_memory = in_memory
     call split_lines(text, source%lines)
     call check_text(source, error)
     if (allocated(error)) return
@@ -99,7 +106,7 @@ contains
   !> An error if the lines hold a control character other than a tab: no text file does, and shown
   !> on a terminal or put into a name it does harm.
   subroutine check_text(source, error)
-    type(source_type), intent(in) :: source
+    type(source_type), intent(in) :: source  !! with its lines and the file's name
     type(error_type), allocatable, intent(out) :: error
     integer :: line, column
 
@@ -385,16 +392,43 @@ contains
     last = merge(len(text), column + last - 2, last == 0)
   end function word_end
 
-  !> Make an error with place, line and carets. `line` 0 names the file only.
+  !> Add a line that stands on the command line instead of the file; `line` is its number.
+  subroutine add_option(source, text, line)
+    type(source_type), intent(inout) :: source  !! with the line behind those of the file on return
+    character(*), intent(in) :: text      !! the option as it is typed, without the shell's quotes
+    integer, intent(out) :: line          !! its number, for places
+    type(line_type), allocatable :: longer(:)
+    integer :: i
+
+    line = size(source%lines) + 1
+    allocate (longer(line))
+    do i = 1, line - 1
+      call move_alloc(source%lines(i)%text, longer(i)%text)
+    end do
+    longer(line)%text = text
+    call move_alloc(longer, source%lines)
+    source%option_count = source%option_count + 1
+  end subroutine add_option
+
+  !> Make an error with place, line and carets. `line` 0 names the file only; lines of options name
+  !> the command line.
   subroutine source_fault(source, line, column, width, message, note, error)
-    type(source_type), intent(in) :: source
-    integer, intent(in) :: line, column, width
-    character(*), intent(in) :: message
-    character(*), intent(in) :: note
+    type(source_type), intent(in) :: source  !! with its lines and the file's name
+    integer, intent(in) :: line              !! number of the line, from 1; 0: of none
+    integer, intent(in) :: column            !! of the first character at fault, from 1
+    integer, intent(in) :: width             !! number of characters at fault
+    character(*), intent(in) :: message      !! what was wrong
+    character(*), intent(in) :: note         !! what was expected; '' for nothing
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: number, text, shown, pad
+    character(:), allocatable :: number, text, shown, pad, place
     integer :: first, last, i, carets
 
+    if (source%in_memory) then
+      text = message//newline//' --> '//place_in_memory(source, line)
+      if (len(note) > 0) text = text//newline//'  = '//note
+      call fail(error, text)
+      return
+    end if
     if (line < 1 .or. line > size(source%lines)) then
       text = message//newline//' --> '//source%file
       if (len(note) > 0) text = text//newline//'  = '//note
@@ -402,6 +436,11 @@ contains
       return
     end if
     number = to_text(line)
+    place = source%file//':'//number
+    if (line > size(source%lines) - source%option_count) then
+      number = ''
+      place = 'the command line'
+    end if
     first = 1
     last = len_trim(source%lines(line)%text)
     if (last > longest_shown) then
@@ -423,12 +462,36 @@ contains
     do i = column, min(column + width - 1, last)
       if (.not. continues(source%lines(line)%text(i:i))) carets = carets + 1
     end do
-    text = message//newline//' --> '//source%file//':'//number//newline// &
+    text = message//newline//' --> '//place//newline// &
       & '  '//number//' | '//shown//newline// &
       & repeat(' ', len(number) + 2)//' | '//pad//repeat('^', max(1, carets))
     if (len(note) > 0) text = text//' '//note
     call fail(error, text)
   end subroutine source_fault
+
+  !> The group, and the key if there is one, that stand in a line of a text that is of no file.
+  pure function place_in_memory(source, line) result(place)
+    type(source_type), intent(in) :: source
+    integer, intent(in) :: line
+    character(:), allocatable :: place
+    integer :: s, e, here
+
+    place = 'the scene in memory'
+    here = 0
+    do s = 1, source%section_count
+      if (source%sections(s)%line <= line) here = s
+    end do
+    if (here == 0 .or. line < 1) return
+    associate (section => source%sections(here))
+      place = 'group &'//section%name//' number '// &
+        & to_text(count([(source%sections(s)%name == section%name, s=1, here)]))
+      do e = section%first, section%last
+        if (source%entries(e)%line /= line) cycle
+        place = place//', key '//source%entries(e)%key
+        return
+      end do
+    end associate
+  end function place_in_memory
 
   !> Whether a byte is a later one of an UTF-8 character.
   pure logical function continues(byte)

@@ -27,17 +27,18 @@ module pd_scene_format_table
 
 contains
 
-  !> Read the table at `path`.
-  !>
-  !> `columns`: how many there must be (default: as many as in the first row). `allowed`: the names
-  !> that a header may use, '*' for any; with it a header is required, without it none may
-  !> stand.
+  !> Read the table at `path`. `allowed`: the names that a header may use; with it a header is
+  !> required, without it none may stand. An error, with its place, if the file cannot be read, if a
+  !> column is unknown or stands twice, if rows differ in length or hold anything but numbers, or if
+  !> there are none.
   subroutine read_table(path, table, error, columns, allowed)
-    character(*), intent(in) :: path
-    type(table_type), intent(out) :: table
+    character(*), intent(in) :: path                  !! of the file
+    type(table_type), intent(out) :: table            !! as it stands in the file
     type(error_type), allocatable, intent(out) :: error
-    integer, intent(in), optional :: columns
-    character(*), intent(in), optional :: allowed(:)
+    integer, intent(in), optional :: columns          !! how many there must be; absent: as many as
+                                                      !! in the first row
+    character(*), intent(in), optional :: allowed(:)  !! (any number), names of columns, '*' for
+                                                      !! any; absent: no header
     character(:), allocatable :: text
 
     call read_text_file(path, text, error)
@@ -45,14 +46,16 @@ contains
     call read_table_text(text, path, table, error, columns, allowed)
   end subroutine read_table
 
-  !> Read a table from its text; `name` stands for the file in messages.
+  !> Read a table from its text, with the errors of `read_table`.
   subroutine read_table_text(text, name, table, error, columns, allowed)
-    character(*), intent(in) :: text
-    character(*), intent(in) :: name
-    type(table_type), intent(out) :: table
+    character(*), intent(in) :: text                  !! of the file
+    character(*), intent(in) :: name                  !! of the file, for messages
+    type(table_type), intent(out) :: table            !! as it stands in the text
     type(error_type), allocatable, intent(out) :: error
-    integer, intent(in), optional :: columns
-    character(*), intent(in), optional :: allowed(:)
+    integer, intent(in), optional :: columns          !! how many there must be; absent: as many as
+                                                      !! in the first row
+    character(*), intent(in), optional :: allowed(:)  !! (any number), names of columns, '*' for
+                                                      !! any; absent: no header
     type(source_type) :: source
     integer :: line, last, row, wide
     logical :: named
@@ -94,8 +97,8 @@ contains
 
   !> The number of the column of this name, 0 if there is none.
   pure integer function column_of(table, name) result(column)
-    type(table_type), intent(in) :: table
-    character(*), intent(in) :: name
+    type(table_type), intent(in) :: table  !! with a header, else no column is found
+    character(*), intent(in) :: name       !! of the column, in lower case
 
     do column = size(table%names), 1, -1
       if (table%names(column) == name) return

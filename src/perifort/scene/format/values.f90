@@ -3,6 +3,7 @@
 !> A word's form is checked first, because list-directed reads accept too much (`5abc/`, `NaN`,
 !> `yes`); the runtime then does the conversion.
 module pd_scene_format_values
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_base_kinds, only: wp
   use pd_base_text, only: lower_case, to_text
   implicit none (type, external)
@@ -28,9 +29,9 @@ contains
 
   !> A finite real; `note` says what was expected if the word is not one, else it is ''.
   subroutine parse_real(word, value, note, tiny_is_zero)
-    character(*), intent(in) :: word
-    real(wp), intent(out) :: value
-    character(:), allocatable, intent(out) :: note
+    character(*), intent(in) :: word                !! without blanks
+    real(wp), intent(out) :: value                  !! to be used only if `note` is ''
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the word is good
     logical, intent(in), optional :: tiny_is_zero  !! read sizes below 1/largest_real as 0, as
                                                    !! computed tables have them, instead of
                                                    !! refusing them (default)
@@ -96,9 +97,9 @@ contains
 
   !> A whole number; `note` says what was expected if the word is not one, else it is ''.
   subroutine parse_integer(word, value, note)
-    character(*), intent(in) :: word
-    integer, intent(out) :: value
-    character(:), allocatable, intent(out) :: note
+    character(*), intent(in) :: word                !! without blanks
+    integer, intent(out) :: value                   !! to be used only if `note` is ''
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the word is good
     integer :: first, status
 
     value = 0
@@ -117,9 +118,9 @@ contains
 
   !> True or false; `note` says what was expected if the word is neither, else it is ''.
   subroutine parse_logical(word, value, note)
-    character(*), intent(in) :: word
-    logical, intent(out) :: value
-    character(:), allocatable, intent(out) :: note
+    character(*), intent(in) :: word                !! without blanks
+    logical, intent(out) :: value                   !! to be used only if `note` is ''
+    character(:), allocatable, intent(out) :: note  !! what was expected; '' if the word is good
 
     note = ''
     value = .false.
@@ -128,18 +129,26 @@ contains
       value = .true.
     case ('.false.', 'false', 'f', '.f.')
       value = .false.
-    case default
+    case default  ! neither: the note says so to the caller
       note = 'expected .true. or .false.'
     end select
   end subroutine parse_logical
 
   !> The shortest decimal that reads back to the very same bits.
   function exact_text(value) result(text)
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value  !! finite
     character(:), allocatable :: text
     integer :: n, status
     real(wp) :: back
 
+    ! what is no number is written as such, to be refused when it is read
+    if (ieee_is_nan(value)) then
+      text = 'NaN'
+      return
+    else if (abs(value) > huge(value)) then
+      text = trim(merge('-Infinity', 'Infinity ', value < 0.0_wp))
+      return
+    end if
     do n = 6, 17
       text = to_text(value, n)
       read (text, *, iostat=status) back
@@ -150,7 +159,7 @@ contains
 
   !> A text in single quotes, quotes inside it doubled.
   pure function quoted_text(text) result(quoted)
-    character(*), intent(in) :: text
+    character(*), intent(in) :: text  !! any characters
     character(:), allocatable :: quoted
     integer :: i
 
@@ -164,7 +173,7 @@ contains
 
   !> Reals parted by commas.
   function reals_text(values) result(text)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)  !! (any number), finite
     character(:), allocatable :: text
     integer :: i
 
@@ -177,7 +186,7 @@ contains
 
   !> Whole numbers parted by commas.
   pure function integers_text(values) result(text)
-    integer, intent(in) :: values(:)
+    integer, intent(in) :: values(:)  !! (any number)
     character(:), allocatable :: text
     integer :: i
 
@@ -191,9 +200,9 @@ contains
   !> The given elements of a vector as they stand behind its key and a `=`. Where there is a gap the
   !> elements are spelled one by one, the first without the key's own name.
   function vector_text(name, values, given) result(text)
-    character(*), intent(in) :: name
-    real(wp), intent(in) :: values(:)
-    logical, intent(in) :: given(:)
+    character(*), intent(in) :: name   !! of the key
+    real(wp), intent(in) :: values(:)  !! (n), finite where given
+    logical, intent(in) :: given(:)    !! (n), whether the element is to be written
     character(:), allocatable :: text
     integer :: i
 
@@ -212,7 +221,7 @@ contains
 
   !> Quoted texts parted by commas.
   pure function texts_text(values) result(text)
-    character(*), intent(in) :: values(:)
+    character(*), intent(in) :: values(:)  !! (any number); blanks at their ends are cut
     character(:), allocatable :: text
     integer :: i
 

@@ -21,13 +21,14 @@ module pd_study_bench_bench
 
 contains
 
-  !> Measure and print a table to `unit` (default: standard output), a row as soon as it is known;
-  !> the CSV file takes its place when all is done. Bodies that do not fit into the free memory are
-  !> left out with a line that says so; if nothing is left that is an error.
+  !> Measure and print a table to `unit`, a row as soon as it is known; the CSV file takes its place
+  !> when all is done. Bodies that do not fit into the free memory are left out with a line that
+  !> says so. An error if an option has a value that cannot be measured, if a body cannot be built,
+  !> if the CSV file cannot be written, or if no body fits into the memory.
   subroutine run_bench(options, error, unit)
-    type(bench_options_type), intent(in) :: options
+    type(bench_options_type), intent(in) :: options  !! what to measure
     type(error_type), allocatable, intent(out) :: error
-    integer, intent(in), optional :: unit
+    integer, intent(in), optional :: unit            !! of the table; absent: standard output
     type(kernel_type), allocatable :: kernels(:)
     type(machine_type), allocatable :: machines(:)
     type(timing_type) :: timing
@@ -93,8 +94,9 @@ contains
 
   !> All bodies and kernels of the options, large dimensions first.
   pure subroutine plan_kernels(options, kernels)
-    type(bench_options_type), intent(in) :: options
+    type(bench_options_type), intent(in) :: options  !! what to measure, checked
     type(kernel_type), allocatable, intent(out) :: kernels(:)
+      !! (measurements), in the order of the table; one thread each
     integer, allocatable :: dimensions(:), points(:)
     type(kernel_type) :: one
     integer :: d, p, m, f, b, r
@@ -146,7 +148,7 @@ contains
   !> Threads to measure with, ascending and each once; 1 is always there, since the others are
   !> compared with it.
   function thread_counts(options) result(threads)
-    type(bench_options_type), intent(in) :: options
+    type(bench_options_type), intent(in) :: options  !! what to measure, checked
     integer, allocatable :: threads(:), wanted(:)
 
     if (allocated(options%threads)) then

@@ -10,7 +10,7 @@ module pd_study_bench_kernels
   use pd_family_family, only: family_type
   use pd_family_lattice, only: both_ends, lattice_family_type
   use pd_family_list, only: list_family_type
-  use pd_force_model, only: dilatation_of, no_dilatation, unprojected
+  use pd_force_model, only: dilatation_of, options_of, no_dilatation, projected, unprojected
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: evaluate, system_type
@@ -68,11 +68,12 @@ module pd_study_bench_kernels
 contains
 
   !> Build and time one kernel. Each repeat takes at least `seconds`; there are five, and on a
-  !> restless machine (least and most differ by over a tenth) up to twenty if they are short.
+  !> machine with other work (least and most differ by over a tenth) up to twenty if they are short.
+  !> An error if the scene cannot be set up or its run fails.
   subroutine measure_kernel(kernel, seconds, timing, error)
-    type(kernel_type), intent(in) :: kernel
-    real(wp), intent(in) :: seconds
-    type(timing_type), intent(out) :: timing
+    type(kernel_type), intent(in) :: kernel   !! what is measured
+    real(wp), intent(in) :: seconds           !! least wall time of a repeat [s]
+    type(timing_type), intent(out) :: timing  !! what came out; without meaning after an error
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
     type(scene_type) :: scene
@@ -88,7 +89,8 @@ contains
         timing%bonds = system%family%n_bonds
         timing%bytes = memory_of(system)
         timing%build = set_up%timer%seconds('families') + set_up%timer%seconds('surface correction')
-        timing%flops = flops_of_bond(system%family, dilatation_of(system%model))*timing%bonds
+        timing%flops = flops_of_bond(system%family, dilatation_of(options_of(system%model))) &
+          & *timing%bonds
         timing%traffic = bytes_of_step(system)
         call start_moving(system, scene)
         call time_steps(system, set_up%plan%step, seconds, timing, error)
@@ -101,8 +103,9 @@ contains
 
   !> A steel cube, plate or bar of a kernel's kind, horizon 3.015 spacings.
   pure subroutine standard_scene(kernel, scene)
-    type(kernel_type), intent(in) :: kernel
-    type(scene_type), intent(out) :: scene
+    type(kernel_type), intent(in) :: kernel  !! gives dimension, points and what is measured of them
+    type(scene_type), intent(out) :: scene   !! of one body without loads and boundaries, for one
+                                             !! step
     real(wp), parameter :: spacing = 1.0e-3_wp                   ! [m]
     real(wp), parameter :: far_away = 0.1_wp                     ! stretch that is never reached [-]
     ! in 2D (plane stress) and 3D bond-based bodies have no other; in 1D any will do
@@ -224,11 +227,12 @@ contains
     timing%forces = median(samples)
   end subroutine time_forces
 
-  !> The clocks at every `stride`-th step.
+  !> The clocks at every `stride`-th step. No error is set.
   subroutine look_at_clock(observer, system, instant, error)
-    class(stopwatch_type), intent(inout) :: observer
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
+    class(stopwatch_type), intent(inout) :: observer  !! reads the clocks once more on return if
+                                                      !! that is due
+    type(system_type), intent(inout) :: system        !! not looked at
+    type(instant_type), intent(in) :: instant         !! gives the step
     type(error_type), allocatable, intent(out) :: error
 
     if (mod(instant%step, observer%stride) /= 0) return
@@ -247,25 +251,30 @@ contains
   !> Lattice, both loops: eta d, x and e 2(2d - 1), 2x + g e 3, polynomial 15. Dilatation: sum 4.
   !> Force: magnitude 1, direction and sums 4d, with a dilatation 8 more. Where a bond is computed
   !> once for both ends, the sums of the other end are 1 and d more, and all of it is for two
-  !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. List, both
-  !> loops: xi and eta 2d, |xi|^2, x and e 3(2d - 1), the rest of them and the weight 9, polynomial
-  !> 15. Dilatation: sum 4. Force: magnitude 4, direction and sums 3d, with a dilatation 9 more;
-  !> stored weights save 6 and are not counted.
-  !> Unprojected, the sum of the dilatation is 2 less, and what it adds to the force 3.
+  !> directed bonds. In mixed precision eta is 2d more, the polynomial 4 less. Unprojected, the sum
+  !> of the dilatation is 2 less, and what it adds to the force 3.
+  !>
+  !> List, both loops: eta d, e 4d, projected 2 more, polynomial 15. Dilatation: sum 2, projected 5.
+  !> Force: magnitude 2, direction and sums 3d, with a dilatation 5 more, projected 9. Without
+  !> stored geometry, both loops: xi d, |xi|^2 2d - 1, root and division 2, weight 3.
   pure real(wp) function flops_of_bond(family, kind) result(flops)
-    class(family_type), intent(in) :: family
+    class(family_type), intent(in) :: family  !! of lists or of one lattice; any other kind is an
+                                              !! internal fault
     integer, intent(in) :: kind  !! of the dilatation, see `dilatation_of`
-    integer :: d, geometry
+    real(wp) :: geometry
+    integer :: d
     logical :: dilatation
 
     dilatation = kind /= no_dilatation
     d = family%dim
     select type (family)
     type is (list_family_type)
-      geometry = 2*d + 3*(2*d - 1) + 9 + 15
-      flops = geometry + 4 + 3*d
-      if (dilatation) flops = flops + 9 + geometry + 4
-      if (kind == unprojected) flops = flops - 5
+      geometry = 5*d + 15
+      if (allocated(family%shape)) geometry = geometry + (3*d + 4)*count(family%shape == 0_i8) &
+        & /real(max(1, size(family%shape)), wp)
+      flops = geometry + 2 + 3*d
+      if (dilatation) flops = flops + 5 + geometry + 2
+      if (kind == projected) flops = flops + 2 + 4 + 2 + 3
     type is (lattice_family_type)
       geometry = d + 2*(2*d - 1) + 3 + 15
       if (family%mixed) geometry = geometry + 2*d - 4
@@ -286,9 +295,10 @@ contains
   !> sums are set to zero and read, and p is made of theta in a loop of its own. In mixed precision
   !> u is split and p rounded, and sums for both ends are set, added to and read. Lists, by each
   !> pass: number and bits of every cluster's members, and what a point has in one place, read and
-  !> written with the displacements in it, and read again by the loop.
+  !> written with the displacements in it, and read again by the loop; tables of weights, once for
+  !> all clusters that share them, and of the geometry.
   pure real(wp) function bytes_of_step(system) result(bytes)
-    type(system_type), intent(in) :: system
+    type(system_type), intent(in) :: system  !! gives dimension, points, bonds and model
     integer :: d, passes
     real(wp) :: points
     logical :: both
@@ -304,6 +314,7 @@ contains
       bytes = bytes + passes*(11*real(size(family%bits), wp) + points*8*3*8)
       if (allocated(family%weight_S)) bytes = bytes + 8*(real(size(family%weight_S), wp) &
         & + 2*real(size(family%weight_D), wp))
+      if (allocated(family%geometry)) bytes = bytes + passes*8*real(size(family%geometry), wp)
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
       both = both_ends(d, family%mixed)
@@ -313,14 +324,15 @@ contains
         if (both) bytes = bytes + points*16*(d + merge(1, 0, system%model%dilatation))
       end if
     class default
-      continue
+      call internal_fault('bytes_of_step does not know a kind of family')
     end select
   end function bytes_of_step
 
   !> Memory that a kernel will need while it is built [bytes], on the safe side: what a machine does
   !> not have is better not begun.
   pure real(wp) function bytes_needed(kernel) result(bytes)
-    type(kernel_type), intent(in) :: kernel
+    type(kernel_type), intent(in) :: kernel  !! gives dimension, points, family and surface
+                                             !! correction
     ! bonds of an inner point at 3.015 spacings: 6, 28, 122
     real(wp), parameter :: bonds(3) = [6.0_wp, 28.0_wp, 122.0_wp]
     real(wp) :: points

@@ -24,9 +24,10 @@ contains
   !> exceed the caches by far. `repeats`: the best of so many counts, since other work can only make
   !> things slower.
   subroutine measure_machine(threads, length, repeats, machine)
-    integer, intent(in) :: threads, repeats
-    integer(i8), intent(in) :: length
-    type(machine_type), intent(out) :: machine
+    integer, intent(in) :: threads              !! number of threads that work at once
+    integer, intent(in) :: repeats              !! measurements, of which the best counts
+    integer(i8), intent(in) :: length           !! elements of each of the three arrays
+    type(machine_type), intent(out) :: machine  !! bandwidth and peak of these threads
 
     machine%threads = threads
     call measure_bandwidth(threads, length, repeats, machine%bandwidth)

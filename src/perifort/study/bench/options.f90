@@ -31,9 +31,9 @@ module pd_study_bench_options
 
 contains
 
-  !> Fails where an option has a value that cannot be measured.
+  !> An error if an option has a value that cannot be measured.
   pure subroutine check_options(options, error)
-    type(bench_options_type), intent(in) :: options
+    type(bench_options_type), intent(in) :: options  !! what the user asks for
     type(error_type), allocatable, intent(out) :: error
 
     call check_range('--points', options%points, 8, 1000000000, error)
@@ -105,8 +105,9 @@ contains
 
   !> Whether `name` belongs to what was chosen: the word itself, 'both', or nothing given.
   pure logical function chosen(word, name)
-    character(:), allocatable, intent(in) :: word
-    character(*), intent(in) :: name
+    character(:), allocatable, intent(in) :: word  !! as the user gave it; '' or not allocated:
+                                                   !! nothing given
+    character(*), intent(in) :: name               !! of one choice
 
     chosen = .true.
     if (given(word)) chosen = word == 'both' .or. word == name
@@ -114,7 +115,7 @@ contains
 
   !> Whether there is a word.
   pure logical function given(word)
-    character(:), allocatable, intent(in) :: word
+    character(:), allocatable, intent(in) :: word  !! as the user gave it; may be not allocated
     given = .false.
     if (allocated(word)) given = len_trim(word) > 0
   end function given

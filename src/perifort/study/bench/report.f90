@@ -23,7 +23,7 @@ contains
 
   !> The `#` lines of the CSV file and its columns, to `unit`.
   subroutine csv_head(unit)
-    integer, intent(in) :: unit
+    integer, intent(in) :: unit  !! of an open file or the terminal
     write (unit, '(a)') '# perifort '//program_version, '# compiler: '//compiler_name(), &
       & '# flags: '//compiler_flags(), '# cpu: '//processor_name(), '# commit: '//commit(), &
       & csv_columns
@@ -31,9 +31,9 @@ contains
 
   !> One line of the CSV file. Numbers have as many digits as the clock is good for.
   function csv_row(kernel, timing, efficiency) result(text)
-    type(kernel_type), intent(in) :: kernel
-    type(timing_type), intent(in) :: timing
-    real(wp), intent(in) :: efficiency
+    type(kernel_type), intent(in) :: kernel  !! what was measured
+    type(timing_type), intent(in) :: timing  !! what came out
+    real(wp), intent(in) :: efficiency  !! parallel: time on one thread over (threads x time) [-]
     character(:), allocatable :: text
     real(wp) :: step
 
@@ -51,9 +51,9 @@ contains
   !> What stands above the table: program, what the machine can do, and what the columns mean.
   !> `surface`: with surface correction.
   subroutine table_head(unit, machines, surface)
-    integer, intent(in) :: unit
-    type(machine_type), intent(in) :: machines(:)
-    logical, intent(in) :: surface
+    integer, intent(in) :: unit                    !! of an open file or the terminal
+    type(machine_type), intent(in) :: machines(:)  !! (thread counts) in the order of the rows
+    logical, intent(in) :: surface                 !! the bodies have a surface correction
     integer :: t
 
     write (unit, '(a)') 'perifort '//program_version//', commit '//commit(), &
@@ -78,7 +78,7 @@ contains
 
   !> What the machine can do, in a line.
   function machine_row(machine) result(text)
-    type(machine_type), intent(in) :: machine
+    type(machine_type), intent(in) :: machine  !! bandwidth and peak of some threads
     character(:), allocatable :: text
     text = to_text(machine%threads)//trim(merge(' thread: ', ' threads:', machine%threads == 1))// &
       & ' triad '//with_unit(machine%bandwidth, 'B/s', 3)//', multiply-adds in registers '// &
@@ -87,10 +87,10 @@ contains
 
   !> One row of the table.
   function table_row(kernel, timing, machine, efficiency) result(text)
-    type(kernel_type), intent(in) :: kernel
-    type(timing_type), intent(in) :: timing
-    type(machine_type), intent(in) :: machine
-    real(wp), intent(in) :: efficiency
+    type(kernel_type), intent(in) :: kernel    !! what was measured
+    type(timing_type), intent(in) :: timing    !! what came out
+    type(machine_type), intent(in) :: machine  !! bandwidth and peak of as many threads
+    real(wp), intent(in) :: efficiency  !! parallel: time on one thread over (threads x time) [-]
     character(:), allocatable :: text
     real(wp) :: step, scale, points
 
@@ -112,7 +112,7 @@ contains
 
   !> A kernel's columns on the left: as wide as `left` less the threads.
   pure function kernel_label(kernel) result(text)
-    type(kernel_type), intent(in) :: kernel
+    type(kernel_type), intent(in) :: kernel  !! what was measured
     character(len(left) - 4) :: text
     character(9) :: body
 

@@ -22,11 +22,13 @@ module pd_study_limits_drift
 
 contains
 
-  !> Run and print the table; `step` is 2/(largest omega) [s]. The runs share about `seconds`.
+  !> Run and print the table; `step` is 2/(largest omega) [s]. The runs share about `seconds`. An
+  !> error if the free body cannot be built; a run that is unstable is a word in the table.
   subroutine study_drift(system, step, seconds, unit, error)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: step, seconds
-    integer, intent(in) :: unit
+    type(system_type), intent(in) :: system  !! as the scene sets it up; it is not changed
+    real(wp), intent(in) :: step             !! 2/(largest omega) [s]
+    real(wp), intent(in) :: seconds          !! wall time that all runs may take, about [s]
+    integer, intent(in) :: unit              !! of the table
     type(error_type), allocatable, intent(out) :: error
     type(system_type) :: body
     real(wp), allocatable :: rough(:, :), smooth(:, :)
@@ -124,7 +126,8 @@ contains
 
   !> Slope of the straight line through values, by least squares.
   pure real(wp) function slope_of(x, y) result(slope)
-    real(wp), intent(in) :: x(:), y(:)
+    real(wp), intent(in) :: x(:)  !! (n), not all alike
+    real(wp), intent(in) :: y(:)  !! (n)
     real(wp) :: middle
     middle = sum(x)/size(x)
     slope = sum((x - middle)*y)/sum((x - middle)**2)

@@ -8,7 +8,8 @@ module pd_study_limits_limits
   use pd_base_clock, only: duration_text, wall_time
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text, with_unit
-  use pd_output_report_begin, only: run_options_type
+  use pd_output_fields_check, only: check_names
+  use pd_output_report_begin, only: fields_of, run_options_type
   use pd_set_up_prepare, only: prepare, set_up_type
   use pd_motion_watch_fault, only: place
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
@@ -46,15 +47,16 @@ module pd_study_limits_limits
 
 contains
 
-  !> Measure a scene and print what was found, each part as soon as it is known, to `unit` (default:
-  !> standard output). Everything but the building and the measurement of the largest frequency
-  !> takes about `seconds`.
+  !> Measure a scene and print what was found, each part as soon as it is known, to `unit`.
+  !> Everything but the building and the measurement of the largest frequency takes about `seconds`.
+  !> An error if the scene cannot be set up, if nothing in it can vibrate, or if the runs contradict
+  !> the measured limit.
   subroutine run_limits(scene, options, seconds, error, unit)
-    type(scene_type), intent(in) :: scene
-    type(run_options_type), intent(in) :: options
-    real(wp), intent(in) :: seconds
+    type(scene_type), intent(in) :: scene  !! to be measured; a static one as if it were explicit
+    type(run_options_type), intent(in) :: options  !! of the command line: the number of threads
+    real(wp), intent(in) :: seconds  !! wall time of all but set-up and largest frequency, about [s]
     type(error_type), allocatable, intent(out) :: error
-    integer, intent(in), optional :: unit
+    integer, intent(in), optional :: unit          !! of the text; absent: standard output
     type(scene_type) :: explicit
     type(set_up_type) :: set_up
     type(limits_type) :: limits
@@ -68,7 +70,8 @@ contains
     explicit%time%limit = 'equation'
     explicit%time%method = 'explicit'
     if (scene%time%method == 'relaxation') explicit%time%steps = 1
-    call prepare(explicit, set_up, error)
+    call check_names(scene, fields_of(options), error)
+    if (.not. allocated(error)) call prepare(explicit, set_up, error)
     if (allocated(error)) return
     associate (system => set_up%system)
       call choose_threads(options, system)
@@ -104,8 +107,9 @@ contains
 
   !> 7.25 point by point and the largest frequency, about the present state of `system`.
   subroutine measure_limits(system, limits)
-    type(system_type), intent(inout) :: system
-    type(limits_type), intent(out) :: limits
+    type(system_type), intent(inout) :: system  !! at the state about which the forces are
+                                                !! linearised
+    type(limits_type), intent(out) :: limits    !! 7.25 and the measured steps [s]
     real(wp), allocatable :: sums(:)
     type(spectrum_type) :: lasting
 
@@ -226,10 +230,12 @@ contains
   !> start) by 7.8 and 7.9 with steps of `dt` [s] on the forces linearised about the state, until it
   !> has grown without bound, the steps are made, or `seconds` have gone by.
   subroutine growth_of(system, dt, seconds, growth, steps)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: dt, seconds
-    real(wp), intent(out) :: growth
-    integer, intent(out) :: steps
+    type(system_type), intent(inout) :: system  !! at the state about which the forces are
+                                                !! linearised
+    real(wp), intent(in) :: dt                  !! time step [s]
+    real(wp), intent(in) :: seconds             !! longest wall time [s]
+    real(wp), intent(out) :: growth  !! largest amplitude over that of the start, at least 1 [-]
+    integer, intent(out) :: steps               !! that were made, at most 1000
     real(wp), allocatable :: w(:, :), v(:, :), kw(:, :)
     real(wp) :: begin, start, kick
     integer :: k, c

@@ -25,10 +25,12 @@ module pd_study_limits_rounding
 contains
 
   !> Run and print the table; `step` is the largest stable step [s]. The runs share about `seconds`.
+  !> An error if a free body cannot be built, or if a run of those compared with fails.
   subroutine study_rounding(system, step, seconds, unit, error)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: step, seconds
-    integer, intent(in) :: unit
+    type(system_type), intent(in) :: system  !! as the scene sets it up; it is not changed
+    real(wp), intent(in) :: step             !! largest stable step [s]
+    real(wp), intent(in) :: seconds          !! wall time that all runs may take, about [s]
+    integer, intent(in) :: unit              !! of the table
     type(error_type), allocatable, intent(out) :: error
     type(system_type) :: body
     real(wp), allocatable :: shape(:, :), start(:, :), linear(:, :), slope(:, :)
@@ -161,7 +163,7 @@ contains
 
   !> Digits that agree, at most 16, of values that are `apart` relative to their size.
   pure real(wp) function digits_of(apart) result(digits)
-    real(wp), intent(in) :: apart
+    real(wp), intent(in) :: apart  !! difference over size, not negative [-]
     digits = 16.0_wp
     if (apart > 1.0e-16_wp) digits = max(0.0_wp, -log10(apart))
   end function digits_of

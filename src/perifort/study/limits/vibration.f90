@@ -3,12 +3,13 @@
 !> What the program measures of a body's motion, it measures on this.
 module pd_study_limits_vibration
   use pd_base_kinds, only: wp, i1, i2, i4
-  use pd_base_error, only: error_type
+  use pd_base_lanes, only: lanes
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_reduce, only: largest_of_ranks, noise, noise_after
   use pd_body_body, only: body_type, allocate_points, gather, scatter
   use pd_body_material, only: material_type, never
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_family_lattice, only: lanes, lattice_family_type, new_lattice_family
+  use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
@@ -40,12 +41,13 @@ module pd_study_limits_vibration
 contains
 
   !> The body of `system`, moved by `shift` [m] along each direction after it was made `factor`
-  !> times as large (thickness and cross section stay), at rest and undeformed.
+  !> times as large (thickness and cross section stay), at rest and undeformed. An error if its
+  !> lattice cannot be built.
   subroutine free_body(system, shift, factor, twin, error)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: shift
-    real(wp), intent(in) :: factor
-    type(system_type), intent(out) :: twin
+    type(system_type), intent(in) :: system  !! of which a copy is made
+    real(wp), intent(in) :: shift            !! along each direction, after the change of size [m]
+    real(wp), intent(in) :: factor           !! size of the copy over that of `system` [-]
+    type(system_type), intent(out) :: twin   !! the copy
     type(error_type), allocatable, intent(out) :: error
     type(material_type), allocatable :: materials(:)
     type(lattice_family_type), allocatable :: lattice
@@ -66,10 +68,12 @@ contains
         & family%grids(1)%alignment > lanes, lattice, error)
       if (allocated(error)) return
       call move_alloc(lattice, twin%family)
-    class default  ! a list holds any points
+    type is (list_family_type)
       allocate (list)
       call new_list_family(twin%body, rule, list)
       call move_alloc(list, twin%family)
+    class default
+      call internal_fault('free_body does not know a kind of family')
     end select
     call new_model(twin%body, materials, system%model%projected, &
       & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), twin%model)
@@ -79,8 +83,10 @@ contains
     select type (family => twin%family)
     type is (lattice_family_type)
       call build_weights(family, twin%model)
-    class default  ! lists prepare themselves in their first pass
+    type is (list_family_type)  ! prepares itself in its first pass
       continue
+    class default
+      call internal_fault('free_body does not know a kind of family')
     end select
     if (cut) call copy_cuts(system, twin)
     call hold(system, twin)
@@ -180,8 +186,9 @@ contains
 
   !> Displacements of all frequencies alike: at random, always the same; 0 where held. [-]
   subroutine random_shape(system, shape)
-    type(system_type), intent(in) :: system
-    real(wp), allocatable, intent(out) :: shape(:, :)
+    type(system_type), intent(in) :: system  !! gives points, bonds and constrained components
+    real(wp), allocatable, intent(out) :: shape(:, :)  !! (n_slots, dim), with a largest gradient of
+                                                       !! 1
     integer :: i, c, state
 
     allocate (shape(system%body%n_slots, system%body%dim), source=0.0_wp)
@@ -198,10 +205,12 @@ contains
   !> What remains of `shape` when the high frequencies are taken out of it: each pass multiplies the
   !> part of frequency omega by 1 - (omega step/2)^2, `step` = 2/(largest omega) [s].
   subroutine smoothed(system, step, passes, shape)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: step
-    integer, intent(in) :: passes
-    real(wp), intent(inout), contiguous :: shape(:, :)
+    type(system_type), intent(inout) :: system  !! free; forces are linearised about its undeformed
+                                                !! state
+    real(wp), intent(in) :: step                !! 2/(largest omega) [s]
+    integer, intent(in) :: passes               !! how often the filter is applied
+    real(wp), intent(inout), contiguous :: shape(:, :)  !! (n_slots, dim); smoothed on return, with
+                                                        !! a largest gradient of 1
     real(wp), allocatable :: kw(:, :), undeformed(:, :)
     integer :: i, k, c
 
@@ -245,9 +254,9 @@ contains
 
   !> Values of slots in the order of the points.
   subroutine in_points(body, values, ordered)
-    type(body_type), intent(in) :: body
-    real(wp), intent(in) :: values(:, :)
-    real(wp), allocatable, intent(out) :: ordered(:, :)
+    type(body_type), intent(in) :: body   !! gives the slot of each point
+    real(wp), intent(in) :: values(:, :)  !! (n_slots, components)
+    real(wp), allocatable, intent(out) :: ordered(:, :)  !! (n_points, components)
 
     allocate (ordered(body%n_points, size(values, 2)))
     call gather(body, values, ordered)
@@ -255,20 +264,22 @@ contains
 
   !> `factor` times values in the order of the points into their slots.
   pure subroutine put_points(body, ordered, factor, values)
-    type(body_type), intent(in) :: body
-    real(wp), intent(in) :: ordered(:, :)
-    real(wp), intent(in) :: factor
-    real(wp), intent(inout) :: values(:, :)
+    type(body_type), intent(in) :: body      !! gives the slot of each point
+    real(wp), intent(in) :: ordered(:, :)    !! (n_points, components)
+    real(wp), intent(in) :: factor           !! of all values [-]
+    real(wp), intent(inout) :: values(:, :)  !! (n_slots, components); 0 in dead slots
 
     values = 0.0_wp
     call scatter(body, factor*ordered, values)
   end subroutine put_points
 
-  !> Look at the energy now and then.
+  !> Look at the energy every `every` steps. No error is set.
   subroutine observe(observer, system, instant, error)
-    class(energy_watch_type), intent(inout) :: observer
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
+    class(energy_watch_type), intent(inout) :: observer  !! keeps the energy once more on return if
+                                                         !! that is due
+    type(system_type), intent(inout) :: system  !! gives velocities, forces and energies
+    type(instant_type), intent(in) :: instant   !! gives the step, and how much of a step the
+                                                !! velocities lack
     type(error_type), allocatable, intent(out) :: error
     type(energies_type) :: energies, of_kick
     real(wp), allocatable :: v(:, :), kick(:, :)

@@ -26,10 +26,11 @@ contains
   !> The closed form `name` for a scene; with '' the first that fits. `reason` is '' if there is
   !> one, else why not.
   subroutine find_form(name, scene, form, reason)
-    character(*), intent(in) :: name
-    type(scene_type), intent(in) :: scene
-    type(closed_form_type), intent(out) :: form
-    character(:), allocatable, intent(out) :: reason
+    character(*), intent(in) :: name  !! of the closed form; '' for the first that fits
+    type(scene_type), intent(in) :: scene             !! with its groups as they were read
+    type(closed_form_type), intent(out) :: form       !! with kind and numbers if it fits, else
+                                                      !! without meaning
+    character(:), allocatable, intent(out) :: reason  !! why no form fits; '' if one does
     character(:), allocatable :: why
     integer :: i
 
@@ -295,11 +296,12 @@ contains
   !> What only the points and their state tell: the wave number of a chain, and how far from its
   !> ends they are not felt until `time` [s]. `reason` is '' if the form holds.
   subroutine complete_form(scene, system, time, form, reason)
-    type(scene_type), intent(in) :: scene
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: time
-    type(closed_form_type), intent(inout) :: form
-    character(:), allocatable, intent(out) :: reason
+    type(scene_type), intent(in) :: scene             !! with its groups as they were read
+    type(system_type), intent(in) :: system           !! at the start of the run
+    real(wp), intent(in) :: time                      !! until which the form is to hold [s]
+    type(closed_form_type), intent(inout) :: form     !! as `find_form` left it; a chain gets
+                                                      !! spacing, state, frequency and limits
+    character(:), allocatable, intent(out) :: reason  !! why the form does not hold; '' if it does
     real(wp), parameter :: lead = 20.0_wp   ! horizons that the front runs ahead of the energy
     type(volume_rule_type) :: rule
     real(wp), allocatable :: fraction(:)

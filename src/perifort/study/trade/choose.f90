@@ -11,6 +11,7 @@ module pd_study_trade_choose
   use pd_base_text, only: newline, to_text
   use pd_output_report_begin, only: run_options_type
   use pd_scene_content_types, only: path_length
+  use pd_scene_format_file, only: line_type
   use pd_scene_format_values, only: exact_text
   use pd_study_trade_lines, only: continuous_variable, law_of, line_notes, on_line, usable_runs
   use pd_study_trade_plan, only: common_divisor, plan_type, scene_of, size_up, trial_type, &
@@ -38,17 +39,19 @@ contains
 
   !> The whole command. `target`: the error to be met; `limit`: the longest a run may take [s], 0
   !> for any. An error with the status of bad input if the target is missed.
-  subroutine run_choose(path, options, target, limit, error)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
-    real(wp), intent(in) :: target, limit
+  subroutine run_choose(path, options, target, limit, error, changes)
+    character(*), intent(in) :: path                     !! of the scene file
+    type(run_options_type), intent(in) :: options        !! of the command line
+    real(wp), intent(in) :: target  !! error to be met, in the norm of the study
+    real(wp), intent(in) :: limit  !! longest time that a run may take, 0 for any [s]
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session
     type(choice_type) :: choice
     logical :: met
     integer :: try
 
-    call begin_study(path, options, session, error)
+    call begin_study(path, options, session, error, changes)
     if (.not. allocated(error)) call run_all(session, error)
     if (allocated(error)) return
     call say(session, newline//table_text(session%plan, session%outcomes, &

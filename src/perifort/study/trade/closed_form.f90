@@ -4,10 +4,12 @@
 module pd_study_trade_closed_form
   use pd_base_kinds, only: wp
   use pd_base_error, only: internal_fault
+  use pd_output_fields_exact, only: exact_type
+  use pd_output_fields_field, only: output_field_type
   implicit none (type, external)
   private
   public :: closed_form_type, field_at, form_wave, form_linear, form_hole, form_chain, &
-    & chain_frequency, components_of
+    & chain_frequency
 
   integer, parameter :: form_wave = 1    !! a bar released from uniform strain
   integer, parameter :: form_linear = 2  !! displacements linear in x, at rest
@@ -42,70 +44,52 @@ module pd_study_trade_closed_form
 
 contains
 
-  !> Components of a field in `dim` directions.
-  pure integer function components_of(field, dim) result(number)
-    character(*), intent(in) :: field
-    integer, intent(in) :: dim
-    select case (field)
-    case ('displacement', 'velocity', 'force_density'); number = dim
-    case default; number = 1  ! all others are scalars
-    end select
-  end function components_of
-
   !> The field at `x` (dim) [m] and time `t` [s]; `known` is false where the form says nothing of
   !> it.
   pure subroutine field_at(form, field, x, t, values, known)
-    type(closed_form_type), intent(in) :: form
-    character(*), intent(in) :: field
-    real(wp), intent(in) :: x(:)
-    real(wp), intent(in) :: t
-    real(wp), intent(out) :: values(:)
-    logical, intent(out) :: known
+    type(closed_form_type), intent(in) :: form    !! completed for the scene
+    type(output_field_type), intent(in) :: field  !! which field of the output
+    real(wp), intent(in) :: x(:)                  !! (dim) position [m]
+    real(wp), intent(in) :: t  !! time, for the forms that move [s]
+    real(wp), intent(out) :: values(:)  !! (components)
+    logical, intent(out) :: known                 !! `values` are set to the closed form's answer
+    type(exact_type) :: state
 
-    values = 0.0_wp
-    known = all(x >= form%lower) .and. all(x <= form%upper)
-    if (.not. known) return
-    select case (form%kind)
-    case (form_wave)
-      call wave(form, field, x(1), t, values(1), known)
-    case (form_hole)
-      call hole(form, field, x, values, known)
-    case (form_chain)
-      call chain(form, field, x(1), t, values(1), known)
-    case (form_linear)
-      call linear(form, field, x, values, known)
-    case default
-      call internal_fault('field_at does not know a closed form')
-    end select
+    if (all(x >= form%lower) .and. all(x <= form%upper)) then
+      select case (form%kind)
+      case (form_wave)
+        call wave(form, x(1), t, state)
+      case (form_hole)
+        call hole(form, x, state)
+      case (form_chain)
+        call chain(form, x(1), t, state)
+      case (form_linear)
+        call linear(form, x, state)
+      case default
+        call internal_fault('field_at does not know a closed form')
+      end select
+    end if
+    call field%exact_values(state, values, known)
   end subroutine field_at
 
   !> d'Alembert: half of the start runs to each side; it is continued odd about the held end and
   !> even about the free one, with a period of four lengths.
-  pure subroutine wave(form, field, x, t, value, known)
+  pure subroutine wave(form, x, t, state)
     type(closed_form_type), intent(in) :: form
-    character(*), intent(in) :: field
     real(wp), intent(in) :: x, t
-    real(wp), intent(out) :: value
-    logical, intent(out) :: known
+    type(exact_type), intent(inout) :: state
     real(wp) :: s, run, strain
 
-    known = .true.
-    value = 0.0_wp
+    state%known = .true.
+    state%knows_velocity = .true.
+    state%knows_strain = .true.
     s = form%side*(x - form%origin(1))
     run = form%speed*t
     strain = form%gradient(1, 1)*(slope(s - run) + slope(s + run))/2
-    select case (field)
-    case ('displacement')
-      value = form%side*form%gradient(1, 1)*(start(s - run) + start(s + run))/2
-    case ('velocity')
-      value = form%side*form%gradient(1, 1)*form%speed*(slope(s + run) - slope(s - run))/2
-    case ('dilatation')
-      value = strain
-    case ('energy_density')
-      value = form%modulus*strain**2/2
-    case default
-      known = .false.
-    end select
+    state%displacement(1) = form%side*form%gradient(1, 1)*(start(s - run) + start(s + run))/2
+    state%velocity(1) = form%side*form%gradient(1, 1)*form%speed*(slope(s + run) - slope(s - run))/2
+    state%dilatation = strain
+    state%energy_density = form%modulus*strain**2/2
 
   contains
 
@@ -125,32 +109,30 @@ contains
     end function slope
   end subroutine wave
 
-  !> u = H (x - origin) + shift.
-  pure subroutine linear(form, field, x, values, known)
+  !> u = H (x - origin) + shift, at rest, whole and in balance.
+  pure subroutine linear(form, x, state)
     type(closed_form_type), intent(in) :: form
-    character(*), intent(in) :: field
     real(wp), intent(in) :: x(:)
-    real(wp), intent(out) :: values(:)
-    logical, intent(out) :: known
-    real(wp) :: strain(3, 3), trace
+    type(exact_type), intent(inout) :: state
+    real(wp) :: strain(3, 3)
     integer :: d, c
 
     d = form%dim
     strain = (form%gradient + transpose(form%gradient))/2
-    trace = sum([(strain(c, c), c=1, d)])
-    known = .true.
-    values = 0.0_wp
-    select case (field)
-    case ('displacement')
-      values = form%shift(:d) + matmul(form%gradient(:d, :d), x - form%origin(:d))
-    case ('dilatation')
-      values = trace
-    case ('energy_density')
-      values = energy_of(form, strain(:d, :d), trace)
-    case default  ! at rest, whole and in balance
-      continue
-    end select
+    call rest(state)
+    state%displacement(:d) = form%shift(:d) + matmul(form%gradient(:d, :d), x - form%origin(:d))
+    state%dilatation = sum([(strain(c, c), c=1, d)])
+    state%energy_density = energy_of(form, strain(:d, :d), state%dilatation)
   end subroutine linear
+
+  !> All is known of a state of equilibrium, and the velocity is 0.
+  pure subroutine rest(state)
+    type(exact_type), intent(inout) :: state
+    state%known = .true.
+    state%knows_velocity = .true.
+    state%knows_strain = .true.
+    state%in_equilibrium = .true.
+  end subroutine rest
 
   !> Energy density of a strain [J/m3]: mu e:e + lambda tr(e)^2/2, lambda that of the dimension.
   pure real(wp) function energy_of(form, strain, trace) result(energy)
@@ -162,11 +144,16 @@ contains
     associate (e => form%modulus, nu => form%ratio)
       shear = e/(2*(1 + nu))
       select case (form%dim)
-      case (3); lame = e*nu/((1 + nu)*(1 - 2*nu))
-      case (2); lame = e*nu/(1 - nu**2)
-      case default
+      case (3)
+        lame = e*nu/((1 + nu)*(1 - 2*nu))
+      case (2)
+        lame = e*nu/(1 - nu**2)
+      case (1)
         energy = e*trace**2/2
         return
+      case default
+        lame = 0.0_wp
+        call internal_fault('energy_of knows one to three dimensions')
       end select
     end associate
     energy = shear*sum(strain**2) + lame*trace**2/2
@@ -176,21 +163,18 @@ contains
   !> phi = S/4 (z + 2 a^2/z), psi = -S/2 (z + a^2/z - a^4/z^3) with z = x + i y, x along the load:
   !> 2 mu (u + i v) = kappa phi - z conj(phi') - conj(psi); kappa = (3 - nu)/(1 + nu) holds for both
   !> planes with the moduli of the plane.
-  pure subroutine hole(form, field, x, values, known)
+  pure subroutine hole(form, x, state)
     type(closed_form_type), intent(in) :: form
-    character(*), intent(in) :: field
     real(wp), intent(in) :: x(:)
-    real(wp), intent(out) :: values(:)
-    logical, intent(out) :: known
+    type(exact_type), intent(inout) :: state
     complex(wp) :: z, phi, phi1, phi2, psi, psi1, u, shear_part
     real(wp) :: mu, kappa, along, across, mean, half_difference
     integer :: other
 
     other = 3 - form%axis
-    values = 0.0_wp
     z = cmplx(x(form%axis) - form%origin(form%axis), x(other) - form%origin(other), wp)
-    known = abs(z) >= form%radius*(1 - 1.0e-9_wp)
-    if (.not. known) return
+    if (abs(z) < form%radius*(1 - 1.0e-9_wp)) return
+    call rest(state)
     mu = form%modulus/(2*(1 + form%ratio))
     kappa = (3 - form%ratio)/(1 + form%ratio)
     associate (s => form%stress, a => form%radius)
@@ -200,51 +184,34 @@ contains
       psi = -s/2*(z + a**2/z - a**4/z**3)
       psi1 = -s/2*(1 - a**2/z**2 + 3*a**4/z**4)
     end associate
-    select case (field)
-    case ('displacement')
-      u = (kappa*phi - z*conjg(phi1) - conjg(psi))/(2*mu)
-      values(form%axis) = real(u, wp)
-      values(other) = aimag(u)
-    case ('dilatation')
-      values = (kappa - 1)/mu*real(phi1, wp)
-    case ('energy_density')
-      mean = 2*real(phi1, wp)
-      shear_part = conjg(z)*phi2 + psi1
-      half_difference = real(shear_part, wp)
-      along = mean - half_difference
-      across = mean + half_difference
-      values = (along**2 + across**2 - 2*form%ratio*along*across)/(2*form%modulus) &
-        & + aimag(shear_part)**2/(2*mu)
-    case ('velocity', 'damage', 'force_density')
-      continue
-    case default
-      known = .false.
-    end select
+    u = (kappa*phi - z*conjg(phi1) - conjg(psi))/(2*mu)
+    state%displacement(form%axis) = real(u, wp)
+    state%displacement(other) = aimag(u)
+    state%dilatation = (kappa - 1)/mu*real(phi1, wp)
+    mean = 2*real(phi1, wp)
+    shear_part = conjg(z)*phi2 + psi1
+    half_difference = real(shear_part, wp)
+    along = mean - half_difference
+    across = mean + half_difference
+    state%energy_density = (along**2 + across**2 - 2*form%ratio*along*across)/(2*form%modulus) &
+      & + aimag(shear_part)**2/(2*mu)
   end subroutine hole
 
   !> Displacements and velocities of one wave number k on an endless chain stay of that wave number
   !> and turn with its frequency: u = u0 cos(omega t) + v0 sin(omega t)/omega at every point.
-  pure subroutine chain(form, field, x, t, value, known)
+  pure subroutine chain(form, x, t, state)
     type(closed_form_type), intent(in) :: form
-    character(*), intent(in) :: field
     real(wp), intent(in) :: x, t
-    real(wp), intent(out) :: value
-    logical, intent(out) :: known
+    type(exact_type), intent(inout) :: state
     integer :: j
 
-    value = 0.0_wp
     j = nint((x - form%origin(1))/form%spacing + 0.5_wp)
-    known = j >= 1 .and. j <= size(form%u)
-    if (.not. known) return
+    state%known = j >= 1 .and. j <= size(form%u)
+    if (.not. state%known) return
+    state%knows_velocity = .true.
     associate (w => form%frequency)
-      select case (field)
-      case ('displacement')
-        value = form%u(j)*cos(w*t) + form%v(j)*sin(w*t)/w
-      case ('velocity')
-        value = form%v(j)*cos(w*t) - form%u(j)*sin(w*t)*w
-      case default
-        known = .false.
-      end select
+      state%displacement(1) = form%u(j)*cos(w*t) + form%v(j)*sin(w*t)/w
+      state%velocity(1) = form%v(j)*cos(w*t) - form%u(j)*sin(w*t)*w
     end associate
   end subroutine chain
 
@@ -253,8 +220,13 @@ contains
   !> on one side; `fraction` are their volume corrections.
   pure real(wp) function chain_frequency(k, spacing, delta, modulus, density, fraction) &
       & result(frequency)
-    real(wp), intent(in) :: k, spacing, delta, modulus, density
-    real(wp), intent(in) :: fraction(:)
+    real(wp), intent(in) :: k            !! wave number [1/m]
+    real(wp), intent(in) :: spacing      !! h, of the points [m]
+    real(wp), intent(in) :: delta        !! horizon [m]
+    real(wp), intent(in) :: modulus      !! E, surface correction included [Pa]
+    real(wp), intent(in) :: density      !! rho [kg/m3]
+    real(wp), intent(in) :: fraction(:)  !! (neighbours on one side), volume corrections of the
+                                         !! nearest first [-]
     real(wp) :: total
     integer :: j
 

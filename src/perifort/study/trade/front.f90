@@ -20,7 +20,7 @@ contains
   !> Mark the runs that no other run beats in both error and time. The run that the others are
   !> compared with does not compete: its own error is not known.
   subroutine mark_front(outcomes)
-    type(outcome_type), intent(inout) :: outcomes(:)
+    type(outcome_type), intent(inout) :: outcomes(:)  !! (runs); `pareto` is set in all
     real(wp), allocatable :: error(:), seconds(:)
 
     error = outcomes%error
@@ -32,8 +32,9 @@ contains
   !> Whether each of the chosen runs is as good as any other in error or in time, and better in one
   !> of them than whatever equals it in the other.
   pure function on_front(error, seconds, chosen) result(front)
-    real(wp), intent(in) :: error(:), seconds(:)
-    logical, intent(in) :: chosen(:)
+    real(wp), intent(in) :: error(:)    !! (runs) in any one unit
+    real(wp), intent(in) :: seconds(:)  !! (runs) [s]
+    logical, intent(in) :: chosen(:)    !! (runs) that are compared; others are not on the front
     logical :: front(size(error))
     integer :: i, j
 
@@ -51,9 +52,10 @@ contains
   !> The step of a variable: what grows as the error does. Points count as the spacing they make,
   !> other numbers as they are.
   pure real(wp) function step_variable(plan, variable, value) result(step)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: variable
-    real(wp), intent(in) :: value
+    type(plan_type), intent(in) :: plan  !! of the study
+    integer, intent(in) :: variable      !! number of the variable
+    real(wp), intent(in) :: value        !! of the variable, as a number; not 0 if it is a number of
+                                         !! points
     step = value
     if (plan%variables(variable)%refines) step = 1/value
   end function step_variable
@@ -61,8 +63,8 @@ contains
   !> Whether the error ought to vanish with a variable: points, the time step and its safety, the
   !> tolerance.
   pure logical function is_step(plan, v)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: v
+    type(plan_type), intent(in) :: plan  !! of the study
+    integer, intent(in) :: v             !! number of the variable
     associate (variable => plan%variables(v))
       is_step = variable%refines .or. variable%target%group == 'time' .and. &
         & (variable%target%key == 'step' .or. variable%target%key == 'safety') .or. &
@@ -75,9 +77,10 @@ contains
   !> go in step the first one counts; if it takes a value more than once, they are no sequence but
   !> a list of runs, and runs are compared that differ in one variable alone.
   pure subroutine observed_orders(plan, outcomes, orders)
-    type(plan_type), intent(in) :: plan
-    type(outcome_type), intent(in) :: outcomes(:)
+    type(plan_type), intent(in) :: plan            !! of the study
+    type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
     type(order_type), allocatable, intent(out) :: orders(:)
+      !! (pairs of runs); empty if there are none
     real(wp) :: fine, coarse, best
     logical, allocatable :: others(:)   ! variables in which compared runs agree
     integer :: v, i, j, next

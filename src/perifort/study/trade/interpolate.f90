@@ -24,20 +24,21 @@ contains
 
   !> Sort places (dim, place) with a spacing [m] so that those around a position are found.
   subroutine grid_of_places(x, spacing, cells)
-    real(wp), intent(in) :: x(:, :)
-    real(wp), intent(in) :: spacing
-    type(cells_type), intent(out) :: cells
+    real(wp), intent(in) :: x(:, :)         !! places (dim, place) [m]
+    real(wp), intent(in) :: spacing         !! of the places [m]
+    type(cells_type), intent(out) :: cells  !! for `find_stencil`
     call sort_into_cells(transpose(x), width*spacing, cells)
   end subroutine grid_of_places
 
   !> The stencil for a position. Where there are too few places for a polynomial of second degree
   !> it is of first, and at last the nearest place alone; without any place it is empty.
   subroutine find_stencil(cells, x, spacing, position, stencil)
-    type(cells_type), intent(in) :: cells
+    type(cells_type), intent(in) :: cells        !! of `grid_of_places` for these places
     real(wp), intent(in) :: x(:, :)              !! places (dim, place) [m]
     real(wp), intent(in) :: spacing              !! of the places [m]
     real(wp), intent(in) :: position(:)          !! [m]
-    type(stencil_type), intent(out) :: stencil
+    type(stencil_type), intent(out) :: stencil   !! places and weights, whose sum is 1; empty
+                                                 !! without any place near
     integer(i4), allocatable :: around(:)
     real(wp), allocatable :: distance(:)
     integer :: i, nearest, degree
@@ -139,9 +140,10 @@ contains
   !> The rows around a time and their weights: Lagrange's cubic through up to four, none outside of
   !> the rows' range. `times` ascend.
   pure subroutine rows_around(times, t, stencil)
-    real(wp), intent(in) :: times(:)
-    real(wp), intent(in) :: t
-    type(stencil_type), intent(out) :: stencil
+    real(wp), intent(in) :: times(:)            !! (rows), ascending [s]
+    real(wp), intent(in) :: t                   !! time [s]
+    type(stencil_type), intent(out) :: stencil  !! rows and weights, whose sum is 1; empty outside
+                                                !! of the rows
     real(wp) :: tolerance
     integer :: low, high, middle, first, n, i, j
 

@@ -20,7 +20,7 @@ contains
   !> tolerance). Among several the one with the smallest spacing, then with the smallest time step
   !> or tolerance, then the first. `reason` is '' unless there is no such run.
   subroutine finest_of(plan, finest, reason)
-    type(plan_type), intent(in) :: plan
+    type(plan_type), intent(in) :: plan                   !! of the study
     integer, intent(out) :: finest                        !! number of the run; 0 if there is none
     character(:), allocatable, intent(out) :: reason      !! why there is none
     logical :: left(size(plan%trials))
@@ -76,7 +76,7 @@ contains
   !> the time step, its safety or the tolerance; 0 if none. Variables that vary together with it
   !> must be positive numbers.
   pure integer function continuous_variable(plan) result(free)
-    type(plan_type), intent(in) :: plan
+    type(plan_type), intent(in) :: plan  !! of the study
 
     do free = 1, size(plan%variables)
       if (plan%variables(free)%refines .and. follows(free)) return
@@ -102,8 +102,9 @@ contains
 
   !> The runs that differ from run `t` on the axis of the variable `free` alone.
   pure function on_line(plan, free, t) result(on)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: free, t
+    type(plan_type), intent(in) :: plan  !! of the study
+    integer, intent(in) :: free          !! number of the continuous variable
+    integer, intent(in) :: t             !! number of the run
     logical :: on(size(plan%trials))
     integer :: i
 
@@ -115,18 +116,18 @@ contains
 
   !> The runs that have an error of their own: done, judged, and not the one compared with.
   pure function usable_runs(outcomes) result(usable)
-    type(outcome_type), intent(in) :: outcomes(:)
+    type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
     logical :: usable(size(outcomes))
     usable = outcomes%done .and. outcomes%judged .and. .not. outcomes%truth
   end function usable_runs
 
   !> The law of the chosen runs; of runs at the same step the last counts.
   subroutine law_of(plan, outcomes, free, chosen, law)
-    type(plan_type), intent(in) :: plan
-    type(outcome_type), intent(in) :: outcomes(:)
+    type(plan_type), intent(in) :: plan            !! of the study
+    type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
     integer, intent(in) :: free                    !! the continuous variable
     logical, intent(in) :: chosen(:)               !! runs of one line
-    type(law_type), intent(out) :: law
+    type(law_type), intent(out) :: law             !! fit of error and time over the step of `free`
     real(wp) :: h(size(chosen)), reference
     logical :: used(size(chosen))
     integer :: t
@@ -147,9 +148,9 @@ contains
 
   !> The step of the variable `free` in a run; 0 if its value is no number.
   real(wp) function step_of(plan, free, trial) result(step)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: free
-    type(trial_type), intent(in) :: trial
+    type(plan_type), intent(in) :: plan    !! of the study
+    integer, intent(in) :: free            !! number of the variable
+    type(trial_type), intent(in) :: trial  !! the run, which need not be one of the plan
     character(len(trial%words)) :: word
     real(wp) :: value
     integer :: status
@@ -162,8 +163,9 @@ contains
   !> Where all are compared with the finest run: set the extrapolated true error of each run, C h^p
   !> by the fit C (h^p - r^p) of its line, r the step of the finest run.
   subroutine mark_true_errors(plan, outcomes)
-    type(plan_type), intent(in) :: plan
-    type(outcome_type), intent(inout) :: outcomes(:)
+    type(plan_type), intent(in) :: plan               !! of the study
+    type(outcome_type), intent(inout) :: outcomes(:)  !! (runs) in the order of the plan; true
+                                                      !! errors are set
     type(law_type) :: law
     logical :: usable(size(outcomes)), line(size(outcomes))
     integer :: free, t
@@ -183,8 +185,8 @@ contains
 
   !> For each line what the fit found, and why runs are not used as they are, one fact a line.
   function line_notes(plan, outcomes) result(text)
-    type(plan_type), intent(in) :: plan
-    type(outcome_type), intent(in) :: outcomes(:)
+    type(plan_type), intent(in) :: plan            !! of the study
+    type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
     character(:), allocatable :: text
     type(law_type) :: law
     logical :: seen(size(outcomes)), usable(size(outcomes)), line(size(outcomes))

@@ -7,11 +7,13 @@ module pd_study_trade_measure
   use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: join, nearest_name
-  use pd_scene_content_groups, only: field_names
+  use pd_output_fields_field, only: output_field_type
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_report_columns, only: columns_of_scene
+  use pd_output_results_types, only: column_type
   use pd_scene_content_rules, only: rule_fault
   use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: name_length, scene_type
-  use pd_study_trade_closed_form, only: components_of
   implicit none (type, external)
   private
   public :: measure_type, record_type, resolve_measure, of_probe, of_column, of_field, &
@@ -22,7 +24,8 @@ module pd_study_trade_measure
   type :: measure_type
     integer :: kind = 0
     character(:), allocatable :: name      !! as the user wrote it
-    character(:), allocatable :: field     !! probe or field: its quantity
+    type(output_field_type) :: field       !! probe or field: its quantity
+    character(32) :: unit = '1'            !! of what is measured, '1' for none
     integer :: probe = 0                   !! number of its group
     integer :: component = 0               !! 0: all
     character(:), allocatable :: region    !! of a field; '' = all points of bodies
@@ -41,106 +44,87 @@ module pd_study_trade_measure
     integer :: place = 1                       !! whose value is reported; 0: the mean square of all
   end type record_type
 
-  character(*), parameter :: directions = 'xyz'
-
 contains
 
-  !> What the name `name` means in a scene; `source` gives an error its place.
-  subroutine resolve_measure(name, region, norm, scene, source, measure, error)
-    character(*), intent(in) :: name, region, norm
-    type(scene_type), intent(in) :: scene
-    type(source_type), intent(in) :: source
-    type(measure_type), intent(out) :: measure
+  !> What the name `name` means in a scene; `source` gives an error its place. An error is set if
+  !> the scene has no such probe, column or field.
+  subroutine resolve_measure(name, region, norm, scene, table, source, measure, error)
+    character(*), intent(in) :: name             !! value of `measure` in &study
+    character(*), intent(in) :: region  !! value of `region` in &study, '' for all body points
+    character(*), intent(in) :: norm             !! value of `norm` in &study
+    type(scene_type), intent(in) :: scene        !! whose fields are in the table
+    type(field_table_type), intent(in) :: table  !! of fields
+    type(source_type), intent(in) :: source      !! the scanned file, for places
+    type(measure_type), intent(out) :: measure   !! what the name means
     type(error_type), allocatable, intent(out) :: error
-    character(name_length), allocatable :: columns(:)
-    character(:), allocatable :: probe, rest
-    integer :: p
+    type(column_type), allocatable :: columns(:)
+    type(output_field_type) :: field
+    character(:), allocatable :: probe
+    integer :: p, c, component
+    logical :: found
 
     measure%name = name
     measure%region = region
     measure%norm = norm
-    do p = 1, size(scene%probes)
-      probe = trim(scene%probes(p)%name)
-      if (name == probe) then
-        measure%field = trim(scene%probes(p)%fields(1))
-      else if (index(name, probe//'_') == 1) then
-        rest = name(len(probe) + 2:)
-        call split_component(rest, scene%header%dimension, measure%component)
-        if (all(field_names /= rest)) cycle
-        measure%field = rest
-      else
-        cycle
+    associate (dim => scene%header%dimension)
+      do p = 1, size(scene%probes)
+        probe = trim(scene%probes(p)%name)
+        if (name == probe) then
+          field = table%field(scene%probes(p)%fields(1))
+          component = 0
+        else if (index(name, probe//'_') == 1) then
+          call table%find_component(name(len(probe) + 2:), dim, field, component, found)
+          if (.not. found) cycle
+        else
+          cycle
+        end if
+        measure%kind = of_probe
+        measure%probe = p
+        measure%field = field
+        measure%component = component
+      end do
+      if (measure%kind == 0) then
+        columns = measurable_columns(scene)
+        c = findloc(columns%name == name, .true., dim=1)
+        if (c > 0) measure%kind = of_column
       end if
-      measure%kind = of_probe
-      measure%probe = p
-    end do
-    if (measure%kind == 0) then
-      columns = columns_of(scene)
-      if (any(columns == name)) measure%kind = of_column
-    end if
-    if (measure%kind == 0) then
-      rest = name
-      call split_component(rest, scene%header%dimension, measure%component)
-      if (any(field_names == rest)) then
-        measure%kind = of_field
-        measure%field = rest
+      if (measure%kind == 0) then
+        call table%find_component(name, dim, measure%field, measure%component, found)
+        if (found) measure%kind = of_field
       end if
-    end if
+    end associate
+    measure%unit = measure%field%unit
+    if (measure%kind == of_column) measure%unit = columns(c)%unit
     if (measure%kind == 0) then
       call rule_fault(error, 'study', 1, 'measure', "nothing is named '"//name//"'", &
-        & hint(scene, name), source)
+        & hint(scene, table, name), source)
     else if (measure%kind /= of_field .and. region /= '') then
       call rule_fault(error, 'study', 1, 'region', "'region' goes with a field, but '"//name// &
         & "' is not a field", 'expected no region', source)
     end if
   end subroutine resolve_measure
 
-  !> `displacement_x` -> `displacement` and 1; other texts stay as they are, with 0.
-  pure subroutine split_component(text, dim, component)
-    character(:), allocatable, intent(inout) :: text
-    integer, intent(in) :: dim
-    integer, intent(out) :: component
-    integer :: last
-
-    component = 0
-    last = len(text)
-    if (last < 3) return
-    if (text(last - 1:last - 1) /= '_') return
-    component = index(directions(:dim), text(last:))
-    if (component > 0) then
-      if (components_of(text(:last - 2), dim) == 1 .and. dim > 1) component = 0
-    end if
-    if (component > 0) text = text(:last - 2)
-  end subroutine split_component
-
   !> Columns of the history without those of probes, the step and the time.
-  pure function columns_of(scene) result(columns)
+  function measurable_columns(scene) result(columns)
     type(scene_type), intent(in) :: scene
-    character(name_length), allocatable :: columns(:)
-    integer :: b, c
+    type(column_type), allocatable :: columns(:)
 
-    columns = [character(name_length) :: 'kinetic_energy', 'strain_energy', 'dissipated_energy', &
-      & 'external_work', 'broken_bonds', 'maximum_damage', 'step_size']
-    if (scene%time%method == 'relaxation') columns = [columns, &
-      & [character(name_length) :: 'residual', 'load_step']]
-    do b = 1, size(scene%boundaries)
-      if (scene%boundaries(b)%name == '') cycle
-      do c = 1, scene%header%dimension
-        columns = [columns, [character(name_length) :: trim(scene%boundaries(b)%name)// &
-          & '_reaction_'//directions(c:c)]]
-      end do
-    end do
-  end function columns_of
+    columns = columns_of_scene(scene)
+    columns = pack(columns, columns%name /= 'step' .and. columns%name /= 'time')
+  end function measurable_columns
 
-  function hint(scene, name) result(note)
+  function hint(scene, table, name) result(note)
     type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table
     character(*), intent(in) :: name
     character(:), allocatable :: note, nearest
     character(name_length), allocatable :: names(:)
+    type(column_type), allocatable :: columns(:)
     integer :: p
 
     names = [character(name_length) :: (scene%probes(p)%name, p=1, size(scene%probes))]
-    names = [names, columns_of(scene), [character(name_length) :: field_names]]
+    columns = measurable_columns(scene)
+    names = [names, [character(name_length) :: columns%name], table%names()]
     nearest = nearest_name(name, names)
     note = 'expected a probe, a column of the history or a field: '//join(names, ', ')
     if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note
@@ -149,10 +133,11 @@ contains
   !> The norm of the differences of a record from its reference, of the same shape. `of` (place,
   !> row) says what is compared.
   pure real(wp) function difference(norm, record, reference, of) result(error)
-    character(*), intent(in) :: norm
-    type(record_type), intent(in) :: record
-    real(wp), intent(in) :: reference(:, :, :)
-    logical, intent(in) :: of(:, :)
+    character(*), intent(in) :: norm            !! 'rms', 'maximum' or 'relative'
+    type(record_type), intent(in) :: record     !! what the run showed
+    real(wp), intent(in) :: reference(:, :, :)  !! (component, place, row), in the unit of the
+                                                !! record
+    logical, intent(in) :: of(:, :)             !! (place, row), whether it is compared
     real(wp) :: squares, answer, weights, square, largest
     integer :: p, r
 
@@ -186,7 +171,7 @@ contains
   !> places the root of the mean square, weighted as in the norm. Of a single place its value with
   !> its sign. 0 without rows.
   pure real(wp) function value_of(record) result(value)
-    type(record_type), intent(in) :: record
+    type(record_type), intent(in) :: record  !! what the run showed
     integer :: p
 
     value = 0.0_wp
@@ -203,34 +188,22 @@ contains
     end associate
   end function value_of
 
-  !> The unit of an error, '' if it has none or is not known.
+  !> The unit of an error, '' if it has none.
   pure function measure_unit(measure) result(unit)
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure  !! with its norm
     character(:), allocatable :: unit
 
     unit = ''
     if (measure%norm /= 'relative') unit = quantity_unit(measure)
   end function measure_unit
 
-  !> The unit of what is measured, '' if it has none or is not known.
+  !> The unit of what is measured, '' if it has none.
   pure function quantity_unit(measure) result(unit)
-    type(measure_type), intent(in) :: measure
+    type(measure_type), intent(in) :: measure  !! with its kind and field
     character(:), allocatable :: unit
 
-    unit = ''
-    if (measure%kind == of_column) then
-      if (index(measure%name, '_energy') > 0 .or. measure%name == 'external_work') unit = 'J'
-      if (index(measure%name, '_reaction_') > 0) unit = 'N'
-      return
-    end if
-    select case (measure%field)
-    case ('displacement'); unit = 'm'
-    case ('velocity'); unit = 'm/s'
-    case ('force_density'); unit = 'N/m3'
-    case ('energy_density'); unit = 'J/m3'
-    case default  ! numbers without a unit
-      unit = ''
-    end select
+    unit = trim(measure%unit)
+    if (unit == '1') unit = ''
   end function quantity_unit
 
 end module pd_study_trade_measure

@@ -11,9 +11,9 @@ module pd_study_trade_plan
   use pd_body_generate, only: generate_body, horizon_of
   use pd_set_up_memory, only: check_memory
   use pd_motion_explicit_time_step, only: horizon_volume
-  use pd_scene_content_change, only: change_key, find_target, full_name, target_type
+  use pd_scene_content_change, only: apply_changes, change_key, find_target, full_name, target_type
   use pd_scene_format_elements, only: find_elements, growing
-  use pd_scene_format_file, only: read_text_file
+  use pd_scene_format_file, only: line_type, read_text_file
   use pd_scene_content_read, only: read_scene_source
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_scene_format_source, only: scan_source, source_fault, source_type, token_type
@@ -55,6 +55,7 @@ module pd_study_trade_plan
 
   type :: plan_type
     type(source_type) :: source
+    type(line_type), allocatable :: changes(:)        !! what `--set` changes in it
     type(scene_type) :: scene                         !! as it stands in the file
     type(variable_type), allocatable :: variables(:)
     type(trial_type), allocatable :: trials(:)        !! the first axis slowest
@@ -63,28 +64,38 @@ module pd_study_trade_plan
 
 contains
 
-  !> Plan the study in the scene file at `path`.
-  subroutine plan_study(path, plan, error)
-    character(*), intent(in) :: path
-    type(plan_type), intent(out) :: plan
+  !> Plan the study in the scene file at `path`. An error is set if the file cannot be read, or if
+  !> the scene or its studies break a rule.
+  subroutine plan_study(path, plan, error, changes)
+    character(*), intent(in) :: path                     !! of the scene file
+    type(plan_type), intent(out) :: plan                 !! its runs, with their scenes
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     character(:), allocatable :: text
 
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call plan_from_text(text, path, plan, error)
+    call plan_from_text(text, path, plan, error, changes)
   end subroutine plan_study
 
-  !> The same from a text; `name` stands for the file in messages.
-  subroutine plan_from_text(text, name, plan, error)
-    character(*), intent(in) :: text, name
-    type(plan_type), intent(out) :: plan
+  !> The same from a text; `name` stands for the file in messages. An error is set if the scene or
+  !> its studies break a rule.
+  subroutine plan_from_text(text, name, plan, error, changes)
+    character(*), intent(in) :: text                     !! of a scene file
+    character(*), intent(in) :: name                     !! path of the file; there need be none
+    type(plan_type), intent(out) :: plan                 !! its runs, with their scenes
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
 
     call scan_source(text, name, plan%source, error)
     if (allocated(error)) return
+    allocate (plan%changes(0))
+    if (present(changes)) plan%changes = changes
+    call apply_changes(plan%source, plan%changes, error)
+    if (allocated(error)) return
     call read_scene_source(plan%source, plan%scene, error)
     if (allocated(error)) return
+    plan%scene%text = text
     if (size(plan%scene%studies) == 0) then
       call source_fault(plan%source, 0, 0, 0, 'the scene has no group &study', &
         & "expected at least one, with 'vary', 'values', 'measure' and 'against'", error)
@@ -93,6 +104,8 @@ contains
     call read_settings(plan, error)
     if (allocated(error)) return
     call read_variables(plan, error)
+    if (allocated(error)) return
+    call refuse_both(plan, error)
     if (allocated(error)) return
     call make_trials(plan, error)
   end subroutine plan_from_text
@@ -181,6 +194,28 @@ contains
       end do
     end do
   end subroutine read_variables
+
+  !> A key cannot be set on the command line and varied: the study would take no notice of the
+  !> option.
+  subroutine refuse_both(plan, error)
+    type(plan_type), intent(in) :: plan
+    type(error_type), allocatable, intent(out) :: error
+    integer :: v, e, section
+
+    do v = 1, size(plan%variables)
+      associate (target => plan%variables(v)%target, source => plan%source)
+        section = find_section(source, target%group, target%number)
+        if (section == 0) cycle
+        e = find_entry(source, section, target%key)
+        if (e == 0) cycle
+        if (source%entries(e)%line <= size(source%lines) - source%option_count) cycle
+        call source_fault(source, source%entries(e)%line, source%entries(e)%column, &
+          & source%entries(e)%width, "'"//full_name(source, target)//"' is set here and varied "// &
+          & 'by a group &study', 'set study%values, or leave the option out', error)
+        return
+      end associate
+    end do
+  end subroutine refuse_both
 
   !> The column has the name that the user wrote, in full where that is a column's already.
   subroutine name_column(plan, i, error)
@@ -304,10 +339,11 @@ contains
     end do
   end function describe
 
-  !> The scene of a run from its words.
+  !> The scene of a run from its words. An error, at the place of the value in `&study`, if the
+  !> scene is refused.
   subroutine scene_of(plan, trial, error)
-    type(plan_type), intent(in) :: plan
-    type(trial_type), intent(inout) :: trial
+    type(plan_type), intent(in) :: plan       !! of the study
+    type(trial_type), intent(inout) :: trial  !! with its words; its scene is set on return
     type(error_type), allocatable, intent(out) :: error
     type(source_type) :: source
     type(token_type) :: place
@@ -394,7 +430,7 @@ contains
 
   !> The greatest common divisor; that of 0 and a number is the number.
   pure integer function common_divisor(first, second) result(divisor)
-    integer, intent(in) :: first, second
+    integer, intent(in) :: first, second  !! 0 or positive
     integer :: rest, next
 
     divisor = first
@@ -409,7 +445,8 @@ contains
   !> Points, spacing and an estimate of the work of a run; an error if it does not fit into the
   !> memory.
   subroutine size_up(trial, error)
-    type(trial_type), intent(inout) :: trial
+    type(trial_type), intent(inout) :: trial  !! with its scene; points, spacing, bonds and work are
+                                              !! set
     type(error_type), allocatable, intent(out) :: error
     type(body_type) :: body
     real(wp) :: delta, steps, speed, extent
@@ -465,7 +502,7 @@ contains
 
   !> A value without its quotes, and parted by blanks if it is a vector.
   pure function shown_word(word) result(text)
-    character(*), intent(in) :: word
+    character(*), intent(in) :: word  !! as it stands in the scene file
     character(:), allocatable :: text
     integer :: comma
 

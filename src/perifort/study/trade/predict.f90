@@ -35,9 +35,11 @@ contains
 
   !> Fit runs of steps `h` with their errors and times. With a single run there is no fit.
   pure subroutine fit_law(h, error, seconds, reference, law)
-    real(wp), intent(in) :: h(:), error(:), seconds(:)
-    real(wp), intent(in) :: reference
-    type(law_type), intent(out) :: law
+    real(wp), intent(in) :: h(:)        !! (runs), different steps of one variable, in any order
+    real(wp), intent(in) :: error(:)    !! (runs) in the norm of the study
+    real(wp), intent(in) :: seconds(:)  !! (runs) [s]
+    real(wp), intent(in) :: reference   !! r, step of the run compared with; 0: something exact
+    type(law_type), intent(out) :: law  !! the fit
     integer :: order(size(h))
     real(wp) :: p, misfit, log_factor
 
@@ -125,8 +127,8 @@ contains
   !> more of itself. Huge where nothing is known, and at steps coarser than the coarsest run's,
   !> which may be unstable.
   pure real(wp) function error_at(law, h) result(error)
-    type(law_type), intent(in) :: law
-    real(wp), intent(in) :: h
+    type(law_type), intent(in) :: law  !! of `fit_law`
+    real(wp), intent(in) :: h          !! step, in the unit of the fitted ones
     real(wp) :: part, above
     integer :: i
 
@@ -158,10 +160,10 @@ contains
   !> r: C h^p by the fit of all runs. `known` is false where there is no such fit: fewer than two
   !> runs, an error of 0, an order below `least_order`, or r = 0.
   pure subroutine true_error_at(law, h, error, known)
-    type(law_type), intent(in) :: law
+    type(law_type), intent(in) :: law      !! of `fit_law`
     real(wp), intent(in) :: h              !! step, not below r
     real(wp), intent(out) :: error         !! in the norm of the errors; 0 if not known
-    logical, intent(out) :: known
+    logical, intent(out) :: known          !! whether the fit gives one
 
     known = law%n >= 2 .and. law%reference > 0.0_wp .and. law%order >= least_order
     if (known) known = all(law%error > 0.0_wp)
@@ -178,8 +180,8 @@ contains
 
   !> The time to be expected at a step [s]: interpolated between runs, and by the fit beyond.
   pure real(wp) function seconds_at(law, h) result(seconds)
-    type(law_type), intent(in) :: law
-    real(wp), intent(in) :: h
+    type(law_type), intent(in) :: law  !! of `fit_law`
+    real(wp), intent(in) :: h          !! step, in the unit of the fitted ones
     real(wp) :: part
     integer :: i
 

@@ -23,11 +23,12 @@ contains
   !> `shift`. Each of two opposite sides is loaded along its normal, or moved along it; a smooth
   !> wall at one other side of a direction says where that side stays.
   subroutine pull(scene, form, axis, strain, reason)
-    type(scene_type), intent(in) :: scene
-    type(closed_form_type), intent(inout) :: form
-    integer, intent(out) :: axis
-    real(wp), intent(out) :: strain
-    character(:), allocatable, intent(inout) :: reason
+    type(scene_type), intent(in) :: scene          !! of one lattice body
+    type(closed_form_type), intent(inout) :: form  !! with dim and modulus; origin and shift are set
+    integer, intent(out) :: axis  !! direction of the pull, 1 to 3; 0 if there is none
+    real(wp), intent(out) :: strain                !! along the axis [-]
+    character(:), allocatable, intent(inout) :: reason  !! '' before; on return why it is no
+                                                        !! uniaxial pull, '' if it is
     type(ends_type) :: ends(3)
     integer :: c, e
 

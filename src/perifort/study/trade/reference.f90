@@ -4,12 +4,13 @@ module pd_study_trade_reference
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: lower_case, to_text
   use pd_family_cells, only: cells_type
+  use pd_output_fields_field, only: rank_scalar
   use pd_output_results_datasets, only: get_shape, read_rows
   use pd_output_results_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, &
     & open_file, start_hdf5
   use pd_scene_format_table, only: column_of, read_table, table_type
   use pd_scene_content_types, only: name_length
-  use pd_study_trade_closed_form, only: closed_form_type, components_of, field_at
+  use pd_study_trade_closed_form, only: closed_form_type, field_at
   use pd_study_trade_interpolate, only: find_stencil, grid_of_places, rows_around, stencil_type
   use pd_study_trade_measure, only: difference, measure_type, of_column, of_field, record_type
   implicit none (type, external)
@@ -21,17 +22,17 @@ contains
   !> The error of a record by a closed form. `fault` is '' unless the form says nothing of what is
   !> measured.
   subroutine judge_by_form(form, measure, record, error_norm, fault)
-    type(closed_form_type), intent(in) :: form
-    type(measure_type), intent(in) :: measure
-    type(record_type), intent(in) :: record
-    real(wp), intent(out) :: error_norm
-    character(:), allocatable, intent(out) :: fault
+    type(closed_form_type), intent(in) :: form       !! complete
+    type(measure_type), intent(in) :: measure        !! a probe or a field
+    type(record_type), intent(in) :: record          !! what the run showed
+    real(wp), intent(out) :: error_norm  !! the error, in the norm of the measure; 0 with a fault
+    character(:), allocatable, intent(out) :: fault  !! why there is no error; '' if there is one
     real(wp), allocatable :: reference(:, :, :), values(:)
     logical, allocatable :: of(:, :)
     integer :: p, r
 
     allocate (reference, mold=record%values)
-    allocate (values(components_of(measure%field, form%dim)))
+    allocate (values(measure%field%components(form%dim)))
     allocate (of(size(record%x, 2), record%rows))
     reference = 0.0_wp
     do r = 1, record%rows
@@ -56,13 +57,14 @@ contains
   end subroutine judge_by_form
 
   !> The error of a record by another one, that of the finest run or of a file: interpolated to the
-  !> places and instants of `record`, as far as it reaches.
+  !> places and instants of `record`, as far as it reaches. `fault` is '' unless final states are of
+  !> different times, or no place and instant of the run lies within those compared with.
   subroutine judge_by_record(truth, measure, record, error_norm, fault)
-    type(record_type), intent(in) :: truth
-    type(measure_type), intent(in) :: measure
-    type(record_type), intent(in) :: record
-    real(wp), intent(out) :: error_norm
-    character(:), allocatable, intent(out) :: fault
+    type(record_type), intent(in) :: truth           !! what is compared with
+    type(measure_type), intent(in) :: measure        !! what was measured, with its norm
+    type(record_type), intent(in) :: record          !! what the run showed
+    real(wp), intent(out) :: error_norm  !! the error, in the norm of the measure; 0 with a fault
+    character(:), allocatable, intent(out) :: fault  !! why there is no error; '' if there is one
     type(cells_type) :: cells
     type(stencil_type) :: around, rows
     real(wp), allocatable :: reference(:, :, :)
@@ -113,14 +115,14 @@ contains
   end subroutine judge_by_record
 
   !> What a file says of the measure: `.vtkhdf` results, or a table whose first line names its
-  !> columns. Histories need `time` and the column itself or the probe's columns; fields need
-  !> `x` .. and the field's columns.
+  !> columns. Histories need `time` and the column itself or the probe's columns; fields need `x` ..
+  !> and the field's columns. An error if the file cannot be read or lacks one of these.
   subroutine read_reference(path, measure, probe, dim, record, error)
-    character(*), intent(in) :: path
-    type(measure_type), intent(in) :: measure
+    character(*), intent(in) :: path             !! of the file
+    type(measure_type), intent(in) :: measure    !! what is measured
     character(*), intent(in) :: probe            !! name of the probe, '' without
-    integer, intent(in) :: dim
-    type(record_type), intent(out) :: record
+    integer, intent(in) :: dim                   !! of the scene: 1, 2 or 3
+    type(record_type), intent(out) :: record     !! what the file shows of it
     type(error_type), allocatable, intent(out) :: error
 
     if (ending(path) == '.vtkhdf') then
@@ -142,7 +144,6 @@ contains
     character(*), intent(in) :: probe
     integer, intent(in) :: dim
     character(name_length), allocatable :: names(:)
-    character(*), parameter :: directions = 'xyz'
     character(:), allocatable :: stem
     integer :: c
 
@@ -150,16 +151,18 @@ contains
       names = [character(name_length) :: measure%name]
       return
     end if
-    stem = measure%field
+    stem = trim(measure%field%name)
     if (len(probe) > 0) stem = probe//'_'//stem
-    if (measure%component > 0) then
-      names = [character(name_length) :: stem//'_'//directions(measure%component: &
-        & measure%component)]
-    else if (components_of(measure%field, 2) == 1) then
-      names = [character(name_length) :: stem]
-    else
-      names = [character(name_length) :: (stem//'_'//directions(c:c), c=1, dim)]
-    end if
+    associate (field => measure%field)
+      if (measure%component > 0) then
+        names = [character(name_length) :: stem//'_'//field%component_name(measure%component, dim)]
+      else if (field%rank == rank_scalar) then
+        names = [character(name_length) :: stem]
+      else
+        names = [character(name_length) :: (stem//'_'//field%component_name(c, dim), &
+          & c=1, field%components(dim))]
+      end if
+    end associate
   end function columns_of
 
   !> A table of text.
@@ -278,12 +281,14 @@ contains
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: x(:, :), values(:, :), line(:), times(:)
     integer(i8), allocatable :: layer(:)
-    integer(i8) :: outputs, n
+    character(:), allocatable :: path_of_field
+    integer(i8) :: outputs, n, rows
     integer, allocatable :: kept(:)
     integer :: components, i
 
-    if (.not. object_exists(file, '/VTKHDF/PointData/'//measure%field)) then
-      call fail(error, "the results in '"//path//"' have no field '"//measure%field//"'")
+    path_of_field = '/VTKHDF/PointData/'//trim(measure%field%name)
+    if (.not. object_exists(file, path_of_field)) then
+      call fail(error, "the results in '"//path//"' have no field '"//trim(measure%field%name)//"'")
       return
     end if
     call get_attribute(file, '/VTKHDF/Steps', 'NSteps', outputs, error)
@@ -294,13 +299,15 @@ contains
     if (.not. allocated(error)) call read_rows(file, '/points/layer', 0_i8, layer, error)
     if (.not. allocated(error)) call read_rows(file, '/VTKHDF/Steps/Values', 0_i8, times, error)
     if (allocated(error)) return
-    if (components_of(measure%field, 2) == 1) then
+    call get_shape(file, path_of_field, components, rows, error)
+    if (allocated(error)) return
+    if (components == 1) then
       allocate (line(n))
-      call read_rows(file, '/VTKHDF/PointData/'//measure%field, (outputs - 1)*n, line, error)
+      call read_rows(file, path_of_field, (outputs - 1)*n, line, error)
       values = reshape(line, [1, size(line)])
     else
-      allocate (values(3, n))
-      call read_rows(file, '/VTKHDF/PointData/'//measure%field, (outputs - 1)*n, values, error)
+      allocate (values(components, n))
+      call read_rows(file, path_of_field, (outputs - 1)*n, values, error)
     end if
     if (allocated(error)) return
     kept = pack([(i, i=1, int(n))], layer == 0)
@@ -308,7 +315,7 @@ contains
     record%time = [times(outputs)]
     record%x = x(:dim, kept)
     if (measure%component > 0) values = values(measure%component:measure%component, :)
-    components = min(size(values, 1), dim)
+    components = min(size(values, 1), measure%field%components(dim))
     record%values = reshape(values(:components, kept), [components, size(kept), 1])
     call guess_spacing(record)
   end subroutine read_field

@@ -9,9 +9,11 @@ module pd_study_trade_study
   use pd_base_numbers, only: ascending
   use pd_base_shell, only: program_command, quoted
   use pd_base_text, only: newline, to_text
-  use pd_output_report_begin, only: output_directory, run_options_type
+  use pd_output_fields_check, only: check_names
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_report_begin, only: fields_of, output_directory, run_options_type
   use pd_output_results_files, only: file_exists, in_directory, make_directory
-  use pd_scene_format_file, only: resolve_path
+  use pd_scene_format_file, only: line_type, resolve_path
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_study_trade_analytic, only: find_form
   use pd_study_trade_closed_form, only: closed_form_type
@@ -31,6 +33,7 @@ module pd_study_trade_study
   !> A study while it runs.
   type :: session_type
     type(plan_type) :: plan
+    type(field_table_type) :: fields            !! that the scenes may name
     type(measure_type) :: measure
     type(outcome_type), allocatable :: outcomes(:)
     type(record_type) :: truth                  !! finest run or file
@@ -44,14 +47,16 @@ module pd_study_trade_study
 
 contains
 
-  !> The whole command. An interrupt keeps what is done.
-  subroutine run_study(path, options, error)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
+  !> The whole command. An interrupt keeps what is done. An error is set if the study is wrong, a
+  !> run cannot be made, or none has an answer.
+  subroutine run_study(path, options, error, changes)
+    character(*), intent(in) :: path                     !! of the scene file
+    type(run_options_type), intent(in) :: options        !! of the command line
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session
 
-    call begin_study(path, options, session, error)
+    call begin_study(path, options, session, error, changes)
     if (.not. allocated(error)) call run_all(session, error)
     if (allocated(error)) return
     call say(session, '')
@@ -75,21 +80,27 @@ contains
     text = text//' plot '//quoted(directory)
   end function plot_command
 
-  !> Plan everything, and check and set up every scene before the first run.
-  subroutine begin_study(path, options, session, error)
-    character(*), intent(in) :: path
-    type(run_options_type), intent(in) :: options
+  !> Plan everything, and check and set up every scene before the first run. An error is set if the
+  !> study is wrong, a scene cannot be set up, or there are results already.
+  subroutine begin_study(path, options, session, error, changes)
+    character(*), intent(in) :: path                     !! of the scene file
+    type(run_options_type), intent(in) :: options        !! of the command line
     type(session_type), intent(out) :: session
+      !! planned, with what the runs are compared with, and its folder made
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     integer :: t
 
     session%quiet = options%quiet
     session%terminal = output_is_terminal() .and. .not. options%quiet
-    call plan_study(path, session%plan, error)
+    call plan_study(path, session%plan, error, changes)
     if (allocated(error)) return
+    session%fields = fields_of(options)
     associate (plan => session%plan)
-      call resolve_measure(plan%measure, plan%region, plan%norm, plan%scene, plan%source, &
-        & session%measure, error)
+      call check_names(plan%scene, session%fields, error)
+      if (allocated(error)) return
+      call resolve_measure(plan%measure, plan%region, plan%norm, plan%scene, session%fields, &
+        & plan%source, session%measure, error)
       if (allocated(error)) return
       call find_truth(session, error)
       if (allocated(error)) return
@@ -170,7 +181,7 @@ contains
         if (len(reason) > 0) call at_key(plan, 'against', reason, 'one run must be at least as '// &
           & 'fine as all others in every key: add it, or compare with a closed form or a file', &
           & error)
-      case default
+      case default  ! the name of a file; one that is not there is an error
         probe = ''
         if (session%measure%probe > 0) probe = trim(plan%scene%probes(session%measure%probe)%name)
         path = resolve_path(plan%against, plan%scene%file)
@@ -214,7 +225,7 @@ contains
           allocate (form)
           call find_form(plan%analytic, plan%trials(t)%scene, form, reason)
         end if
-        call check_trial(plan%trials(t)%scene, session%measure, form, error)
+        call check_trial(plan%trials(t)%scene, session%fields, session%measure, form, error)
         if (.not. allocated(error)) cycle
         error%message = settings_text(plan, t)//': '//error%message
         return
@@ -233,9 +244,10 @@ contains
     end if
   end subroutine choose_threads
 
-  !> All runs, coarse to fine; with 'finest' that run comes first, since its answer is needed.
+  !> All runs, coarse to fine; with 'finest' that run comes first, since its answer is needed. An
+  !> error as of `run_one`; what was done before it is in the tables.
   subroutine run_all(session, error)
-    type(session_type), intent(inout) :: session
+    type(session_type), intent(inout) :: session  !! begun; with the outcome of every run on return
     type(error_type), allocatable, intent(out) :: error
     integer, allocatable :: order(:)
     real(wp), allocatable :: work(:)
@@ -254,11 +266,14 @@ contains
       & ' of '//to_text(size(order))//' runs are in '//in_directory(session%directory, 'study.csv')
   end subroutine run_all
 
-  !> Make run `t`, judge it and write the table anew. `remaining`: estimated work of the later runs.
+  !> Make run `t`, compare it and write the tables anew. An error if its scene cannot be set up, if
+  !> the user interrupts, if the finest run has no answer, if nothing of it can be compared, or if
+  !> the tables cannot be written.
   subroutine run_one(session, t, remaining, error, silent)
-    type(session_type), intent(inout) :: session
-    integer, intent(in) :: t
-    real(wp), intent(in) :: remaining
+    type(session_type), intent(inout) :: session  !! begun; with the outcome of this run on return
+    integer, intent(in) :: t                      !! number of the run
+    real(wp), intent(in) :: remaining             !! estimated work of the later runs; 0: their time
+                                                  !! is not shown
     type(error_type), allocatable, intent(out) :: error
     logical, intent(in), optional :: silent      !! the row is not shown
     type(closed_form_type), allocatable :: form
@@ -279,8 +294,8 @@ contains
       ! can be found in it: their points are at most half a cell's diagonal away
       around = 0.0_wp
       if (truth) around = session%around + 3*plan%trials(t)%spacing
-      call run_trial(plan%trials(t)%scene, session%measure, around, session%terminal, form, &
-        & outcome, record, error)
+      call run_trial(plan%trials(t)%scene, session%fields, session%measure, around, &
+        & session%terminal, form, outcome, record, error)
       if (allocated(error)) return
       outcome%truth = truth
       if (outcome%done) call judge(session, record, form, t, error)
@@ -326,9 +341,9 @@ contains
     end associate
   end subroutine judge
 
-  !> Write study.csv and study.txt with the runs made so far.
+  !> Write study.csv and study.txt with the runs made so far. An error if they cannot be written.
   subroutine keep_tables(session, error)
-    type(session_type), intent(inout) :: session
+    type(session_type), intent(inout) :: session  !! its outcomes get front and true errors
     type(error_type), allocatable, intent(out) :: error
 
     call mark_front(session%outcomes)
@@ -341,8 +356,9 @@ contains
 
   !> One more run at the end of the plan.
   subroutine add_trial(session, trial)
-    type(session_type), intent(inout) :: session
-    type(trial_type), intent(in) :: trial
+    type(session_type), intent(inout) :: session  !! with one run more on return, which is not made
+                                                  !! yet
+    type(trial_type), intent(in) :: trial         !! the run, with words and scene
     type(trial_type), allocatable :: trials(:)
     type(outcome_type), allocatable :: outcomes(:)
     integer :: n
@@ -356,9 +372,10 @@ contains
     call move_alloc(outcomes, session%outcomes)
   end subroutine add_trial
 
+  !> Print to standard output, unless the study is quiet.
   subroutine say(session, text)
-    type(session_type), intent(in) :: session
-    character(*), intent(in) :: text
+    type(session_type), intent(in) :: session  !! tells whether the study is quiet
+    character(*), intent(in) :: text           !! a line or several
     if (session%quiet) return
     write (output_unit, '(a)') text
     flush (output_unit)

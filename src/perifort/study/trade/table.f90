@@ -21,8 +21,8 @@ contains
   !> without an answer has nan as its value and error. With the finest run as reference
   !> the true error is extrapolated, nan where it is not known; else it is the error.
   function csv_text(plan, outcomes) result(text)
-    type(plan_type), intent(in) :: plan
-    type(outcome_type), intent(in) :: outcomes(:)
+    type(plan_type), intent(in) :: plan            !! of the study
+    type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
     character(:), allocatable :: text
     integer :: t, v
 
@@ -94,14 +94,21 @@ contains
 
   !> The whole table with what follows from it.
   function table_text(plan, outcomes, measure) result(text)
-    type(plan_type), intent(in) :: plan
-    type(outcome_type), intent(in) :: outcomes(:)
-    type(measure_type), intent(in) :: measure
+    type(plan_type), intent(in) :: plan            !! of the study
+    type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
+    type(measure_type), intent(in) :: measure      !! what is measured
     character(:), allocatable :: text
     type(order_type), allocatable :: orders(:)
     integer :: t, i
 
-    text = head_text(plan, measure)//newline
+    text = ''
+    if (allocated(plan%changes)) then
+      do i = 1, size(plan%changes)
+        text = text//'  set         '//plan%changes(i)%text//newline
+      end do
+      if (size(plan%changes) > 0) text = text//newline
+    end if
+    text = text//head_text(plan, measure)//newline
     do t = 1, size(outcomes)
       if (known(outcomes(t))) text = text//row_text(plan, t, outcomes(t))//newline
     end do
@@ -139,7 +146,7 @@ contains
       text = text//'the closed form'
     case ('finest')
       text = text//'the finest run'
-    case default
+    case default  ! the name of a file
       text = text//plan%against
     end select
     text = text//newline
@@ -154,8 +161,8 @@ contains
 
   !> The line above the rows.
   function head_text(plan, measure) result(text)
-    type(plan_type), intent(in) :: plan
-    type(measure_type), intent(in) :: measure
+    type(plan_type), intent(in) :: plan        !! of the study
+    type(measure_type), intent(in) :: measure  !! what is measured
     character(:), allocatable :: text
     integer :: v
 
@@ -181,9 +188,9 @@ contains
 
   !> The row of one run.
   function row_text(plan, t, outcome) result(text)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: t
-    type(outcome_type), intent(in) :: outcome
+    type(plan_type), intent(in) :: plan        !! of the study
+    integer, intent(in) :: t                   !! number of the run
+    type(outcome_type), intent(in) :: outcome  !! what it came to
     character(:), allocatable :: text
     integer :: v
 
@@ -205,8 +212,8 @@ contains
 
   !> `a = 1, b = 2` of run `t`.
   function settings_text(plan, t) result(text)
-    type(plan_type), intent(in) :: plan
-    integer, intent(in) :: t
+    type(plan_type), intent(in) :: plan  !! of the study
+    integer, intent(in) :: t             !! number of the run
     character(:), allocatable :: text
     integer :: v
 
@@ -261,9 +268,12 @@ contains
     text = trim(adjustl(buffer))
   end function fixed
 
-  !> Put a text into a file of a folder, in one step: what was there stays until then.
+  !> Put a text into a file of a folder, in one step: what was there stays until then. An error if
+  !> it cannot be written.
   subroutine put_file(directory, name, text, error)
-    character(*), intent(in) :: directory, name, text
+    character(*), intent(in) :: directory  !! folder of the file, which is there
+    character(*), intent(in) :: name       !! of the file
+    character(*), intent(in) :: text       !! the whole of it
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: path
     character(512) :: message

@@ -6,20 +6,22 @@ module pd_study_trade_trial
   use pd_base_kinds, only: wp, i8
   use pd_base_numbers, only: median
   use pd_base_text, only: to_text
-  use pd_output_report_begin, only: history_interval
   use pd_set_up_prepare, only: prepare, set_up_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_set_up_conditions, only: region_mask
-  use pd_output_report_before, only: find_probes
+  use pd_output_fields_check, only: check_available
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_report_columns, only: history_columns, history_row, history_table, &
+    & history_table_type, row_source_type
+  use pd_output_report_probes, only: find_probes, probe_type
+  use pd_output_report_schedule, only: history_interval
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_static_relaxation, only: run_relaxation
-  use pd_motion_system, only: energies_of, energies_type, system_type
-  use pd_output_report_recorder, only: field_of, history_columns, history_row, probe_type, &
-    & probe_values, velocities_now
+  use pd_motion_system, only: energies_of, energies_type, system_type, velocities_now
   use pd_output_report_summary, only: memory_of
   use pd_output_results_types, only: column_type
   use pd_scene_content_types, only: scene_type
-  use pd_study_trade_closed_form, only: closed_form_type, components_of
+  use pd_study_trade_closed_form, only: closed_form_type
   use pd_study_trade_analytic, only: complete_form
   use pd_study_trade_measure, only: measure_type, of_column, of_field, of_probe, record_type, &
     & value_of
@@ -53,7 +55,8 @@ module pd_study_trade_trial
     type(record_type) :: record
     type(probe_type), allocatable :: probes(:)
     integer, allocatable :: slots(:)           !! of the places
-    integer :: column = 0                      !! of the history
+    type(history_table_type) :: columns        !! of the history
+    integer :: column = 0                      !! among them
     integer :: every = 1
     logical :: relaxation = .false.
     integer :: steps = 0
@@ -76,14 +79,16 @@ contains
   !> taken a second. `around`: of a probe all points so near are kept [m], 0 for the nearest alone.
   !> `form` gets what only the points tell of it. An error that ends a run without an answer is kept
   !> in `outcome`; others, and interrupts, in `error`.
-  subroutine run_trial(scene, measure, around, terminal, form, outcome, record, error)
-    type(scene_type), intent(in) :: scene
-    type(measure_type), intent(in) :: measure
-    real(wp), intent(in) :: around
+  subroutine run_trial(scene, table, measure, around, terminal, form, outcome, record, error)
+    type(scene_type), intent(in) :: scene       !! a checked scene
+    type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
+    type(measure_type), intent(in) :: measure   !! what is kept
+    real(wp), intent(in) :: around              !! [m]; counts for probes only
     logical, intent(in) :: terminal            !! show the progress of the steps
     type(closed_form_type), allocatable, intent(inout) :: form
-    type(outcome_type), intent(out) :: outcome
-    type(record_type), intent(out) :: record
+      !! what is compared with, completed on return; not allocated: none
+    type(outcome_type), intent(out) :: outcome  !! what the run came to
+    type(record_type), intent(out) :: record    !! what was measured, as far as the run went
     type(error_type), allocatable, intent(out) :: error
     type(watcher_type) :: watcher
     type(error_type), allocatable :: fault
@@ -91,8 +96,8 @@ contains
     integer :: r
 
     do r = 1, most_repeats
-      call run_once(scene, measure, merge(around, -1.0_wp, r == 1), terminal .and. r == 1, form, &
-        & watcher, seconds(r), outcome, fault, error)
+      call run_once(scene, table, measure, merge(around, -1.0_wp, r == 1), &
+        & terminal .and. r == 1, form, watcher, seconds(r), outcome, fault, error)
       if (allocated(error)) return
       if (r == 1) record = watcher%record
       if (r == 1 .and. .not. allocated(fault)) outcome%value = value_of(record)
@@ -110,10 +115,12 @@ contains
   !> Set a scene up as `run_trial` does, without running it: an error if that is not possible, if
   !> what is measured is not there, or if the closed form does not hold for the points. The largest
   !> frequency of `limit = 'spectral'` is not measured.
-  subroutine check_trial(scene, measure, form, error)
-    type(scene_type), intent(in) :: scene
-    type(measure_type), intent(in) :: measure
+  subroutine check_trial(scene, table, measure, form, error)
+    type(scene_type), intent(in) :: scene        !! a checked scene
+    type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
+    type(measure_type), intent(in) :: measure    !! what a run would keep
     type(closed_form_type), allocatable, intent(inout) :: form
+      !! what is compared with, completed on return; not allocated: none
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: checked
     type(set_up_type) :: set_up
@@ -123,14 +130,15 @@ contains
     checked = scene
     checked%time%limit = 'equation'
     call prepare(checked, set_up, error)
-    if (.not. allocated(error)) call begin_watch(checked, measure, 0.0_wp, set_up, form, watcher, &
-      & outcome, error)
+    if (.not. allocated(error)) call begin_watch(checked, table, measure, 0.0_wp, set_up, form, &
+      & watcher, outcome, error)
   end subroutine check_trial
 
   !> What is measured in a scene that is set up, its size and its closed form, before the first
   !> step.
-  subroutine begin_watch(scene, measure, around, set_up, form, watcher, outcome, error)
+  subroutine begin_watch(scene, table, measure, around, set_up, form, watcher, outcome, error)
     type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table
     type(measure_type), intent(in) :: measure
     real(wp), intent(in) :: around             !! as in `run_trial` [m]; below 0 for the time alone
     type(set_up_type), intent(in) :: set_up
@@ -143,9 +151,18 @@ contains
     watcher%measure = measure
     watcher%quick = around < 0.0_wp
     watcher%relaxation = set_up%plan%relaxes
+    watcher%columns = history_table(watcher%relaxation)
     watcher%every = history_interval(scene, set_up%plan, set_up%system%family%n_bonds)
-    call find_probes(scene, set_up%system%body, watcher%probes)
-    if (watcher%quick) return
+    call find_probes(scene, table, set_up%system%body, watcher%probes, error)
+    if (allocated(error) .or. watcher%quick) return
+    call check_available(scene, set_up%system, table, error)
+    if (allocated(error)) return
+    if (measure%kind /= of_column) then
+      reason = measure%field%missing(set_up%system)
+      if (len(reason) > 0) call fail(error, "this scene has no field '"// &
+        & trim(measure%field%name)//"': "//reason)
+      if (allocated(error)) return
+    end if
     call choose_places(scene, set_up%system, around, watcher, error)
     if (allocated(error)) return
     call note_costs(set_up%system, set_up%plan%step, outcome)
@@ -155,9 +172,10 @@ contains
   end subroutine begin_watch
 
   !> One repeat; with `around` < 0 nothing but the time is wanted.
-  subroutine run_once(scene, measure, around, terminal, form, watcher, seconds, outcome, fault, &
-      & error)
+  subroutine run_once(scene, table, measure, around, terminal, form, watcher, seconds, outcome, &
+      & fault, error)
     type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table
     type(measure_type), intent(in) :: measure
     real(wp), intent(in) :: around
     logical, intent(in) :: terminal
@@ -174,7 +192,7 @@ contains
     call prepare(scene, set_up, error)
     if (allocated(error)) return
     lost = wall_time()
-    call begin_watch(scene, measure, around, set_up, form, watcher, outcome, error)
+    call begin_watch(scene, table, measure, around, set_up, form, watcher, outcome, error)
     if (allocated(error)) return
     associate (system => set_up%system, plan => set_up%plan)
       ! one more than there are, since the last step would be shown of runs of any length
@@ -262,18 +280,19 @@ contains
         end select
         record%spacing = maxval(body%spacing, mask=body%point > 0)
         k = 1
-        if (measure%kind /= of_column) k = merge(1, components_of(measure%field, dim), &
+        if (measure%kind /= of_column) k = merge(1, measure%field%components(dim), &
           & measure%component > 0)
         allocate (record%values(k, max(1, size(watcher%slots)), 1), record%time(1), source=0.0_wp)
       end associate
     end associate
   end subroutine choose_places
 
-  !> The progress, and on rows what is measured and the balance.
+  !> The progress, and on rows what is measured and the balance. An error, of an interrupted run, if
+  !> the user has asked to stop.
   subroutine observe(observer, system, instant, error)
-    class(watcher_type), intent(inout) :: observer
-    type(system_type), intent(inout) :: system
-    type(instant_type), intent(in) :: instant
+    class(watcher_type), intent(inout) :: observer  !! keeps what is measured, and the balance
+    type(system_type), intent(inout) :: system      !! at this instant
+    type(instant_type), intent(in) :: instant       !! step and time of the run
     type(error_type), allocatable, intent(out) :: error
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :)
@@ -324,30 +343,33 @@ contains
   !> One row of what is measured.
   subroutine keep(watcher, system, instant, v, energies)
     class(watcher_type), intent(inout) :: watcher
-    type(system_type), intent(in) :: system
+    type(system_type), target, intent(inout) :: system
     type(instant_type), intent(in) :: instant
-    real(wp), intent(in) :: v(:, :)
+    real(wp), target, contiguous, intent(in) :: v(:, :)
     type(energies_type), intent(in) :: energies
-    real(wp), allocatable :: values(:)
-    integer :: p
+    type(row_source_type) :: now
+    real(wp), allocatable :: row(:), values(:, :)
 
     associate (record => watcher%record, measure => watcher%measure)
       if (record%rows == size(record%time)) call double_rows(record)
       record%rows = record%rows + 1
       record%time(record%rows) = instant%time
+      now%system => system
+      now%v => v
       if (measure%kind == of_column) then
-        values = history_row(system, watcher%probes, watcher%relaxation, instant, v, energies)
-        record%values(1, 1, record%rows) = values(watcher%column)
+        now%instant = instant
+        now%energies = energies
+        row = history_row(watcher%columns, now, watcher%probes)
+        record%values(1, 1, record%rows) = row(watcher%column)
         return
       end if
-      do p = 1, size(watcher%slots)
-        values = probe_values(system, field_of(measure%field), watcher%slots(p), v)
-        if (measure%component > 0) then
-          record%values(1, p, record%rows) = values(measure%component)
-        else
-          record%values(:, p, record%rows) = values
-        end if
-      end do
+      allocate (values(measure%field%components(system%body%dim), size(watcher%slots)))
+      call measure%field%values_at(now%moment_type, watcher%slots, values)
+      if (measure%component > 0) then
+        record%values(1, :, record%rows) = values(measure%component, :)
+      else
+        record%values(:, :, record%rows) = values
+      end if
     end associate
   end subroutine keep
 

@@ -1,29 +1,24 @@
-!> How often rows of the history are written, and fields that nothing computes.
-module test_output_report_begin
-  use pd_base_error, only: fault_type => error_type
+!> How often rows of the history are written.
+module test_output_report_schedule
   use pd_base_kinds, only: i8, wp
   use pd_set_up_plan, only: plan_type
   use pd_motion_explicit_time_step, only: evaluations
-  use pd_output_report_begin, only: history_interval
-  use pd_output_report_recorder, only: check_fields, field_of
-  use pd_output_results_types, only: field_type
-  use pd_scene_content_groups, only: field_names
+  use pd_output_report_schedule, only: history_interval
   use pd_scene_content_types, only: scene_type
-  use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
+  use testdrive, only: check, error_type, new_unittest, unittest_type
   use bodies, only: expect_true
   implicit none (type, external)
   private
-  public :: collect_output_report_begin
+  public :: collect_output_report_schedule
 
 contains
 
-  subroutine collect_output_report_begin(testsuite)
+  subroutine collect_output_report_schedule(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('rows take a twentieth of the time at most', test_rows), &
-      & new_unittest('rows of small bodies and of long runs', test_other_rows), &
-      & new_unittest('every field that scenes know is computed', test_fields)]
-  end subroutine collect_output_report_begin
+      & new_unittest('rows of small bodies and of long runs', test_other_rows)]
+  end subroutine collect_output_report_schedule
 
   !> A row takes the time of two evaluations of the forces at most (1.35 to 2.0 were measured).
   subroutine test_rows(error)
@@ -70,21 +65,4 @@ contains
     call check(error, history_interval(scene, plan, 7000000_i8), 1, 'lines of a relaxation')
   end subroutine test_other_rows
 
-  subroutine test_fields(error)
-    type(error_type), allocatable, intent(out) :: error
-    type(fault_type), allocatable :: fault
-    integer :: f
-
-    do f = 1, size(field_names)
-      call check_fields([field_of(trim(field_names(f)))], fault)
-      if (.not. allocated(fault)) cycle
-      call test_failed(error, fault%message)
-      return
-    end do
-    call check_fields([field_of('damage'), field_type(name='no_such_field')], fault)
-    call expect_true(error, allocated(fault), 'a field that nothing computes')
-    if (allocated(error)) return
-    call expect_true(error, index(fault%message, "'no_such_field'") > 0, fault%message)
-  end subroutine test_fields
-
-end module test_output_report_begin
+end module test_output_report_schedule

@@ -1,0 +1,40 @@
+!> One output: the fields that a run writes, computed now and given to the results.
+module pd_output_fields_write
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp
+  use pd_output_fields_field, only: moment_type, output_field_type
+  use pd_output_results_results, only: results_type
+  use pd_output_results_types, only: field_type
+  implicit none (type, external)
+  private
+  public :: write_fields
+
+contains
+
+  !> Write all fields of an output that has begun.
+  subroutine write_fields(results, fields, now, error)
+    type(results_type), intent(inout) :: results        !! was created with these fields
+    type(output_field_type), intent(in) :: fields(:)
+    type(moment_type), intent(in) :: now
+    type(error_type), allocatable, intent(out) :: error
+    type(field_type) :: entry
+    real(wp), allocatable :: values(:, :)
+    integer :: f, n
+
+    do f = 1, size(fields)
+      entry = fields(f)%in_file(now%system%body%dim)
+      allocate (values(now%system%body%n_points, entry%components))
+      n = fields(f)%components(now%system%body%dim)
+      call fields(f)%fill(now, values(:, :n))
+      values(:, n + 1:) = 0.0_wp
+      if (entry%components == 1) then
+        call results%put_field(f, values(:, 1), error)
+      else
+        call results%put_field(f, values, error)
+      end if
+      if (allocated(error)) return
+      deallocate (values)
+    end do
+  end subroutine write_fields
+
+end module pd_output_fields_write

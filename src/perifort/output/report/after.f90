@@ -1,0 +1,62 @@
+!> What the user reads on the terminal when a run is over: what it came to.
+module pd_output_report_after
+  use pd_base_kinds, only: wp
+  use pd_base_reduce, only: largest_over
+  use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
+  use pd_motion_system, only: system_type
+  use pd_output_report_recorder, only: recorder_type
+  implicit none (type, external)
+  private
+  public :: summary_after
+
+contains
+
+  !> What the run came to: time per phase, speed, energies, damage, where the results are.
+  function summary_after(system, recorder, directory) result(text)
+    type(system_type), intent(in) :: system
+    type(recorder_type), intent(in) :: recorder
+    character(*), intent(in) :: directory   !! of the results; '' = there are no files
+    character(:), allocatable :: text, parts
+    real(wp) :: balance, share
+    integer :: steps
+
+    text = recorder%timer%table()//newline
+    steps = recorder%steps_done - recorder%first_step
+    if (steps > 0) text = text//line('speed', &
+      & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
+      & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
+      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
+      & trim(merge(' iterations/s', ' steps/s     ', recorder%schedule%relaxation)))
+    if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
+    if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
+      & 'load step')//' left to dynamic relaxation by the conjugate gradient')
+    associate (now => recorder%balance%energies)
+      text = text//line('kinetic energy', with_unit(now%kinetic, 'J'))
+      text = text//line('strain energy', with_unit(now%strain, 'J'))
+      if (system%model%breaking) then
+        text = text//line('dissipated', with_unit(system%dissipated, 'J'))
+        text = text//line('broken bonds', to_text(system%broken)//' pairs of points')
+        text = text//line('greatest damage', to_text(largest_over(system%body%order, &
+          & system%state%damage), 3))
+      end if
+      text = text//line('external work', with_unit(system%external_work, 'J'))
+      call recorder%energy_balance(system, balance, share)
+      if (share >= 0.0_wp) then
+        parts = to_text(100*share, 2)//' % of the greater of the energy supplied and the '// &
+          & 'energy present'
+        if (abs(system%dissipated) > 0.0_wp) parts = parts//', '// &
+          & to_text(100*abs(balance/system%dissipated), 2)//' % of the dissipated energy'
+        text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '//parts)
+      end if
+    end associate
+    if (recorder%warnings%count() > 0) text = text//line('warnings', &
+      & to_text(recorder%warnings%count())//trim(merge(', kept in warnings.txt', &
+      & repeat(' ', 22), directory /= '')))
+    if (directory == '') then
+      text = text//line('results', 'in memory alone')
+    else
+      text = text//line('results', directory)
+    end if
+  end function summary_after
+
+end module pd_output_report_after

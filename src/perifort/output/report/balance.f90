@@ -1,0 +1,44 @@
+!> The balance of energy over the rows of a run's history.
+module pd_output_report_balance
+  use pd_base_kinds, only: wp
+  use pd_motion_system, only: energies_type, system_type
+  implicit none (type, external)
+  private
+  public :: balance_type
+
+  !> What the balance is made from.
+  type :: balance_type
+    type(energies_type) :: energies      !! of the last row
+    real(wp) :: supply = 0.0_wp          !! energy at the first row, with breaking at t = 0 [J]
+  contains
+    procedure :: begin
+    procedure :: gap
+  end type balance_type
+
+contains
+
+  !> Take the energy of the first row for what was there.
+  pure subroutine begin(balance, system)
+    class(balance_type), intent(inout) :: balance
+    type(system_type), intent(in) :: system
+    balance%supply = balance%energies%kinetic + balance%energies%strain + system%dissipated
+  end subroutine begin
+
+  !> How far the energies of the last row are from what was there and has been supplied.
+  pure subroutine gap(balance, system, off, share)
+    class(balance_type), intent(in) :: balance
+    type(system_type), intent(in) :: system
+    real(wp), intent(out) :: off         !! [J]
+    real(wp), intent(out) :: share       !! of the energy in play [-], -1 where there is none
+    real(wp) :: supply, largest
+
+    share = -1.0_wp
+    supply = balance%supply + system%external_work
+    associate (now => balance%energies)
+      off = now%kinetic + now%strain + system%dissipated - supply
+      largest = max(abs(now%kinetic) + abs(now%strain) + system%dissipated, abs(supply))
+    end associate
+    if (largest > 0.0_wp) share = abs(off)/largest
+  end subroutine gap
+
+end module pd_output_report_balance

@@ -1,0 +1,70 @@
+!> What is told during a run of a state that the method is not meant for: pieces that touch, parts
+!> that have turned, large strains. Each is a text, '' if there is nothing to tell.
+module pd_output_report_run_warnings
+  use pd_base_kinds, only: wp
+  use pd_base_numbers, only: pi
+  use pd_base_text, only: counted, to_text
+  use pd_motion_system, only: system_type
+  use pd_output_report_contact, only: touching_points
+  use pd_output_report_rotation, only: turned_part
+  use pd_output_report_strain, only: find_large_strains, large_strain
+  implicit none (type, external)
+  private
+  public :: contact_warning, rotation_warning, strain_warning
+
+  !> Rotations that the projected dilatation is told for: beyond 10 degrees it is off by 1.5 % and
+  !> more. So large a share of the points must have turned: a few may turn at the tip of a crack.
+  real(wp), parameter :: small_rotation = pi/18
+  real(wp), parameter :: least_turned = 0.02_wp
+
+contains
+
+  !> Points pass through each other, which the method doesn't hinder.
+  function contact_warning(system, time) result(text)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: time              !! [s]
+    character(:), allocatable :: text
+    integer :: first, second
+
+    text = ''
+    call touching_points(system%body, system%family, system%state%u, first, second)
+    if (first > 0) text = 'at t = '//to_text(time)//' s points '// &
+      & to_text(first)//' and '//to_text(second)// &
+      & ', which share no intact bond, are closer than half a spacing: '// &
+      & 'there is no contact, pieces pass through each other from here on'
+  end function contact_warning
+
+  !> Parts of the body have turned where the dilatation is projected.
+  function rotation_warning(system, time) result(text)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: time              !! [s]
+    character(:), allocatable :: text
+    real(wp) :: share, largest
+
+    text = ''
+    if (.not. (system%model%dilatation .and. system%model%projected)) return
+    call turned_part(system%body, system%family, system%state%u, small_rotation, share, largest)
+    if (share > least_turned) text = 'at t = '//to_text(time)//' s '// &
+      & to_text(100*share, 2)//' % of the points are turned by more than 10 degrees, up to '// &
+      & to_text(largest*180/pi, 3)//': the projected dilatation shrinks by the cosine of a '// &
+      & "rotation, so forces and energies are off; &horizon dilatation = 'unprojected' has no "// &
+      & 'such error'
+  end function rotation_warning
+
+  !> Strains are too large for a law that is linear in the stretch.
+  function strain_warning(system, time) result(text)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in) :: time              !! [s]
+    character(:), allocatable :: text
+    integer :: number, point
+    real(wp) :: stretch
+
+    text = ''
+    call find_large_strains(system, number, point, stretch)
+    if (number > 0) text = 'at t = '//to_text(time)//' s intact bonds of '// &
+      & counted(number, 'point')//' are strained by more than '//to_text(nint(100*large_strain))// &
+      & ' %, the most by '//to_text(100*stretch, 3)//' % (point '//to_text(point)// &
+      & '): the material is linear in the strain and not meant for that'
+  end function strain_warning
+
+end module pd_output_report_run_warnings

@@ -1,0 +1,188 @@
+!> The output of one run, from what is there of earlier ones to the last word: the driver's partner.
+!>
+!>     call output%look_back(scene, options, error)   ! earlier results, a checkpoint to go on from
+!>     call output%foresee(scene, options, set_up, error)      ! probes, schedule, warnings
+!>     call output%open(scene, options, set_up, error)
+!>     ...                                            ! the motion, seen by output%recorder
+!>     call output%close(scene, options, set_up, error)
+module pd_output_run
+  use pd_base_error, only: error_type, status_input, status_interrupted
+  use pd_base_kinds, only: wp, i8
+  use pd_base_text, only: newline, to_text
+  use pd_motion_keep, only: checksum_of_start
+  use pd_motion_system, only: system_type
+  use pd_output_checkpoint_earlier, only: mark_complete, refuse_existing
+  use pd_output_checkpoint_restart, only: find_restart, put_back, restart_type
+  use pd_output_fields_check, only: check_names
+  use pd_output_report_after, only: summary_after
+  use pd_output_report_before, only: foresee_output
+  use pd_output_report_begin, only: command_of, fields_of, keep_checkpoints, open_recorder, &
+    & output_directory, run_options_type, stem_of, text_of
+  use pd_output_report_probes, only: probe_type
+  use pd_output_report_recorder, only: recorder_type
+  use pd_output_report_say, only: say
+  use pd_output_report_summary, only: summary_before
+  use pd_output_results_answer, only: answer_type
+  use pd_scene_content_rules, only: place_fault
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_prepare, only: set_up_type
+  implicit none (type, external)
+  private
+  public :: run_output_type
+
+  real(wp), parameter :: doubtful_balance = 0.1_wp      !! of the energy in play
+  real(wp), parameter :: doubtful_dissipation = 0.05_wp !! of the dissipated energy
+
+  type :: run_output_type
+    type(recorder_type) :: recorder           !! sees the motion
+    logical :: complete = .false.             !! there is nothing to compute: all is there already
+    type(restart_type), private :: restart
+    type(probe_type), allocatable, private :: probes(:)
+    character(:), allocatable, private :: directory  !! '' = no files
+    character(:), allocatable, private :: stem
+  contains
+    procedure :: look_back
+    procedure :: foresee
+    procedure :: open => open_output
+    procedure :: close => close_output
+    procedure :: answer
+  end type run_output_type
+
+contains
+
+  !> See to it that the scene's fields are known and that no earlier results are overwritten
+  !> unasked, or find the checkpoint that a run is to go on from.
+  subroutine look_back(self, scene, options, error)
+    class(run_output_type), intent(inout) :: self
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(error_type), allocatable, intent(out) :: error
+
+    call check_names(scene, fields_of(options), error)
+    if (allocated(error)) return
+    self%stem = stem_of(scene)
+    self%directory = output_directory(scene, options)
+    if (self%directory == '') return
+    if (options%restart) then
+      call find_restart(self%directory, self%stem, text_of(options%checkpoint), scene, &
+        & command_of(options), self%restart, error)
+      if (allocated(error)) return
+      call say(self%restart%note, options%quiet)
+      self%complete = self%restart%complete
+    else
+      call refuse_existing(self%directory, self%stem, options%overwrite, error)
+    end if
+  end subroutine look_back
+
+  !> What is known of the output before the first step; warnings and notes go to the set-up.
+  subroutine foresee(self, scene, options, set_up, error)
+    class(run_output_type), intent(inout) :: self
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(set_up_type), intent(inout) :: set_up
+    type(error_type), allocatable, intent(out) :: error
+    call foresee_output(scene, fields_of(options), set_up, self%probes, error)
+  end subroutine foresee
+
+  !> Put the system back to where its checkpoint stands, if it has one, say what will be computed,
+  !> and open the files. With `in_memory` the last output stays in memory, too.
+  subroutine open_output(self, scene, options, set_up, in_memory, error)
+    class(run_output_type), intent(inout) :: self
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(set_up_type), intent(inout) :: set_up
+    logical, intent(in) :: in_memory
+    type(error_type), allocatable, intent(out) :: error
+    integer(i8) :: start
+
+    associate (system => set_up%system, plan => set_up%plan, recorder => self%recorder)
+      start = checksum_of_start(system)
+      if (self%restart%found) call put_back(self%restart, scene, system, plan, error)
+      if (allocated(error)) return
+      self%complete = self%restart%complete
+      if (self%complete) then
+        call say('  complete        the run has as many steps already', options%quiet)
+        return
+      end if
+      call say(summary_before(scene, system, plan, self%probes, set_up%cut, set_up%warnings, &
+        & set_up%notes, set_up%team%threads()), options%quiet)
+      recorder%timer = set_up%timer
+      recorder%team = set_up%team
+      recorder%probes = self%probes
+      recorder%warnings = set_up%warnings
+      call open_recorder(scene, options, system, plan, self%directory, self%stem, self%restart, &
+        & recorder, in_memory, error)
+      if (allocated(error)) return
+      call keep_checkpoints(scene, options, plan, start, self%directory, self%stem, &
+        & self%restart, recorder)
+      call recorder%timer%start('time stepping')
+    end associate
+  end subroutine open_output
+
+  !> After the motion: judge the energy balance, close the files, keep the end, and say what it came
+  !> to. An error of the motion stays and gets what is to be said of it; `place_it`: one that it
+  !> found in the input gets a place in the scene.
+  subroutine close_output(self, scene, options, set_up, place_it, error)
+    class(run_output_type), intent(inout) :: self
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(set_up_type), intent(inout) :: set_up
+    logical, intent(in) :: place_it
+    type(error_type), allocatable, intent(inout) :: error
+    type(error_type), allocatable :: late
+    real(wp) :: balance, share
+    logical :: stopped
+
+    associate (system => set_up%system, recorder => self%recorder)
+      if (allocated(error)) then
+        ! what the motion finds wrong with the input, it finds before the first iteration
+        if (error%status == status_input .and. recorder%rows == 0 .and. place_it) &
+          & call place_fault(error, scene, 'time', 1, 'method')
+        if (allocated(recorder%rescued)) error%message = error%message//newline//'  '// &
+          & recorder%rescued
+      end if
+      call recorder%timer%stop('time stepping')
+      call recorder%progress%finish()
+      call recorder%energy_balance(system, balance, share)
+      if (.not. allocated(error)) call warn_of_balance(system, recorder, balance, share)
+      call recorder%results%put_warnings(recorder%warnings%text())
+      stopped = .false.
+      if (allocated(error)) stopped = error%status == status_interrupted
+      call recorder%results%close(late, stopped, keep_mark=.true.)
+      if (.not. allocated(error) .and. allocated(late)) call move_alloc(late, error)
+      if (allocated(error)) return
+      ! the end is kept when the results are complete, and then the mark of unfinished ones goes
+      system%memory%step = recorder%steps_done
+      if (recorder%checkpoint%keeps_end()) call recorder%keep_state(system, finished=.true.)
+      if (self%directory /= '') call mark_complete(self%directory, self%stem)
+      call say(summary_after(system, recorder, self%directory), options%quiet)
+    end associate
+  end subroutine close_output
+
+  !> The results in memory.
+  subroutine answer(self, found)
+    class(run_output_type), intent(in) :: self
+    type(answer_type), intent(out) :: found
+    call self%recorder%results%answer(found)
+  end subroutine answer
+
+  !> Warn if energy was gained or lost that nothing explains: much of what is in play, or, where
+  !> bonds have broken, much of what they dissipated.
+  subroutine warn_of_balance(system, recorder, balance, share)
+    type(system_type), intent(in) :: system
+    type(recorder_type), intent(inout) :: recorder
+    real(wp), intent(in) :: balance  !! energy that nothing explains [J]
+    real(wp), intent(in) :: share    !! its size over the energy in play [-], < 0 without a balance
+
+    if (share > doubtful_balance) then
+      call recorder%warn('balance', 'the energy balance is off by '//to_text(100*share, 2)// &
+        & ' % of the energy: the answer is not reliable; a smaller step may help')
+    else if (share >= 0.0_wp .and. abs(system%dissipated) > 0.0_wp .and. &
+      & abs(balance) > doubtful_dissipation*abs(system%dissipated)) then
+      call recorder%warn('dissipation', 'the energy balance is off by '// &
+        & to_text(100*abs(balance/system%dissipated), 2)// &
+        & ' % of the dissipated energy, which is known no better; a smaller step helps')
+    end if
+  end subroutine warn_of_balance
+
+end module pd_output_run

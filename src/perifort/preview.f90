@@ -1,0 +1,132 @@
+!> What is known of a scene before it runs: whether it keeps the rules, and what a run would do,
+!> which `perifort check` prints.
+module pd_preview
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: i8
+  use pd_base_text, only: newline
+  use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_bytes, new_about
+  use pd_output_fields_check, only: check_names
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_report_before, only: foresee_output
+  use pd_output_report_begin, only: fields_of, run_options_type
+  use pd_output_report_columns, only: history_columns
+  use pd_output_report_estimate, only: estimate
+  use pd_output_report_overview, only: overview
+  use pd_output_report_probes, only: probe_type
+  use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of, schedule_type
+  use pd_output_report_say, only: say
+  use pd_output_report_summary, only: checkpoint_line, summary_before
+  use pd_scene_content_complete, only: complete_scene
+  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_write, only: scene_text
+  use pd_set_up_move, only: take_all_memory
+  use pd_set_up_prepare, only: prepare, set_up_type
+  implicit none (type, external)
+  private
+  public :: check_scene, preview_scene
+
+contains
+
+  !> Complete a scene in place, and hold it to every rule that needs no points: those of a scene
+  !> file, and the names of fields.
+  subroutine check_scene(scene, error, fields)
+    type(scene_type), intent(inout) :: scene             !! built or changed in memory, or read
+    type(error_type), allocatable, intent(out) :: error  !! the broken rule; the scene is as it was
+    type(field_table_type), intent(in), optional :: fields  !! that it may name; none: `all_fields`
+    type(scene_type) :: complete
+    type(run_options_type) :: options
+
+    if (present(fields)) options%fields = fields
+    complete = scene
+    call complete_scene(complete, error)
+    if (.not. allocated(error)) call check_names(complete, fields_of(options), error)
+    if (.not. allocated(error)) scene = complete
+  end subroutine check_scene
+
+  !> Check a scene, build points and families, and say what a run would do: size, forces, time step,
+  !> warnings, predicted duration. No files are written. The caller's number of threads is as it was
+  !> thereafter.
+  subroutine preview_scene(scene, options, error, text)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options               !! `threads` and `quiet` count
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable, intent(out), optional :: text    !! what is printed
+    type(scene_type) :: complete
+    character(:), allocatable :: all
+    integer :: threads
+
+    complete = scene
+    call complete_scene(complete, error)
+    if (allocated(error)) return
+    threads = omp_get_max_threads()
+    call examine(complete, options, error, all)
+    call omp_set_num_threads(threads)
+    if (present(text)) text = all
+  end subroutine preview_scene
+
+  !> `preview_scene` of a complete scene with threads of its own number.
+  subroutine examine(scene, options, error, text)
+    type(scene_type), intent(in) :: scene
+    type(run_options_type), intent(in) :: options
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable, intent(out) :: text
+    type(set_up_type) :: set_up
+    type(probe_type), allocatable :: probes(:)
+    character(:), allocatable :: times
+
+    text = ''
+    call check_names(scene, fields_of(options), error)
+    if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads)
+    if (allocated(error)) return
+    call foresee_output(scene, fields_of(options), set_up, probes, error)
+    if (allocated(error)) return
+    associate (system => set_up%system, plan => set_up%plan)
+      call tell(summary_before(scene, system, plan, probes, set_up%cut, &
+        & set_up%warnings, set_up%notes, set_up%team%threads()))
+      call tell_lines(overview(scene, system, .not. plan%relaxes))
+      call estimate(scene, fields_of(options), system, plan, &
+        & schedule_of(scene, plan, system%family%n_bonds), set_up%timer%total(), times)
+      call tell_lines(times)
+      call tell(checkpoint_line(scene, bytes_of_checkpoint(scene, set_up, probes)))
+    end associate
+
+  contains
+
+    !> Print a part as soon as it is known, and keep it.
+    subroutine tell(part)
+      character(*), intent(in) :: part
+      call say(part, options%quiet)
+      text = text//part//newline
+    end subroutine tell
+
+    !> The same for lines that end with a newline.
+    subroutine tell_lines(lines)
+      character(*), intent(in) :: lines
+      if (len(lines) > 0) call tell(lines(:len(lines) - 1))
+    end subroutine tell_lines
+  end subroutine examine
+
+  !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
+  !> largest.
+  integer(i8) function bytes_of_checkpoint(scene, set_up, probes) result(bytes)
+    type(scene_type), intent(in) :: scene
+    type(set_up_type), intent(inout) :: set_up
+    type(probe_type), intent(in) :: probes(:)
+    type(about_type) :: about
+    type(schedule_type) :: schedule
+    integer :: columns
+
+    associate (system => set_up%system, plan => set_up%plan)
+      schedule = schedule_of(scene, plan, system%family%n_bonds)
+      about = new_about(scene_text(scene), 0_i8, plan%steps, plan%step)
+      columns = size(history_columns(system, probes, plan%relaxes))
+      allocate (about%kept%rows(columns, 0), about%kept%times(0))
+      call take_all_memory(system, plan)
+      ! rows and times are counted and not made: a long run may have more than fit into the memory
+      bytes = checkpoint_bytes(about, system) + 8*(int(columns, i8)*planned_rows(schedule) &
+        & + planned_outputs(schedule, plan%step))
+    end associate
+  end function bytes_of_checkpoint
+
+end module pd_preview

@@ -1,0 +1,75 @@
+!> The defaults that have changed from version to version.
+!>
+!> `&scene defaults` says for which version a scene was written; without it, for this one. What is
+!> not listed here has had the same default in all of them.
+!>
+!> | version | what has changed                                                                  |
+!> |---------|-----------------------------------------------------------------------------------|
+!> | 0.2     | `&horizon dilatation`: 'unprojected', before 'projected'                          |
+!> | 0.2     | `&output history_every`: rows take at most 5 % of the time; before, this was not  |
+!> |         | looked at: max(1, steps/2000)                                                     |
+!> | 0.2     | relaxation, `&output history_every`: 1, before max(1, maximum_iterations/2000)    |
+!> | 0.2     | relaxation, temperature changes of `&initial`: by a ramp over the load steps,     |
+!> |         | before at once                                                                    |
+module pd_scene_content_defaults
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: join
+  use pd_scene_content_rules, only: rule_fault
+  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_format_source, only: source_type
+  use pd_scene_groups_header, only: known_defaults, own_defaults
+  implicit none (type, external)
+  private
+  public :: fill_defaults, rows_by_cost
+
+  integer, parameter :: rows_wanted = 2000  !! of a history, in version 0.1
+
+contains
+
+  !> Give keys that the user has not given the default of the scene's version. An error if the
+  !> version is not known.
+  subroutine fill_defaults(scene, error, source)
+    type(scene_type), intent(inout) :: scene                !! with all lists allocated
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source       !! the scanned file, for places
+    integer :: i
+
+    if (scene%header%defaults == '') scene%header%defaults = own_defaults
+    if (all(known_defaults /= scene%header%defaults)) then
+      call rule_fault(error, 'scene', 1, 'defaults', "unknown version '"// &
+        & trim(scene%header%defaults)//"' of the defaults", 'known: '//join(known_defaults, ', '), &
+        & source)
+      return
+    end if
+    if (scene%horizon%dilatation == '') then
+      scene%horizon%dilatation = 'unprojected'
+      if (before_0_2(scene)) scene%horizon%dilatation = 'projected'
+    end if
+    if (scene%time%method /= 'relaxation' .or. .not. before_0_2(scene)) return
+    if (scene%output%history_every == 0) &
+      & scene%output%history_every = max(1, scene%relaxation%maximum_iterations/rows_wanted)
+    do i = 1, size(scene%initial)
+      associate (initial => scene%initial(i))
+        if (.not. is_set(initial%temperature_change) .and. initial%file == '') cycle
+        if (is_set(initial%ramp_time) .or. allocated(initial%times) .or. &
+          & allocated(initial%values)) cycle
+        initial%times = [0.0_wp, 1.0_wp]
+        initial%values = [1.0_wp, 1.0_wp]
+      end associate
+    end do
+  end subroutine fill_defaults
+
+  !> Whether rows of the history, where the user says nothing, are so few that they take little
+  !> time. Their number follows from the steps, which only the plan of a run knows.
+  pure logical function rows_by_cost(scene)
+    type(scene_type), intent(in) :: scene  !! checked, with its version of the defaults
+    rows_by_cost = .not. before_0_2(scene)
+  end function rows_by_cost
+
+  pure logical function before_0_2(scene)
+    type(scene_type), intent(in) :: scene
+    before_0_2 = scene%header%defaults == '0.1'
+  end function before_0_2
+
+end module pd_scene_content_defaults

@@ -1,0 +1,45 @@
+!> The group `&boundary`: imposed motion.
+module pd_scene_groups_boundary
+  use pd_base_kinds, only: wp
+  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_groups_course, only: sides, visit_course
+  use pd_scene_groups_group, only: group_type
+  implicit none (type, external)
+  private
+  public :: boundary_group
+
+  !> `&boundary`
+  type, extends(group_type) :: boundary_group
+    character(name_length) :: name = ''
+    character(name_length) :: body = ''          !! '' = all bodies together
+    character(name_length) :: side = ''          !! 'x_min' .. 'z_max': adds a layer
+    character(name_length) :: region = ''        !! existing points instead
+    real(wp) :: displacement(3) = unset          !! imposed, unset = free [m]
+    real(wp) :: velocity(3) = unset              !! imposed, unset = free [m/s]
+    real(wp) :: ramp_time = unset                !! [s]
+    real(wp), allocatable :: times(:)            !! [s]
+    real(wp), allocatable :: values(:)           !! factors at `times` [-]
+  contains
+    procedure :: visit
+  end type boundary_group
+
+contains
+
+  !> The keys of the group.
+  subroutine visit(group, keys)
+    class(boundary_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys         !! visitor: reads, describes or writes
+
+    call keys%key('name', group%name, 'with a name, the history has its reaction force', &
+      & word=.true.)
+    call keys%key('body', group%body, 'side: name of the body', default='all bodies together')
+    call keys%key('side', group%side, 'adds a layer as wide as the horizon outside this side', &
+      & allowed=sides)
+    call keys%key('region', group%region, 'name of a region, instead of side')
+    call keys%triple('displacement', group%displacement, 'm', 'imposed displacement', 'free')
+    call keys%triple('velocity', group%velocity, 'm/s', 'imposed velocity', 'free')
+    call visit_course(keys, group%ramp_time, group%times, group%values)
+  end subroutine visit
+
+end module pd_scene_groups_boundary

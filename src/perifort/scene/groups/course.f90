@@ -1,0 +1,32 @@
+!> The keys of a course in time, which temperature changes, boundaries and loads share.
+module pd_scene_groups_course
+  use pd_base_kinds, only: wp
+  use pd_scene_format_keys, only: keys_type
+  implicit none (type, external)
+  private
+  public :: visit_course, sides
+
+  !> Sides of a body.
+  character(5), parameter :: sides(6) = [character(5) :: 'x_min', 'x_max', 'y_min', 'y_max', &
+    & 'z_min', 'z_max']
+
+contains
+
+  !> The course in time of a temperature change, a boundary or a load.
+  subroutine visit_course(keys, ramp_time, times, values, subject)
+    type(keys_type), intent(inout) :: keys             !! visitor
+    real(wp), intent(inout) :: ramp_time               !! length of a ramp from 0 [s]
+    real(wp), allocatable, intent(inout) :: times(:)   !! of a table [s]
+    real(wp), allocatable, intent(inout) :: values(:)  !! factors at `times` [-]
+    character(*), intent(in), optional :: subject      !! what varies, if not all of the group
+    character(:), allocatable :: who
+
+    who = ''
+    if (present(subject)) who = subject
+    call keys%key('ramp_time', ramp_time, 's', who//'grows linearly from 0 during this time', &
+      & above=0.0_wp, default='at once; in relaxation 1, the end of the load steps')
+    call keys%list('times', times, 's', 'instead of ramp_time: increasing times')
+    call keys%list('values', values, '-', 'factors at these times, linear between them')
+  end subroutine visit_course
+
+end module pd_scene_groups_course

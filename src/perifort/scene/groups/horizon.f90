@@ -1,0 +1,50 @@
+!> The group `&horizon`: how far points interact, and how sums over families are corrected.
+module pd_scene_groups_horizon
+  use pd_base_kinds, only: wp
+  use pd_scene_format_given, only: is_set, name_length, unset
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_groups_group, only: group_type
+  implicit none (type, external)
+  private
+  public :: horizon_group
+
+  !> `&horizon`
+  type, extends(group_type) :: horizon_group
+    real(wp) :: ratio = 3.015_wp                           !! delta over the largest spacing [-]
+    real(wp) :: length = unset                             !! delta [m], instead of ratio
+    character(name_length) :: volume_correction = 'linear' !! 'linear_extended', 'exact', 'none'
+    character(name_length) :: surface_correction = 'energy'!! 'none'
+    character(name_length) :: dilatation = ''              !! 'unprojected': Lambda = 1;
+                                                           !! 'projected': as printed;
+                                                           !! '' = by &scene defaults
+    character(name_length) :: family = 'automatic'         !! 'lattice', 'list'
+  contains
+    procedure :: visit
+  end type horizon_group
+
+contains
+
+  !> The keys of the group.
+  subroutine visit(group, keys)
+    class(horizon_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys        !! visitor: reads, describes or writes
+
+    call keys%key('ratio', group%ratio, '-', 'horizon over the largest spacing', at_least=1.0_wp, &
+      & hidden=is_set(group%length))
+    call keys%key('length', group%length, 'm', 'horizon delta, instead of ratio', above=0.0_wp)
+    call keys%key('volume_correction', group%volume_correction, 'volumes of cells that the '// &
+      & 'horizon cuts (7.2)', allowed=[character(15) :: 'linear', 'linear_extended', 'exact', &
+      & 'none'])
+    call keys%key('surface_correction', group%surface_correction, 'correction of points with '// &
+      & 'incomplete families (7.7)', allowed=[character(6) :: 'energy', 'none'])
+    call keys%key('dilatation', group%dilatation, 'unprojected: Lambda = 1, whatever way parts '// &
+      & 'are turned; projected: Lambda as in the book, for small rotations (default of 0.1)', &
+      & allowed=[character(11) :: 'unprojected', 'projected'], &
+      & default="'unprojected'")
+    call keys%key('family', group%family, &
+      & 'how families are kept: a lattice where all points lie on grids, else lists; or one of '// &
+      & 'them by force', &
+      & allowed=[character(9) :: 'automatic', 'lattice', 'list'])
+  end subroutine visit
+
+end module pd_scene_groups_horizon

@@ -1,0 +1,43 @@
+!> The group `&load`: forces.
+module pd_scene_groups_load
+  use pd_base_kinds, only: wp
+  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_groups_course, only: sides, visit_course
+  use pd_scene_groups_group, only: group_type
+  implicit none (type, external)
+  private
+  public :: load_group
+
+  !> `&load`
+  type, extends(group_type) :: load_group
+    character(name_length) :: body = ''
+    character(name_length) :: side = ''
+    character(name_length) :: region = ''
+    real(wp) :: pressure = unset                 !! [Pa], positive pushes
+    real(wp) :: force(3) = unset                 !! total over the points: force_x, _y, _z [N]
+    real(wp) :: body_force(3) = unset            !! density: body_force_x, _y, _z [N/m3]
+    real(wp) :: ramp_time = unset                !! [s]
+    real(wp), allocatable :: times(:)            !! [s]
+    real(wp), allocatable :: values(:)           !! factors at `times` [-]
+  contains
+    procedure :: visit
+  end type load_group
+
+contains
+
+  !> The keys of the group.
+  subroutine visit(group, keys)
+    class(load_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
+
+    call keys%key('body', group%body, 'side: name of the body', default='the only body')
+    call keys%key('side', group%side, 'the outermost points at this side', allowed=sides)
+    call keys%key('region', group%region, 'name of a region, instead of side')
+    call keys%key('pressure', group%pressure, 'Pa', 'side: pressure, positive pushes')
+    call keys%triple('force', group%force, 'N', 'total force over the points', '0')
+    call keys%triple('body_force', group%body_force, 'N/m3', 'force density', '0')
+    call visit_course(keys, group%ramp_time, group%times, group%values)
+  end subroutine visit
+
+end module pd_scene_groups_load

@@ -1,0 +1,55 @@
+!> The group `&relaxation`: how static equilibrium is found.
+module pd_scene_groups_relaxation
+  use pd_base_kinds, only: wp
+  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_keys, only: keys_type
+  use pd_scene_groups_group, only: group_type, change_harmless, change_refused
+  implicit none (type, external)
+  private
+  public :: relaxation_group
+
+  !> `&relaxation`
+  type, extends(group_type) :: relaxation_group
+    character(name_length) :: solver = 'conjugate_gradient'      !! 'dynamic_relaxation'
+    character(name_length) :: density_matrix = 'frame_invariant' !! 'chapter', 'constant'
+    real(wp) :: safety = unset                   !! on the mass; 1, or 5 for 'chapter', 'constant'
+    real(wp) :: tolerance = 1.0e-6_wp            !! of residual force and of displacement change [-]
+    integer :: maximum_iterations = 100000       !! of each relaxation
+    integer :: load_steps = 1
+  contains
+    procedure :: visit
+    procedure, nopass :: change_of
+  end type relaxation_group
+
+contains
+
+  !> The keys of the group.
+  subroutine visit(group, keys)
+    class(relaxation_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys           !! visitor: reads, describes or writes
+
+    call keys%key('solver', group%solver, 'conjugate_gradient: Newton''s method with conjugate '// &
+      & 'gradients; dynamic_relaxation: adaptive, as in the book', &
+      & allowed=[character(18) :: 'conjugate_gradient', 'dynamic_relaxation'])
+    call keys%key('density_matrix', group%density_matrix, 'fictitious mass of dynamic '// &
+      & 'relaxation, scale of conjugate gradients; chapter = 7.32', &
+      & allowed=[character(15) :: 'frame_invariant', 'chapter', 'constant'])
+    call keys%key('safety', group%safety, '-', 'factor on the fictitious mass', above=0.0_wp, &
+      & default='1; 5 for chapter and constant')
+    call keys%key('tolerance', group%tolerance, '-', 'converged when residual force and '// &
+      & 'displacement change are below this', above=0.0_wp, below=1.0_wp)
+    call keys%key('maximum_iterations', group%maximum_iterations, '', 'most iterations of each '// &
+      & 'relaxation', at_least=1)
+    call keys%key('load_steps', group%load_steps, '', 'steps in which loads and imposed '// &
+      & 'displacements grow', at_least=1)
+  end subroutine visit
+
+  !> More iterations are the same iterations.
+  pure integer function change_of(key) result(change)
+    character(*), intent(in) :: key  !! its name, '' for the group as a whole
+
+    change = change_refused
+    if (key == 'maximum_iterations') change = change_harmless
+  end function change_of
+
+end module pd_scene_groups_relaxation

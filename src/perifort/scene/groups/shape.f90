@@ -1,0 +1,91 @@
+!> Shapes: the group `&remove`, and what `&region` and `&no_fail` add to it.
+module pd_scene_groups_shape
+  use pd_base_kinds, only: wp
+  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_keys, only: keys_type, mode_write
+  use pd_scene_groups_group, only: group_type
+  implicit none (type, external)
+  private
+  public :: shape_group, region_group, no_fail_group, shape_names
+
+  !> Kinds of shapes.
+  character(8), parameter :: shape_names(3) = [character(8) :: 'box', 'sphere', 'cylinder']
+  character(1), parameter :: axes(3) = ['x', 'y', 'z']
+
+  !> `&remove`
+  type, extends(group_type) :: shape_group
+    character(name_length) :: shape = ''         !! 'box', 'sphere', 'cylinder'
+    real(wp) :: lower(3) = unset                 !! box, cylinder's ends: unset = unbounded [m]
+    real(wp) :: upper(3) = unset                 !! [m]
+    real(wp) :: centre(3) = 0.0_wp               !! sphere, cylinder [m]
+    real(wp) :: radius = unset                   !! sphere, cylinder [m]
+    character(name_length) :: axis = 'z'         !! cylinder: 'x', 'y', 'z'
+  contains
+    procedure :: visit => visit_remove
+  end type shape_group
+
+  !> `&region`
+  type, extends(shape_group) :: region_group
+    character(name_length) :: name = ''
+  contains
+    procedure :: visit => visit_region
+  end type region_group
+
+  !> `&no_fail`
+  type, extends(shape_group) :: no_fail_group
+    character(name_length) :: region = ''        !! instead of a shape
+  contains
+    procedure :: visit => visit_no_fail
+  end type no_fail_group
+
+contains
+
+  !> The keys of `&remove`.
+  subroutine visit_remove(group, keys)
+    class(shape_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
+
+    call visit_shape(group, keys, required=.true.)
+  end subroutine visit_remove
+
+  !> The keys of `&region`.
+  subroutine visit_region(group, keys)
+    class(region_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys       !! visitor: reads, describes or writes
+
+    call keys%key('name', group%name, 'name used elsewhere', required=.true., word=.true.)
+    call visit_shape(group, keys, required=.true.)
+  end subroutine visit_region
+
+  !> The keys of `&no_fail`.
+  subroutine visit_no_fail(group, keys)
+    class(no_fail_group), intent(inout) :: group  !! its components are read or shown
+    type(keys_type), intent(inout) :: keys        !! visitor: reads, describes or writes
+
+    call keys%key('region', group%region, 'name of a region, instead of a shape')
+    call visit_shape(group, keys, required=.false.)
+  end subroutine visit_no_fail
+
+  !> The keys of a shape.
+  subroutine visit_shape(group, keys, required)
+    class(shape_group), intent(inout) :: group
+    type(keys_type), intent(inout) :: keys
+    logical, intent(in) :: required
+    logical :: plain
+
+    ! Written: only keys that the kind of shape has. Reading starts before the kind is known.
+    plain = keys%mode == mode_write .and. group%shape /= 'sphere' .and. group%shape /= 'cylinder'
+    call keys%key('shape', group%shape, 'kind of shape; in 2D a sphere is a circle', &
+      & required=required, allowed=shape_names)
+    call keys%key('lower', group%lower, 'm', 'box: lower corner; cylinder: its lower end along '// &
+      & 'the axis', default='unbounded')
+    call keys%key('upper', group%upper, 'm', 'box: upper corner; cylinder: its upper end along '// &
+      & 'the axis', default='unbounded')
+    call keys%key('centre', group%centre, 'm', 'sphere: centre; cylinder: a point of the axis', &
+      & hidden=plain)
+    call keys%key('radius', group%radius, 'm', 'sphere, cylinder: radius', above=0.0_wp)
+    call keys%key('axis', group%axis, 'cylinder: direction of the axis', allowed=axes, &
+      & hidden=keys%mode == mode_write .and. group%shape /= 'cylinder')
+  end subroutine visit_shape
+
+end module pd_scene_groups_shape
