@@ -1,4 +1,4 @@
-!> Layers: the rows of points that `&boundary side` adds outside a side (doc/theory.md, 10).
+!> Layers, the rows of points that `&boundary side` adds outside a side (doc/theory.md, 10).
 !>
 !> A layer continues the lattice of its body, column by column. Seen from the side, a column's layer
 !> starts outside the outermost cell that is left of it, if that cell lies within the horizon of the

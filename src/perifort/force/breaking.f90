@@ -48,8 +48,8 @@ contains
     class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
     type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
     real(wp), intent(in) :: u(:, :)       !! displacements (n_slots, dim) [m]
-    integer(i4), allocatable, intent(inout) :: slots(:)  !! in: where to look, ascending;
-                                                         !! out: those that lost a bond
+    integer(i4), allocatable, intent(inout) :: slots(:)  !! where to look, ascending;
+                                                         !! then those that lost a bond
     real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
     integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
     real(wp), intent(out) :: dissipated   !! energy lost at fixed u [J]

@@ -25,7 +25,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(body_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys     !! the visitor: reads, describes, writes
 
     call keys%key('name', group%name, 'name of the body', word=.true.)
     call keys%key('material', group%material, 'name of its material', default='the only material')

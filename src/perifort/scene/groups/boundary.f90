@@ -29,7 +29,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(boundary_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys         !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys         !! the visitor: reads, describes, writes
 
     call keys%key('name', group%name, 'with a name, the history has its reaction force', &
       & word=.true.)

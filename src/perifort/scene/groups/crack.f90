@@ -27,7 +27,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(crack_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
     call keys%key('from', group%from, 'm', '2D segment: one end')
     call keys%key('to', group%to, 'm', '2D segment: other end')

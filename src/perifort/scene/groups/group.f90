@@ -26,7 +26,7 @@ module pd_scene_groups_group
       import :: group_type, keys_type
       implicit none (type, external)
       class(group_type), intent(inout) :: group  !! its components are read or shown
-      type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
+      type(keys_type), intent(inout) :: keys     !! the visitor: reads, describes, writes
     end subroutine visit_interface
   end interface
 

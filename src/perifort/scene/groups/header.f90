@@ -32,7 +32,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(header_type), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
     call keys%key('title', group%title, 'what the scene shows')
     call keys%key('dimension', group%dimension, '', 'number of directions', required=.true., &

@@ -27,7 +27,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(horizon_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys        !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys        !! the visitor: reads, describes, writes
 
     call keys%key('ratio', group%ratio, '-', 'horizon over the largest spacing', at_least=1.0_wp, &
       & hidden=is_set(group%length))

@@ -30,7 +30,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(initial_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys        !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys        !! the visitor: reads, describes, writes
 
     call keys%key('region', group%region, 'name of a region', default='all points')
     call keys%triple('displacement', group%displacement, 'm', 'displacement', '0')

@@ -29,7 +29,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(load_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys     !! the visitor: reads, describes, writes
 
     call keys%key('body', group%body, 'side: name of the body', default='the only body')
     call keys%key('side', group%side, 'the outermost points at this side', allowed=sides)

@@ -29,7 +29,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(material_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys         !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys         !! the visitor: reads, describes, writes
 
     call keys%key('name', group%name, 'name of the material', word=.true.)
     call keys%key('model', group%model, 'law of the bonds; bond_based holds for one '// &

@@ -32,7 +32,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(output_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys       !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys       !! the visitor: reads, describes, writes
 
     call keys%key('every', group%every, '', 'steps (relaxation: load steps) between outputs', &
       & at_least=1, default='a tenth of the steps; relaxation: 1', hidden=group%every == 0)

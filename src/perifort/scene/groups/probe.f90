@@ -26,7 +26,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(probe_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
     call keys%key('name', group%name, 'start of its column names', required=.true., word=.true.)
     call keys%key('point', group%point, 'm', 'position; the nearest point is taken', &

@@ -26,7 +26,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(relaxation_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys           !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys           !! the visitor: reads, describes, writes
 
     call keys%key('solver', group%solver, 'conjugate_gradient: Newton''s method with conjugate '// &
       & 'gradients; dynamic_relaxation: adaptive, as in the book', &

@@ -43,7 +43,7 @@ contains
   !> The keys of `&remove`.
   subroutine visit_remove(group, keys)
     class(shape_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
     call visit_shape(group, keys, required=.true.)
   end subroutine visit_remove
@@ -51,7 +51,7 @@ contains
   !> The keys of `&region`.
   subroutine visit_region(group, keys)
     class(region_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys       !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys       !! the visitor: reads, describes, writes
 
     call keys%key('name', group%name, 'name used elsewhere', required=.true., word=.true.)
     call visit_shape(group, keys, required=.true.)
@@ -60,7 +60,7 @@ contains
   !> The keys of `&no_fail`.
   subroutine visit_no_fail(group, keys)
     class(no_fail_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys        !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys        !! the visitor: reads, describes, writes
 
     call keys%key('region', group%region, 'name of a region, instead of a shape')
     call visit_shape(group, keys, required=.false.)

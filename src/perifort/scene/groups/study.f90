@@ -30,7 +30,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(study_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys      !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
     call keys%key('vary', group%vary, 'the key that is varied: group%key, or key alone where '// &
       & 'it is the only one of its name; group(2)%key where a group is repeated, key(2) for an '// &

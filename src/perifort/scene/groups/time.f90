@@ -28,7 +28,7 @@ contains
   !> The keys of the group.
   subroutine visit(group, keys)
     class(time_group), intent(inout) :: group  !! its components are read or shown
-    type(keys_type), intent(inout) :: keys     !! visitor: reads, describes or writes
+    type(keys_type), intent(inout) :: keys     !! the visitor: reads, describes, writes
 
     call keys%key('method', group%method, 'explicit steps in time, or relaxation to '// &
       & 'static equilibrium', allowed=[character(10) :: 'explicit', 'relaxation'])

@@ -159,7 +159,8 @@ contains
     energy = shear*sum(strain**2) + lame*trace**2/2
   end function energy_of
 
-  !> Kirsch: a hole in an infinite plate under uniaxial stress S, by Kolosov's potentials
+  !> The solution of Kirsch: a hole in an infinite plate under uniaxial stress S, by Kolosov's
+  !> potentials
   !> phi = S/4 (z + 2 a^2/z), psi = -S/2 (z + a^2/z - a^4/z^3) with z = x + i y, x along the load:
   !> 2 mu (u + i v) = kappa phi - z conj(phi') - conj(psi); kappa = (3 - nu)/(1 + nu) holds for both
   !> planes with the moduli of the plane.
