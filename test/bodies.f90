@@ -3,7 +3,7 @@ module bodies
   use omp_lib, only: omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_error, only: fault_type => error_type
-  use pd_base_numbers, only: noise
+  use pd_base_reduce, only: noise
   use pd_body_body, only: body_type
   use pd_body_material, only: material_type, new_material
   use pd_set_up_prepare, only: set_up_type, prepare

@@ -328,8 +328,8 @@ contains
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
     allocate (strained(size(u, 1)), source=0_i1)
-    call internal_force(subject%family, subject%model, options_of(subject%model), u, p, force, &
-      & strained)
+    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), u, &
+      & p, force, strained)
   end subroutine fast_force
 
   !> A gradient with all components, also where the dimension has no use for them.

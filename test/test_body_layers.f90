@@ -4,7 +4,7 @@ module test_body_layers
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
   use pd_base_text, only: to_text
-  use pd_body_body, only: body_type, in_point_order
+  use pd_body_body, only: body_type, gather
   use pd_body_generate, only: generate_body
   use pd_body_layers, only: layer_count_type, layer_count_text
   use pd_set_up_prepare, only: set_up_type
@@ -538,7 +538,7 @@ contains
     close (unit, status='delete')
     if (allocated(error)) return
     allocate (v(54), source=0.0_wp)
-    call in_point_order(set_up%system%body, set_up%system%state%v(:, 2), v)
+    call gather(set_up%system%body, set_up%system%state%v(:, 2), v)
     call expect_true(error, all(abs(v - [(real(i, wp), i=1, 54)]) <= 0.0_wp), 'rows of a table')
   end subroutine test_state
 

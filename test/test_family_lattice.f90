@@ -3,7 +3,7 @@
 module test_family_lattice
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, i1, i2, i4, i8
-  use pd_body_body, only: body_type, grid_type, allocate_points, in_point_order, keep_points
+  use pd_body_body, only: body_type, grid_type, allocate_points, gather, keep_points
   use pd_body_material, only: material_type, new_material
   use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds, family_type
@@ -285,7 +285,7 @@ contains
       if (allocated(u)) deallocate (u)
       allocate (u(set_up%system%body%n_points, 2))
       do c = 1, 2
-        call in_point_order(set_up%system%body, set_up%system%state%u(:, c), u(:, c))
+        call gather(set_up%system%body, set_up%system%state%u(:, c), u(:, c))
       end do
       if (run == 1) first = u
     end do
@@ -466,9 +466,9 @@ contains
             & dissipated)
           call fast_force(subject, u, force, p)
           do c = 1, 3
-            call in_point_order(body, force(:, c), ordered(:, c))
+            call gather(body, force(:, c), ordered(:, c))
           end do
-          call in_point_order(body, damage, ordered(:, 4))
+          call gather(body, damage, ordered(:, 4))
           call expect_theory(error, subject, trim(kinds(kind))//' with broken bonds')
         end associate
         if (kind == 2) exit

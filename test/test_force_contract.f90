@@ -131,7 +131,8 @@ contains
         call reference_force(subject%family, cold, u, f_ref)
         options = options_of(subject%model)
         options%thermal = .false.
-        call internal_force(subject%family, subject%model, options, u, p, force, strained)
+        call internal_force(subject%body, subject%family, subject%model, options, u, p, force, &
+          & strained)
         call expect_close(error, force, f_ref, tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp) &
           & *max_abs(f_ref), 'force, '//name_of(subject, number))
         if (allocated(error)) return
@@ -549,8 +550,8 @@ contains
     real(wp), allocatable :: force(:, :), p(:)
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
-    call internal_force(subject%family, subject%model, options_of(subject%model), u, p, force, &
-      & strained, up_to_marks)
+    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), u, &
+      & p, force, strained, up_to_marks)
   end subroutine mark
 
   !> Pairs within the horizon whose stretch |y|/|xi| - 1 is beyond the smaller of the ends' limits,

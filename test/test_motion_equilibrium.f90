@@ -3,7 +3,7 @@
 module test_motion_equilibrium
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: fault_type => error_type, status_no_answer
-  use pd_base_numbers, only: noise
+  use pd_base_reduce, only: noise
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_static_relaxation, only: run_relaxation

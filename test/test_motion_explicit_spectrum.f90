@@ -4,7 +4,8 @@ module test_motion_explicit_spectrum
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_error, only: fault_type => error_type
-  use pd_base_numbers, only: noise, pi
+  use pd_base_numbers, only: pi
+  use pd_base_reduce, only: noise
   use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_motion_explicit_integrators, only: run_explicit

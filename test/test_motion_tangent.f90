@@ -255,9 +255,9 @@ contains
           call shake(set_up%system%body, no_gradient, 1.0_wp, 92, w)
           call apply_tangent(set_up%system, u, w, kw)
           if (precision == 1) then
-            expected = in_point_order(set_up%system, kw)
+            expected = gather(set_up%system, kw)
           else
-            call expect(error, max_abs(in_point_order(set_up%system, kw) - expected) &
+            call expect(error, max_abs(gather(set_up%system, kw) - expected) &
               & /max_abs(expected), 0.0_wp, 1.0e-6_wp, text_of(real(dim, wp))// &
               & ' dimensions, way '//text_of(real(way, wp)))
           end if
@@ -268,12 +268,12 @@ contains
 
   !> Values of slots, point by point: blocks in mixed precision are longer, and rows of slots with
   !> them.
-  pure function in_point_order(system, values) result(ordered)
+  pure function gather(system, values) result(ordered)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: values(:, :)
     real(wp), allocatable :: ordered(:)
 
     ordered = reshape(values(system%body%slot, :), [system%body%n_points*size(values, 2)])
-  end function in_point_order
+  end function gather
 
 end module test_motion_tangent

@@ -3,13 +3,17 @@
 !> A point's place in the arrays is its slot. A body is made in point order (slot = point); the
 !> family then arranges it: a list family sorts the points, a lattice family also adds dead slots
 !> (padding and cells cut out), which have no volume and no bonds. Results are written in point
-!> order.
+!> order. `gather` and `scatter` translate between the two.
+!>
+!> A process owns a range of its points; the others, its halo, are copies of what other processes
+!> own. One process alone owns all.
 module pd_body_body
-  use pd_base_kinds, only: wp, i2, i4
+  use pd_base_kinds, only: wp, i2, i4, i8
+  use pd_base_reduce, only: number_points, order_type, owns
   implicit none (type, external)
   private
   public :: body_type, grid_type, allocate_points, append_points, keep_points, arrange, &
-    & in_point_order
+    & gather, scatter, own_points, owned, share_halo
 
   !> A uniform grid: points at origin + (i - 1/2) spacing, i integer.
   type :: grid_type
@@ -30,17 +34,30 @@ module pd_body_body
     integer(i2), allocatable :: grid(:)     !! number of its grid, 0 in a cloud
     integer(i4), allocatable :: point(:)    !! the slot's point, 0 if dead
     integer(i4), allocatable :: slot(:)     !! the point's slot (n_points)
+    integer :: first_owned = 1              !! points that the process owns
+    integer :: last_owned = 0
+    type(order_type) :: order               !! where the owned points are, for sums over them
     type(grid_type), allocatable :: grids(:)
   end type body_type
 
+  interface take
+    module procedure :: take_real, take_small
+  end interface take
+
+  !> Values, or vectors, of slots in the order of the points that the process owns.
   interface gather
-    module procedure :: gather_real, gather_small
+    module procedure :: gather_reals, gather_vectors, gather_small, gather_logicals
   end interface gather
 
-  !> Values (or vectors) of slots in the order of points.
-  interface in_point_order
-    module procedure :: reals_in_point_order, integers_in_point_order
-  end interface in_point_order
+  !> Values of the points that the process owns into their slots; other slots stay as they are.
+  interface scatter
+    module procedure :: scatter_reals, scatter_vectors
+  end interface scatter
+
+  !> Copy values of points that other processes own from there.
+  interface share_halo
+    module procedure :: share_scalars, share_vectors
+  end interface share_halo
 
 contains
 
@@ -59,6 +76,7 @@ contains
     body%point = [(int(k, i4), k=1, n)]
     body%slot = body%point
     allocate (body%grids(0))
+    call own_all(body)
   end subroutine allocate_points
 
   !> Put the points of `more` behind those of `body`; both in point order, grids are those of
@@ -84,6 +102,7 @@ contains
     body%n_slots = body%n_points
     body%point = [(int(k, i4), k=1, body%n_points)]
     body%slot = body%point
+    call own_all(body)
   end subroutine append_points
 
   !> Drop the points where `keep` is false; the body is in point order before and after.
@@ -98,6 +117,7 @@ contains
     call gather_all(body, kept)
     body%point = [(int(k, i4), k=1, body%n_points)]
     body%slot = body%point
+    call own_all(body)
   end subroutine keep_points
 
   !> Move every point into its slot. `point(slot)` is 0 for dead slots.
@@ -106,6 +126,7 @@ contains
                                             !! return
     integer(i4), intent(in) :: point(:)     !! (n_slots), the point that each slot takes; 0: a dead
                                             !! slot
+    integer(i8) :: before, n_global
     integer :: s
 
     call gather_all(body, point)
@@ -115,7 +136,35 @@ contains
     end do
     ! a dead slot needs a valid material, so that loops over rows need no test
     where (point == 0) body%material = 1_i2
+    before = body%order%before
+    n_global = body%order%n_global
+    call number_points(body%slot, body%order, body%first_owned, body%last_owned, before, n_global)
   end subroutine arrange
+
+  !> The process owns all points.
+  pure subroutine own_all(body)
+    type(body_type), intent(inout) :: body
+    call own_points(body, 1, body%n_points, 0_i8, int(body%n_points, i8))
+  end subroutine own_all
+
+  !> Note which points the process owns.
+  pure subroutine own_points(body, first, last, before, n_global)
+    type(body_type), intent(inout) :: body  !! in point order or arranged in slots
+    integer, intent(in) :: first, last     !! the first and the last one, by their numbers here
+    integer(i8), intent(in) :: before      !! added to these it is that among all points
+    integer(i8), intent(in) :: n_global    !! points of all processes
+
+    body%first_owned = first
+    body%last_owned = last
+    call number_points(body%slot, body%order, first, last, before, n_global)
+  end subroutine own_points
+
+  !> Whether the process owns the point of a slot; no process owns dead slots.
+  elemental logical function owned(body, slot)
+    type(body_type), intent(in) :: body  !! with its owned points
+    integer, intent(in) :: slot          !! 1 to n_slots
+    owned = owns(body%order, body%point(slot))
+  end function owned
 
   !> Take the values of `from(i)` to place i; 0 gives zeros.
   pure subroutine gather_all(body, from)
@@ -132,15 +181,15 @@ contains
       end do
     end do
     call move_alloc(x, body%x)
-    call gather(body%volume, from)
-    call gather(body%spacing, from)
-    call gather(body%body, from)
-    call gather(body%material, from)
-    call gather(body%layer, from)
-    call gather(body%grid, from)
+    call take(body%volume, from)
+    call take(body%spacing, from)
+    call take(body%body, from)
+    call take(body%material, from)
+    call take(body%layer, from)
+    call take(body%grid, from)
   end subroutine gather_all
 
-  pure subroutine gather_real(values, from)
+  pure subroutine take_real(values, from)
     real(wp), allocatable, intent(inout) :: values(:)
     integer(i4), intent(in) :: from(:)
     real(wp), allocatable :: gathered(:)
@@ -151,9 +200,9 @@ contains
       if (from(i) > 0) gathered(i) = values(from(i))
     end do
     call move_alloc(gathered, values)
-  end subroutine gather_real
+  end subroutine take_real
 
-  pure subroutine gather_small(values, from)
+  pure subroutine take_small(values, from)
     integer(i2), allocatable, intent(inout) :: values(:)
     integer(i4), intent(in) :: from(:)
     integer(i2), allocatable :: gathered(:)
@@ -164,30 +213,94 @@ contains
       if (from(i) > 0) gathered(i) = values(from(i))
     end do
     call move_alloc(gathered, values)
+  end subroutine take_small
+
+  pure subroutine gather_reals(body, of_slots, of_points)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: of_slots(:)       !! (n_slots)
+    real(wp), intent(inout) :: of_points(:)   !! (owned points)
+    integer :: i
+
+    do i = body%first_owned, body%last_owned
+      of_points(i - body%first_owned + 1) = of_slots(body%slot(i))
+    end do
+  end subroutine gather_reals
+
+  pure subroutine gather_vectors(body, of_slots, of_points)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: of_slots(:, :)       !! (n_slots, components)
+    real(wp), intent(inout) :: of_points(:, :)   !! (owned points, as many or more)
+    integer :: i, c
+
+    do c = 1, size(of_slots, 2)
+      do i = body%first_owned, body%last_owned
+        of_points(i - body%first_owned + 1, c) = of_slots(body%slot(i), c)
+      end do
+    end do
+  end subroutine gather_vectors
+
+  pure subroutine gather_small(body, of_slots, of_points)
+    type(body_type), intent(in) :: body
+    integer(i2), intent(in) :: of_slots(:)       !! (n_slots)
+    integer(i4), intent(inout) :: of_points(:)   !! (owned points)
+    integer :: i
+
+    do i = body%first_owned, body%last_owned
+      of_points(i - body%first_owned + 1) = int(of_slots(body%slot(i)), i4)
+    end do
   end subroutine gather_small
 
-  !> Real numbers of slots in the order of points.
-  pure subroutine reals_in_point_order(body, values, ordered)
-    type(body_type), intent(in) :: body    !! gives the slot of each point
-    real(wp), intent(in) :: values(:)      !! (n_slots), in the order of slots
-    real(wp), intent(inout) :: ordered(:)  !! (n_points), in the order of points on return
+  pure subroutine gather_logicals(body, of_slots, of_points)
+    type(body_type), intent(in) :: body
+    logical, intent(in) :: of_slots(:)       !! (n_slots)
+    logical, intent(inout) :: of_points(:)   !! (owned points)
     integer :: i
 
-    do i = 1, body%n_points
-      ordered(i) = values(body%slot(i))
+    do i = body%first_owned, body%last_owned
+      of_points(i - body%first_owned + 1) = of_slots(body%slot(i))
     end do
-  end subroutine reals_in_point_order
+  end subroutine gather_logicals
 
-  !> Short integers of slots in the order of points.
-  pure subroutine integers_in_point_order(body, values, ordered)
-    type(body_type), intent(in) :: body       !! gives the slot of each point
-    integer(i2), intent(in) :: values(:)      !! (n_slots), in the order of slots
-    integer(i4), intent(inout) :: ordered(:)  !! (n_points), in the order of points on return
+  pure subroutine scatter_reals(body, of_points, of_slots)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: of_points(:)      !! (owned points)
+    real(wp), intent(inout) :: of_slots(:)    !! (n_slots)
     integer :: i
 
-    do i = 1, body%n_points
-      ordered(i) = int(values(body%slot(i)), i4)
+    do i = body%first_owned, body%last_owned
+      of_slots(body%slot(i)) = of_points(i - body%first_owned + 1)
     end do
-  end subroutine integers_in_point_order
+  end subroutine scatter_reals
+
+  pure subroutine scatter_vectors(body, of_points, of_slots)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: of_points(:, :)      !! (owned points, components)
+    real(wp), intent(inout) :: of_slots(:, :)    !! (n_slots, components)
+    integer :: i, c
+
+    do c = 1, size(of_points, 2)
+      do i = body%first_owned, body%last_owned
+        of_slots(body%slot(i), c) = of_points(i - body%first_owned + 1, c)
+      end do
+    end do
+  end subroutine scatter_vectors
+
+  subroutine share_scalars(body, values)
+    type(body_type), intent(in) :: body
+    real(wp), intent(inout) :: values(:)      !! (n_slots)
+    real(wp), allocatable :: vectors(:, :)
+
+    if (.not. associated(body%order%ranks)) return
+    allocate (vectors(size(values), 1))
+    vectors(:, 1) = values
+    call body%order%ranks%share(vectors)
+    values = vectors(:, 1)
+  end subroutine share_scalars
+
+  subroutine share_vectors(body, values)
+    type(body_type), intent(in) :: body
+    real(wp), intent(inout) :: values(:, :)   !! (n_slots, components)
+    if (associated(body%order%ranks)) call body%order%ranks%share(values)
+  end subroutine share_vectors
 
 end module pd_body_body

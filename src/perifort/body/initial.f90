@@ -7,7 +7,7 @@ module pd_body_initial
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, scatter
   use pd_body_generate, only: touch
   use pd_body_shapes, only: inside
   implicit none (type, external)
@@ -104,12 +104,12 @@ contains
       which = findloc(known == table%names(column), .true., dim=1)
       select case (which)
       case (1:3)
-        u(body%slot, which) = table%values(column, :)
+        call scatter(body, table%values(column, :), u(:, which))
       case (4:6)
-        v(body%slot, which - 3) = table%values(column, :)
+        call scatter(body, table%values(column, :), v(:, which - 3))
       case default  ! the last of the known names
-        temperature_change(body%slot) = table%values(column, :)
-        heated_by(body%slot) = int(number, i2)
+        call scatter(body, table%values(column, :), temperature_change)
+        where (body%point > 0) heated_by = int(number, i2)
       end select
     end do
   end subroutine state_from_file

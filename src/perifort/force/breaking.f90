@@ -2,6 +2,8 @@
 !> decided here, by one formula that gives both ends of a bond the same bits.
 module pd_force_breaking
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_reduce, only: add_point, ascending_order, count_of_ranks, new_running, owns, &
+    & running_type, total_of_running
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
@@ -57,7 +59,9 @@ contains
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:)
-    integer, allocatable :: number(:), first(:)
+    integer, allocatable :: number(:), first(:), order(:)
+    type(running_type) :: running
+    real(wp) :: totals(6)
     logical :: breaks
     integer :: g, m, k, i, sets
 
@@ -90,9 +94,17 @@ contains
       end do
     end do
     !$omp end parallel
-    broken = sum(int(number, i8))/2_i8
-    dissipated = sum(lost(:, 0))
-    if (present(products)) products = sum(lost(:, 1:), 1)
+    broken = count_of_ranks(body%order, sum(int(number, i8), mask=owns(body%order, &
+      & body%point(slots))))/2_i8
+    order = ascending_order(body%point(slots))
+    call new_running(body%order, running)
+    do i = 1, size(order)
+      m = order(i)
+      call add_point(body%order, body%point(slots(m)), lost(m, :), running)
+    end do
+    totals = total_of_running(body%order, running)
+    dissipated = totals(1)
+    if (present(products)) products = totals(2:sets + 1)
     slots = pack(slots, number > 0)
   end subroutine break_bonds
 

@@ -3,6 +3,7 @@
 module pd_force_forces
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1
+  use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
   use pd_family_lattice, only: lattice_family_type
@@ -22,8 +23,11 @@ module pd_force_forces
 contains
 
   !> Internal force density of all slots at displacements `u`: the dilatation of all points first,
-  !> if the forces have one, then the forces. Whoever needs internal forces calls this.
-  subroutine internal_force(family, model, options, u, p, force, strained, part)
+  !> if the forces have one, then the forces. Whoever needs internal forces calls this. Values at
+  !> points that other processes own come from there: dilatation and forces here, displacements from
+  !> whoever calls.
+  subroutine internal_force(body, family, model, options, u, p, force, strained, part)
+    type(body_type), intent(in) :: body                 !! what the process owns of it
     class(family_type), intent(inout) :: family         !! its loops keep their room there
     type(model_type), intent(in) :: model               !! parameters of the slots
     type(force_options_type), intent(in) :: options     !! what the forces take in
@@ -41,10 +45,12 @@ contains
     if (present(part)) now = part
     if (options%dilatation) then
       if (now /= after_marks) call dilatation_pass(family, model, options, u, p, strained)
+      if (now /= up_to_marks) call share_halo(body, p)
       if (now /= up_to_marks) call force_pass(family, model, options, u, p, force, strained)
     else if (now /= after_marks) then
       call force_pass(family, model, options, u, p, force, strained)
     end if
+    if (now /= up_to_marks) call share_halo(body, force)
   end subroutine internal_force
 
   !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds

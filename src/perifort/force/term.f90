@@ -13,7 +13,7 @@ module pd_force_term
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
-  use pd_base_numbers, only: inner
+  use pd_base_reduce, only: inner
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_material, only: material_type
@@ -294,7 +294,7 @@ contains
     if (self%inside == 0) return
     allocate (density(view%body%n_slots), source=0.0_wp)
     call self%add_energy(view, density)
-    energy = inner(density, view%body%volume)
+    energy = inner(view%body%order, density, view%body%volume)
   end function energy
 
   !> Bounds of all terms, external ones included: they act on the motion as well.
@@ -386,11 +386,11 @@ contains
         if (.not. item%term%external) then
           density = 0.0_wp
           call item%term%add_energy(view, density)
-          stored = inner(density, view%body%volume)
+          stored = inner(view%body%order, density, view%body%volume)
         end if
         if (allocated(item%last_u)) then
           density = sum((item%last_force + force)/2*(view%u - item%last_u), 2)
-          work = inner(density, view%body%volume)
+          work = inner(view%body%order, density, view%body%volume)
           if (item%term%external) then
             supplied = supplied + work
           else

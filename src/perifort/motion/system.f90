@@ -2,11 +2,11 @@
 !> brings the forces up to date. Integrators and relaxation work on this type alone.
 module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_numbers, only: inner
-  use pd_body_body, only: body_type
+  use pd_base_reduce, only: add_point, inner, new_running, running_type, total_of_running
+  use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
-  use pd_force_forces, only: internal_force, energy_pass, up_to_marks, after_marks
+  use pd_force_forces, only: internal_force, energy_pass, whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of
   use pd_force_reference, only: point_dilatation, point_force
   use pd_force_term, only: term_list_type, term_view_type
@@ -161,6 +161,7 @@ contains
     late = breaking .and. system%model%breaking .and. system%break_late
     if (late) call settle_account(system)
     call impose(system%motions, t, system%state%u, system%state%v)
+    if (system%model%breaking) call share_halo(system%body, system%state%v)
     call bring_temperature(system, t)
     if (early) then
       call renew_forces(system, t, up_to_marks)
@@ -187,18 +188,20 @@ contains
     real(wp), intent(in) :: t  !! [s]
     integer, intent(in), optional :: part  !! `whole`, `up_to_marks` or `after_marks`
     type(term_view_type) :: view
+    integer :: now
 
     system%time = t
+    now = whole
+    if (present(part)) now = part
+    if (now /= after_marks) call share_halo(system%body, system%state%u)
     associate (state => system%state)
-      call internal_force(system%family, system%model, options_of(system%model), state%u, state%p, &
-        & state%force, system%strained, part)
+      call internal_force(system%body, system%family, system%model, options_of(system%model), &
+        & state%u, state%p, state%force, system%strained, now)
     end associate
-    if (system%terms%inside == 0) return
-    if (present(part)) then
-      if (part == up_to_marks) return
-    end if
+    if (system%terms%inside == 0 .or. now == up_to_marks) return
     call view_of(system, t, view)
     call system%terms%add_force(view, system%state%force)
+    call share_halo(system%body, system%state%force)
   end subroutine renew_forces
 
   !> Bring the thermal strains to time `t`.
@@ -234,7 +237,7 @@ contains
     integer(i8) :: broken
 
     call strained_slots(system%strained, slots)
-    if (size(slots) == 0) return
+    if (size(slots) == 0 .and. .not. associated(system%body%order%ranks)) return
     if (abs(pairing%offset) > 0.0_wp .or. abs(pairing%held) > 0.0_wp) then
       call displacements_at(system, t, pairing, slots, others)
       allocate (products(size(others, 3)))
@@ -426,7 +429,8 @@ contains
     real(wp), intent(in) :: t                 !! time of the displacements [s]
     logical, intent(in), optional :: at_rest  !! nothing is accelerated; false by default
     real(wp), allocatable :: applied(:, :)
-    real(wp) :: force, acceleration, mass
+    type(running_type) :: running
+    real(wp) :: force, acceleration, mass, work, totals(6)
     logical :: first, moving
     type(load_type), pointer :: load
     type(term_view_type) :: view
@@ -450,6 +454,7 @@ contains
           acceleration = 0.0_wp
           if (moving .and. motion%kind(c) == moved_by_velocity) &
             & acceleration = motion%amplitude(c)*motion%curve%slope(t)
+          call new_running(system%body%order, running)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)
@@ -458,21 +463,31 @@ contains
             force = system%state%force(k, c)
             if (allocated(applied)) force = force + applied(k, c)
             force = -force*system%body%volume(k)
-            motion%reaction(c) = motion%reaction(c) + mass*acceleration + force
-            call add_work(system, n, first, system%state%u(k, c), force, mass, system%state%v(k, c))
+            call add_work(system, n, first, work, system%state%u(k, c), force, mass, &
+              & system%state%v(k, c))
+            call add_point(system%body%order, system%body%point(k), &
+              & [mass*acceleration + force, work], running)
           end do
+          totals = total_of_running(system%body%order, running)
+          motion%reaction(c) = totals(1)
+          system%external_work = system%external_work + totals(2)
         end do
       end associate
     end do
     do l = 1, number_of_loads(system%terms)
       load => load_of(system%terms, l)
       do c = 1, system%body%dim
-        if (all(abs(load%density(:, c)) <= 0.0_wp)) cycle
+        if (all(abs(load%density(:, c)) <= 0.0_wp) .and. &
+          & .not. associated(system%body%order%ranks)) cycle
+        call new_running(system%body%order, running)
         do i = 1, size(load%slots)
           k = load%slots(i)
-          call add_work(system, n, first, system%state%u(k, c), &
+          call add_work(system, n, first, work, system%state%u(k, c), &
             & load%density(i, c)*load%curve%value(t)*system%body%volume(k))
+          call add_point(system%body%order, system%body%point(k), [work], running)
         end do
+        totals = total_of_running(system%body%order, running)
+        system%external_work = system%external_work + totals(1)
       end do
     end do
     if (system%terms%number() == number_of_loads(system%terms)) return
@@ -529,7 +544,7 @@ contains
 
     allocate (density(system%body%n_slots))
     call energy_pass(system%family, system%model, system%state%u, density)
-    energy = inner(density, system%body%volume)
+    energy = inner(system%body%order, density, system%body%volume)
   end function strain_energy
 
   !> What the terms of the force store at the present displacements [J].
@@ -541,23 +556,23 @@ contains
     energy = system%terms%energy(view)
   end function stored_energy
 
-  !> One component's share of the work since its last force and place; `n` counts the components.
-  !> With `mass` and the imposed velocity `v` its gain in kinetic energy comes on top.
-  pure subroutine add_work(system, n, first, u, force, mass, v)
+  !> One component's `work` since its last force and place; `n` counts the components. With `mass`
+  !> and the imposed velocity `v` its gain in kinetic energy comes on top.
+  pure subroutine add_work(system, n, first, work, u, force, mass, v)
     type(system_type), intent(inout) :: system
     integer, intent(inout) :: n
     logical, intent(in) :: first
+    real(wp), intent(out) :: work
     real(wp), intent(in) :: u, force
     real(wp), intent(in), optional :: mass, v
 
     n = n + 1
-    if (.not. first) system%external_work = system%external_work &
-      & + (system%last_force(n) + force)/2*(u - system%last_u(n))
+    work = 0.0_wp
+    if (.not. first) work = (system%last_force(n) + force)/2*(u - system%last_u(n))
     system%last_u(n) = u
     system%last_force(n) = force
     if (.not. present(v)) return
-    if (.not. first) system%external_work = system%external_work &
-      & + mass/2*(v - system%last_v(n))*(v + system%last_v(n))
+    if (.not. first) work = work + mass/2*(v - system%last_v(n))*(v + system%last_v(n))
     system%last_v(n) = v
   end subroutine add_work
 
@@ -625,7 +640,7 @@ contains
         density(k) = density(k) + v(k, c)**2
       end do
     end do
-    energies%kinetic = inner(mass, density)/2
+    energies%kinetic = inner(system%body%order, mass, density)/2
   end subroutine energies_of
 
 end module pd_motion_system

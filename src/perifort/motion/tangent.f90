@@ -3,6 +3,8 @@
 module pd_motion_tangent
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: largest_over, largest_of_ranks, least_over
+  use pd_body_body, only: share_halo
   use pd_force_forces, only: internal_force
   use pd_force_model, only: force_options_type, model_type, options_of
   use pd_motion_system, only: system_type
@@ -55,16 +57,17 @@ contains
     real(wp), allocatable :: moved(:, :)
     real(wp) :: length, strain, spacing
 
-    length = largest(w)
+    length = largest_over(system%body%order, w)
     if (.not. length > 0.0_wp) then
       kw = 0.0_wp
       return
     end if
     tangent%options = options_of(system%model)
     if (present(options)) tangent%options = options
-    spacing = minval(system%body%spacing, mask=system%body%point > 0)
-    strain = largest(u)/spacing
-    if (tangent%options%thermal) strain = strain + maxval(abs(system%model%expansion))
+    spacing = least_over(system%body%order, system%body%spacing)
+    strain = largest_over(system%body%order, u)/spacing
+    if (tangent%options%thermal) strain = strain &
+      & + largest_of_ranks(system%body%order, maxval(abs(system%model%expansion)))
     if (.not. strain > 0.0_wp) then
       tangent%difference = at_rest
       tangent%step = undeformed_step*spacing/length
@@ -142,6 +145,24 @@ contains
       !! (n_slots, dim) set for all slots, terms not included [N/m3]
     type(force_options_type), intent(in), optional :: options  !! the model's own by default
     type(model_type), intent(in), optional :: model            !! the system's by default
+    real(wp), allocatable :: shared(:, :)
+
+    if (associated(system%body%order%ranks)) then
+      shared = u
+      call share_halo(system%body, shared)
+      call own_forces_at(system, shared, force, options, model)
+    else
+      call own_forces_at(system, u, force, options, model)
+    end if
+  end subroutine forces_at
+
+  !> The same where displacements of points that other processes own are known.
+  subroutine own_forces_at(system, u, force, options, model)
+    type(system_type), intent(inout) :: system
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), intent(inout), contiguous :: force(:, :)
+    type(force_options_type), intent(in), optional :: options
+    type(model_type), intent(in), optional :: model
     type(force_options_type) :: taken
     real(wp), allocatable :: p(:)
     integer(i1), allocatable :: strained(:)
@@ -154,11 +175,12 @@ contains
     end associate
     force = 0.0_wp  ! the passes leave out slots far from any point
     if (present(model)) then
-      call internal_force(system%family, model, taken, u, p, force, strained)
+      call internal_force(system%body, system%family, model, taken, u, p, force, strained)
     else
-      call internal_force(system%family, system%model, taken, u, p, force, strained)
+      call internal_force(system%body, system%family, system%model, taken, u, p, force, &
+        & strained)
     end if
-  end subroutine forces_at
+  end subroutine own_forces_at
 
   !> `moved` = `u` + `step` `w`.
   subroutine displace(u, step, w, moved)
@@ -220,20 +242,5 @@ contains
       end do
     end do
   end subroutine one_sided_difference
-
-  !> The largest size of a component.
-  real(wp) function largest(values)
-    real(wp), intent(in), contiguous :: values(:, :)
-    integer :: k, c
-
-    largest = 0.0_wp
-    do c = 1, size(values, 2)
-      !$omp parallel do simd schedule(static) default(none) shared(values, c) private(k) &
-      !$omp reduction(max:largest)
-      do k = 1, size(values, 1)
-        largest = max(largest, abs(values(k, c)))
-      end do
-    end do
-  end function largest
 
 end module pd_motion_tangent

@@ -2,6 +2,7 @@
 module pd_set_up_conditions
   use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type
+  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, load_group, is_set
   use pd_body_body, only: body_type
@@ -90,7 +91,7 @@ contains
         do c = 1, body%dim
           if (is_set(group%body_force(c))) load%density(:, c) = group%body_force(c)
           if (is_set(group%force(c))) load%density(:, c) = load%density(:, c) &
-            & + group%force(c)/sum(body%volume(load%slots))
+            & + group%force(c)/volume_of(body, load%slots)
         end do
         if (is_set(group%pressure)) then
           axis = index('xyz', group%side(1:1))
@@ -102,6 +103,22 @@ contains
       end associate
     end do
   end subroutine loads_of_scene
+
+  !> The volume of points, whose slots stand in the order of the points [m3].
+  real(wp) function volume_of(body, slots) result(volume)
+    type(body_type), intent(in) :: body
+    integer(i4), intent(in) :: slots(:)
+    type(running_type) :: running
+    real(wp) :: totals(6)
+    integer :: i
+
+    call new_running(body%order, running)
+    do i = 1, size(slots)
+      call add_point(body%order, body%point(slots(i)), [body%volume(slots(i))], running)
+    end do
+    totals = total_of_running(body%order, running)
+    volume = totals(1)
+  end function volume_of
 
   !> Courses of the temperature changes of every `&initial`.
   subroutine heating_of_scene(scene, heated_by, expansion, heating)

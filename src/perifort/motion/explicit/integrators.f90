@@ -5,6 +5,8 @@
 !> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
 module pd_motion_explicit_integrators
   use pd_base_kinds, only: wp
+  use pd_base_reduce, only: add_block, block_points, largest_of_ranks, new_sums, slots_of_block, &
+    & sum_of_ranks, sum_over, sums_type, total_of
   use pd_base_error, only: error_type, fail, internal_fault, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
@@ -51,7 +53,7 @@ contains
     if (seen == not_begun) call begin_memory(system, integrator)
     system%watch = watch_type()
     system%watch%rounding = maxval(system%model%materials%youngs_modulus)*smallest_strain**2 &
-      & *sum(system%body%volume)
+      & *sum_over(system%body%order, system%body%volume)
     system%watch%heaviest = heaviest_point(system)
     call allocate_start(system, integrator, start)
     bound = huge(bound)
@@ -112,37 +114,37 @@ contains
       & call keep_good(good, system, instant, system%watch%most_of_good())
   end subroutine look
 
-  !> Kinetic energy of the velocities as the integrator keeps them [J], for the watch only: its
-  !> rounding depends on the number of threads.
+  !> Kinetic energy of the velocities as the integrator keeps them [J].
   real(wp) function kinetic_energy(system) result(kinetic)
     type(system_type), intent(in) :: system
-    real(wp) :: part(size(system%model%materials))
-    integer :: k, c, m
+    type(sums_type) :: parts
+    real(wp) :: terms(block_points, 1), totals(1)
+    integer :: block, i, k, c, at, n, slots(block_points)
 
-    part = 0.0_wp
-    do c = 1, system%body%dim
-      if (size(part) == 1) then
-        kinetic = 0.0_wp
-        !$omp parallel do simd schedule(static) default(none) shared(system, c) private(k) &
-        !$omp reduction(+:kinetic)
-        do k = 1, system%body%n_slots
-          kinetic = kinetic + system%body%volume(k)*system%state%v(k, c)**2
+    call new_sums(system%body%order, 1, parts)
+    !$omp parallel do schedule(static) default(none) shared(system, parts) &
+    !$omp private(block, i, k, c, at, n, slots, terms)
+    do block = 1, system%body%order%blocks
+      call slots_of_block(system%body%order, block, at, n, slots)
+      terms = 0.0_wp
+      do c = 1, system%body%dim
+        do i = 1, n
+          k = slots(i)
+          terms(at + i - 1, 1) = terms(at + i - 1, 1) + system%state%v(k, c)**2
         end do
-        part(1) = part(1) + kinetic
-      else
-        !$omp parallel do schedule(static) default(none) shared(system, c) private(k, m) &
-        !$omp reduction(+:part)
-        do k = 1, system%body%n_slots
-          m = system%model%material(k)
-          part(m) = part(m) + system%body%volume(k)*system%state%v(k, c)**2
-        end do
-      end if
+      end do
+      do i = 1, n
+        terms(at + i - 1, 1) = terms(at + i - 1, 1)*system%body%volume(slots(i)) &
+          & /inverse_density(system%model, slots(i))
+      end do
+      call add_block(system%body%order, block, terms, parts)
     end do
-    kinetic = sum(part*system%model%materials%density)/2
+    totals = total_of(system%body%order, parts)
+    kinetic = totals(1)/2
   end function kinetic_energy
 
   !> The greatest mass of a point [kg].
-  pure real(wp) function heaviest_point(system) result(mass)
+  real(wp) function heaviest_point(system) result(mass)
     type(system_type), intent(in) :: system
     integer :: k
 
@@ -151,6 +153,7 @@ contains
       if (system%body%point(k) > 0) &
         & mass = max(mass, system%body%volume(k)/inverse_density(system%model, k))
     end do
+    mass = largest_of_ranks(system%body%order, mass)
   end function heaviest_point
 
   !> Whether the integrator's velocities belong to the middle of the steps.
@@ -293,6 +296,8 @@ contains
         largest_sum = max(largest_sum, sum_of_block)
       end do
     end do
+    squares = sum_of_ranks(system%body%order, squares)
+    largest_sum = largest_of_ranks(system%body%order, largest_sum)
     sound = stays_within(system, system%state%v, dt, squares, largest_sum)
   end subroutine leap
 

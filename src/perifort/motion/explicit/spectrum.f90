@@ -8,8 +8,10 @@
 !> 341).
 module pd_motion_explicit_spectrum
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i1, i2, i4
-  use pd_base_numbers, only: inner, noise, pi
+  use pd_base_kinds, only: wp, i1, i2, i4, i8
+  use pd_base_numbers, only: pi
+  use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, noise_after
+  use pd_body_body, only: owned
   use pd_body_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_lattice, only: lattice_family_type
@@ -79,7 +81,7 @@ contains
     allocate (diagonal(most_evaluations), beside(most_evaluations))
     before = 0.0_wp
     call random_start(system, scale(:, :, 1), now)
-    length = length_of(now)
+    length = length_of(system, now)
     do m = 1, most_evaluations
       call recur(system, taken, system%state%u, scale, length, now, before, w, kw, diagonal(m), &
         & beside(m), model)
@@ -122,6 +124,9 @@ contains
       associate (m => system%model%material(k))
         largest(m) = max(largest(m), share(k))
       end associate
+    end do
+    do k = 1, size(largest)
+      largest(k) = largest_of_ranks(system%body%order, largest(k))
     end do
     beta = maxval(largest)
     options = options_of(system%model)
@@ -238,7 +243,7 @@ contains
     options%thermal = .false.
     before = 0.0_wp
     call random_start(system, scale(:, :, 1), now)
-    length = length_of(now)
+    length = length_of(system, now)
     do m = 1, stability_evaluations
       call recur(system, options, undeformed, scale, length, now, before, w, kw, diagonal(m), &
         & beside(m))
@@ -312,9 +317,10 @@ contains
         if (system%body%point(k) == 0 .or. system%held(k, c) == 1_i1) cycle
         scale(k, c, 1) = sqrt(inverse_density(system%model, k)/system%body%volume(k))
         scale(k, c, 2) = sqrt(inverse_density(system%model, k)*system%body%volume(k))
-        free = free + 1
+        if (owned(system%body, k)) free = free + 1
       end do
     end do
+    free = int(count_of_ranks(system%body%order, int(free, i8)))
   end subroutine make_scale
 
   !> A vector of every direction alike: normally distributed components, drawn in the order of the
@@ -327,8 +333,8 @@ contains
     real(wp) :: radius
 
     now = 0.0_wp
-    state = seed
-    do i = 1, system%body%n_points
+    state = noise_after(seed, 2*system%body%dim*(system%body%order%first - 1))
+    do i = system%body%first_owned, system%body%last_owned
       k = system%body%slot(i)
       do c = 1, system%body%dim
         radius = sqrt(-2*log((1 + noise(state))/2))
@@ -339,15 +345,10 @@ contains
   end subroutine random_start
 
   !> |y|.
-  real(wp) function length_of(y)
+  real(wp) function length_of(system, y)
+    type(system_type), intent(in) :: system
     real(wp), intent(in), contiguous :: y(:, :)
-    integer :: c
-
-    length_of = 0.0_wp
-    do c = 1, size(y, 2)
-      length_of = length_of + inner(y(:, c), y(:, c))
-    end do
-    length_of = sqrt(length_of)
+    length_of = sqrt(inner(system%body%order, y, y))
   end function length_of
 
   !> One step of the recurrence: q = now/length becomes the newest vector, and
@@ -371,18 +372,17 @@ contains
       call multiply_by(w(:, c), scale(:, c, 1))
     end do
     call apply_tangent(system, u, w, kw, options, model)
-    diagonal = 0.0_wp
     do c = 1, size(now, 2)
       call multiply_by(kw(:, c), scale(:, c, 2))
       call subtract(kw(:, c), length, before(:, c))
-      diagonal = diagonal + inner(now(:, c), kw(:, c))
     end do
+    diagonal = inner(system%body%order, now, kw)
     do c = 1, size(now, 2)
       before(:, c) = now(:, c)
       now(:, c) = kw(:, c)
       call subtract(now(:, c), diagonal, before(:, c))
     end do
-    beside = length_of(now)
+    beside = length_of(system, now)
   end subroutine recur
 
   ! One rounding in each loop: how the compiler pairs products and sums may differ between the

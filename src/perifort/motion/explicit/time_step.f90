@@ -3,6 +3,7 @@ module pd_motion_explicit_time_step
   use pd_base_kinds, only: wp
   use pd_base_error, only: internal_fault
   use pd_base_numbers, only: pi
+  use pd_base_reduce, only: largest_of_ranks
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
@@ -87,7 +88,7 @@ contains
   end function factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
-  pure real(wp) function stable_step(body, model, bound) result(step)
+  real(wp) function stable_step(body, model, bound) result(step)
     type(body_type), intent(in) :: body    !! arranged in slots
     type(model_type), intent(in) :: model  !! densities of the slots
     real(wp), intent(in) :: bound(:)       !! (n_slots) M_k; slots with 0 do not count [N/m4]
@@ -98,6 +99,7 @@ contains
       if (bound(k) > 0.0_wp) &
         & step = min(step, sqrt(2*model%materials(model%material(k))%density/bound(k)))
     end do
+    step = -largest_of_ranks(body%order, -step)
   end function stable_step
 
   !> 7.25 as printed: without surface factors, and with the plain sign of a. Negative sums have no
@@ -120,7 +122,7 @@ contains
       if (printed(k) > 0.0_wp) &
         & squared = min(squared, 2*model%materials(model%material(k))%density/printed(k))
     end do
-    step = sqrt(squared)
+    step = sqrt(-largest_of_ranks(body%order, -squared))
   end subroutine printed_step
 
   !> The sum of 7.25 as printed for every slot [N/m4], 0 without bonds: no surface factors, a with

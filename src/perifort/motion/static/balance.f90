@@ -3,12 +3,14 @@
 !> be off.
 module pd_motion_static_balance
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: add_point, ascending_order, largest_of_ranks, largest_over, &
+    & new_running, running_type, total_of_running
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text
   use pd_force_forces, only: energy_pass
   use pd_motion_watch_fault, only: place
   use pd_motion_static_pieces, only: piece_text
-  use pd_motion_static_residual, only: relaxation_type
+  use pd_motion_static_residual, only: relaxation_type, squared_force
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
   use pd_force_term, only: term_view_type
   use pd_motion_system, only: system_type, add_loads, view_of
@@ -71,24 +73,18 @@ contains
     real(wp), intent(in) :: t                    !! time [s]
     type(balance_type), intent(out) :: balance   !! ready for `weigh`
     real(wp), allocatable :: none(:, :), force(:, :), energy(:)
-    real(wp) :: squared
-    integer :: k, p
+    real(wp) :: totals(6)
+    integer :: p
 
     allocate (balance%piece(rigid%pieces%number))
     allocate (balance%thermal(rigid%pieces%number), balance%thermal_energy(rigid%pieces%number), &
       & source=0.0_wp)
     allocate (force(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., force)
-    do k = 1, system%body%n_slots
-      balance%acting = balance%acting + sum((force(k, :)*system%body%volume(k))**2)
-    end do
+    balance%acting = squared_force(system, force, held=.true.)
     if (system%terms%inside > 0) then
       call forces_of_terms(system, t, force)
-      squared = 0.0_wp
-      do k = 1, system%body%n_slots
-        squared = squared + sum((force(k, :)*system%body%volume(k))**2)
-      end do
-      balance%acting = max(balance%acting, squared)
+      balance%acting = max(balance%acting, squared_force(system, force, held=.true.))
     end if
     if (.not. system%model%thermal) return
     allocate (none, mold=force)
@@ -96,13 +92,31 @@ contains
     none = 0.0_wp
     call forces_at(system, none, force)
     call energy_pass(system%family, system%model, none, energy)
-    do k = 1, system%body%n_slots
-      p = rigid%pieces%of(k)
-      if (p == 0) cycle
-      balance%thermal(p) = balance%thermal(p) + sum((force(k, :)*system%body%volume(k))**2)
-      balance%thermal_energy(p) = balance%thermal_energy(p) + 2*abs(energy(k))*system%body%volume(k)
+    do p = 1, rigid%pieces%number
+      totals = of_piece(p)
+      balance%thermal(p) = totals(1)
+      balance%thermal_energy(p) = totals(2)
     end do
     balance%acting = max(balance%acting, sum(balance%thermal))
+
+  contains
+
+    !> Squared forces and energy of a piece.
+    function of_piece(number) result(sums)
+      integer, intent(in) :: number
+      real(wp) :: sums(6)
+      type(running_type) :: running
+      integer :: i, k
+
+      call new_running(system%body%order, running)
+      do i = rigid%pieces%start(number), rigid%pieces%start(number + 1) - 1
+        k = rigid%pieces%slots(i)
+        call add_point(system%body%order, system%body%point(k), &
+          & [sum((force(k, :)*system%body%volume(k))**2), &
+          & 2*abs(energy(k))*system%body%volume(k)], running)
+      end do
+      sums = total_of_running(system%body%order, running)
+    end function of_piece
   end subroutine begin_balance
 
   !> Force density of the terms that are not external, at the present displacements: what they bear
@@ -127,8 +141,9 @@ contains
     real(wp), intent(in) :: t                         !! time [s]
     type(balance_type), intent(inout) :: balance      !! gets the sums
     real(wp), allocatable :: loads(:, :), borne(:, :)
-    real(wp) :: squared, floor
-    integer :: k, c, p
+    type(running_type) :: running
+    real(wp) :: squared, floor, terms(6)
+    integer :: i, k, c, p
 
     do p = 1, size(balance%piece)
       balance%piece(p) = tally_type()
@@ -136,36 +151,54 @@ contains
     end do
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
-    do k = 1, system%body%n_slots
-      p = rigid%pieces%of(k)
-      if (p == 0) cycle
-      associate (piece => balance%piece(p), volume => system%body%volume(k))
-        do c = 1, system%body%dim
-          piece%load = piece%load + (loads(k, c)*volume)**2
-          squared = ((system%state%force(k, c) + loads(k, c))*volume)**2
-          if (system%held(k, c) == 1_i1) then
-            piece%support = piece%support + squared
-          else
-            piece%residual = piece%residual + squared
-          end if
-          if (.not. relaxation%mass(k, c) > 0.0_wp) cycle
-          ! the mass is half the bound of the stiffness
-          floor = last_places*epsilon(floor)*norm2(system%state%u(k, :)) &
-            & *2*relaxation%mass(k, c)*volume
-          piece%rounding = piece%rounding + floor**2
-          piece%rho_rounding = piece%rho_rounding + floor**2/(relaxation%mass(k, c)*volume)
-          if (system%held(k, c) == 0_i1) piece%rho = piece%rho &
-            & + squared/(relaxation%mass(k, c)*volume)
-        end do
+    do p = 1, size(balance%piece)
+      call new_running(system%body%order, running)
+      do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+        k = rigid%pieces%slots(i)
+        terms = 0.0_wp
+        associate (volume => system%body%volume(k))
+          do c = 1, system%body%dim
+            terms(1) = terms(1) + (loads(k, c)*volume)**2
+            squared = ((system%state%force(k, c) + loads(k, c))*volume)**2
+            if (system%held(k, c) == 1_i1) then
+              terms(2) = terms(2) + squared
+            else
+              terms(3) = terms(3) + squared
+            end if
+            if (.not. relaxation%mass(k, c) > 0.0_wp) cycle
+            ! the mass is half the bound of the stiffness
+            floor = last_places*epsilon(floor)*norm2(system%state%u(k, :)) &
+              & *2*relaxation%mass(k, c)*volume
+            terms(4) = terms(4) + floor**2
+            terms(5) = terms(5) + floor**2/(relaxation%mass(k, c)*volume)
+            if (system%held(k, c) == 0_i1) terms(6) = terms(6) &
+              & + squared/(relaxation%mass(k, c)*volume)
+          end do
+        end associate
+        call add_point(system%body%order, system%body%point(k), terms, running)
+      end do
+      terms = total_of_running(system%body%order, running)
+      associate (piece => balance%piece(p))
+        piece%load = terms(1)
+        piece%support = terms(2)
+        piece%residual = terms(3)
+        piece%rounding = terms(4)
+        piece%rho_rounding = terms(5)
+        piece%rho = terms(6)
       end associate
     end do
     allocate (borne, mold=loads)
     if (system%terms%inside > 0) then
       call forces_of_terms(system, t, borne)
-      do k = 1, system%body%n_slots
-        p = rigid%pieces%of(k)
-        if (p > 0) balance%piece(p)%support = balance%piece(p)%support &
-          & + sum((borne(k, :)*system%body%volume(k))**2)
+      do p = 1, size(balance%piece)
+        call new_running(system%body%order, running)
+        do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+          k = rigid%pieces%slots(i)
+          call add_point(system%body%order, system%body%point(k), &
+            & [sum((borne(k, :)*system%body%volume(k))**2)], running)
+        end do
+        terms = total_of_running(system%body%order, running)
+        balance%piece(p)%support = balance%piece(p)%support + terms(1)
       end do
     end if
     call add_groups(system, rigid, loads, borne, balance)
@@ -179,80 +212,84 @@ contains
     real(wp), intent(in) :: loads(:, :)
     real(wp), intent(in) :: borne(:, :)   !! by the terms of the force that are not external, if any
     type(balance_type), intent(inout) :: balance
-    real(wp), allocatable :: force(:, :), moment(:, :), applied(:)
-    real(wp) :: one(3)
-    integer :: m, i, p, dim, k
+    type(running_type) :: running, of_applied
+    integer, allocatable :: order(:)
+    real(wp) :: one(3), net(6), applied(6)
+    integer :: m, i, p, dim, k, next
 
     dim = system%body%dim
-    allocate (force(3, size(balance%piece)), moment(3, size(balance%piece)))
     do m = 1, size(system%motions)
-      force = 0.0_wp
-      moment = 0.0_wp
       associate (motion => system%motions(m))
-        do i = 1, size(motion%slots)
-          k = motion%slots(i)
-          one = 0.0_wp
-          where (motion%held(i, :) == 1_i1) &
-            & one(:dim) = -(system%state%force(k, :) + loads(k, :))*system%body%volume(k)
-          call add_one(k, one)
+        ! piece by piece, each in the order of points
+        order = ascending_order(rigid%pieces%of(motion%slots))
+        next = 1
+        do p = 1, size(balance%piece)
+          call new_running(system%body%order, running)
+          i = next
+          do while (next <= size(order))
+            k = motion%slots(order(next))
+            if (rigid%pieces%of(k) /= p) exit
+            one = 0.0_wp
+            where (motion%held(order(next), :) == 1_i1) &
+              & one(:dim) = -(system%state%force(k, :) + loads(k, :))*system%body%volume(k)
+            call add_one(k, one)
+            next = next + 1
+          end do
+          if (next > i .or. associated(system%body%order%ranks)) call add_net()
         end do
       end associate
-      call add_net()
-    end do
-    if (system%terms%inside > 0) then
-      force = 0.0_wp
-      moment = 0.0_wp
-      do k = 1, system%body%n_slots
-        if (rigid%pieces%of(k) == 0) cycle
-        one = 0.0_wp
-        one(:dim) = borne(k, :)*system%body%volume(k)
-        call add_one(k, one)
-      end do
-      call add_net()
-    end if
-    force = 0.0_wp
-    moment = 0.0_wp
-    allocate (applied(size(balance%piece)), source=0.0_wp)
-    do k = 1, system%body%n_slots
-      if (rigid%pieces%of(k) == 0) cycle
-      if (all(abs(loads(k, :)) <= 0.0_wp)) cycle
-      one = 0.0_wp
-      one(:dim) = loads(k, :)*system%body%volume(k)
-      call add_one(k, one)
-      applied(p) = applied(p) + norm2(one)
     end do
     do p = 1, size(balance%piece)
-      balance%piece(p)%loaded = norm2(force(:, p)) > no_net*applied(p) .or. &
-        & norm2(moment(:, p)) > no_net*applied(p)*rigid%piece(p)%size
+      if (system%terms%inside > 0) then
+        call new_running(system%body%order, running)
+        do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+          k = rigid%pieces%slots(i)
+          one = 0.0_wp
+          one(:dim) = borne(k, :)*system%body%volume(k)
+          call add_one(k, one)
+        end do
+        call add_net()
+      end if
+      call new_running(system%body%order, running)
+      call new_running(system%body%order, of_applied)
+      do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+        k = rigid%pieces%slots(i)
+        if (all(abs(loads(k, :)) <= 0.0_wp)) cycle
+        one = 0.0_wp
+        one(:dim) = loads(k, :)*system%body%volume(k)
+        call add_one(k, one)
+        call add_point(system%body%order, system%body%point(k), [norm2(one)], of_applied)
+      end do
+      call add_net()
+      applied = total_of_running(system%body%order, of_applied)
+      balance%piece(p)%loaded = norm2(net(:3)) > no_net*applied(1) .or. &
+        & norm2(net(4:)) > no_net*applied(1)*rigid%piece(p)%size
     end do
-    call add_net()
 
   contains
 
-    !> A force on a slot.
+    !> A force on a slot of piece `p`.
     subroutine add_one(slot, value)
       integer, intent(in) :: slot
       real(wp), intent(in) :: value(3)
       real(wp) :: arm(3)
 
       arm = 0.0_wp
-      p = rigid%pieces%of(slot)
       arm(:dim) = system%body%x(slot, :) + system%state%u(slot, :) - rigid%piece(p)%centre(:dim)
-      force(:, p) = force(:, p) + value
-      moment(:, p) = moment(:, p) + [arm(2)*value(3) - arm(3)*value(2), &
-        & arm(3)*value(1) - arm(1)*value(3), arm(1)*value(2) - arm(2)*value(1)]
+      call add_point(system%body%order, system%body%point(slot), [value, arm(2)*value(3) &
+        & - arm(3)*value(2), arm(3)*value(1) - arm(1)*value(3), arm(1)*value(2) &
+        & - arm(2)*value(1)], running)
     end subroutine add_one
 
-    !> A group is complete.
+    !> A group is complete on piece `p`.
     subroutine add_net()
-      do p = 1, size(balance%piece)
-        associate (piece => balance%piece(p))
-          piece%left = piece%left + force(:, p)
-          piece%moment = piece%moment + moment(:, p)
-          piece%force_scale = max(piece%force_scale, norm2(force(:, p)))
-          piece%moment_scale = max(piece%moment_scale, norm2(moment(:, p)))
-        end associate
-      end do
+      net = total_of_running(system%body%order, running)
+      associate (piece => balance%piece(p))
+        piece%left = piece%left + net(:3)
+        piece%moment = piece%moment + net(4:)
+        piece%force_scale = max(piece%force_scale, norm2(net(:3)))
+        piece%moment_scale = max(piece%moment_scale, norm2(net(4:)))
+      end associate
     end subroutine add_net
   end subroutine add_groups
 
@@ -264,17 +301,23 @@ contains
     type(balance_type), intent(inout) :: balance  !! gets the energy of every piece
     type(term_view_type) :: view
     real(wp), allocatable :: energy(:)
-    integer :: k, p
+    type(running_type) :: running
+    real(wp) :: totals(6)
+    integer :: i, k, p
 
     allocate (energy(system%body%n_slots), source=0.0_wp)
     call energy_pass(system%family, system%model, system%state%u, energy)
     call view_of(system, system%time, view)
     call system%terms%add_energy(view, energy)
-    balance%piece%energy = 0.0_wp
-    do k = 1, system%body%n_slots
-      p = rigid%pieces%of(k)
-      if (p > 0) balance%piece(p)%energy = balance%piece(p)%energy &
-        & + 2*energy(k)*system%body%volume(k)
+    do p = 1, size(balance%piece)
+      call new_running(system%body%order, running)
+      do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+        k = rigid%pieces%slots(i)
+        call add_point(system%body%order, system%body%point(k), &
+          & [2*energy(k)*system%body%volume(k)], running)
+      end do
+      totals = total_of_running(system%body%order, running)
+      balance%piece(p)%energy = totals(1)
     end do
     balance%piece%energy = max(abs(balance%piece%energy), balance%thermal_energy)
   end subroutine weigh_energies
@@ -455,7 +498,8 @@ contains
         end if
       end associate
       call fail(error, 'no static equilibrium can be computed: '//text// &
-        & ' at displacements of up to '//to_text(maxval(abs(system%state%u)), 3)// &
+        & ' at displacements of up to '//to_text(largest_over(system%body%order, &
+        & system%state%u), 3)// &
         & ' m. Move or heat it by less, or load it by more', &
         & status_no_answer)
       return
@@ -475,8 +519,9 @@ contains
       allocate (weight, source=real(system%held, wp))
       allocate (u(size(weight, 1), size(weight, 2)), source=0.0_wp)
       call fit_rigid_motion(system, rigid, p, system%state%u, weight, u)
-      supports_strain = any(weight(slots, :)*abs(u(slots, :) - system%state%u(slots, :)) &
-        & > rigid_to*maxval(abs(system%state%u(slots, :))))
+      supports_strain = largest_of_ranks(system%body%order, maxval(weight(slots, :) &
+        & *abs(u(slots, :) - system%state%u(slots, :)))) > rigid_to*largest_of_ranks( &
+        & system%body%order, maxval(abs(system%state%u(slots, :))))
     end associate
   end function supports_strain
 

@@ -5,6 +5,7 @@
 !> so, dynamic relaxation goes on.
 module pd_motion_static_conjugate_gradient
   use pd_base_kinds, only: wp, i1
+  use pd_body_body, only: share_halo
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_static_balance, only: balance_type, begin_balance, weigh, weigh_energies, &

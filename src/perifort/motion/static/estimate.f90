@@ -2,6 +2,7 @@
 !> tell: a slender beam, or a stiff block on a soft pad, has a small residual long before.
 module pd_motion_static_estimate
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_motion_static_krylov, only: make_room, linearise, take_residual, first_direction, &
     & next_direction, apply_stiffness, go_along, volume_inner, note_length, smallest_curvature
   use pd_motion_newton, only: krylov_type, sums_type
@@ -39,8 +40,9 @@ contains
     type(krylov_type) :: krylov
     type(sums_type) :: sums
     real(wp), allocatable :: u(:, :), force(:, :), first(:, :), energy(:)
-    real(wp) :: curvature, gained, rho
-    integer :: p, k
+    type(running_type) :: running
+    real(wp) :: curvature, gained, rho, totals(6)
+    integer :: p, i, k
 
     allocate (u, source=system%state%u)
     allocate (force, source=system%state%force)
@@ -72,10 +74,16 @@ contains
     end do
     if (within) then
       allocate (energy(size(allowed)), source=0.0_wp)
-      do k = 1, system%body%n_slots
-        p = rigid%pieces%of(k)
-        if (p > 0) energy(p) = energy(p) + system%body%volume(k) &
-          & *sum((system%state%u(k, :) - u(k, :))*first(k, :), mask=system%held(k, :) == 0_i1)
+      do p = 1, rigid%pieces%number
+        call new_running(system%body%order, running)
+        do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
+          k = rigid%pieces%slots(i)
+          call add_point(system%body%order, system%body%point(k), [system%body%volume(k) &
+            & *sum((system%state%u(k, :) - u(k, :))*first(k, :), mask=system%held(k, :) == 0_i1)], &
+            & running)
+        end do
+        totals = total_of_running(system%body%order, running)
+        energy(p) = totals(1)
       end do
       within = all(energy <= allowed)
     end if

@@ -3,7 +3,10 @@
 !> inner products are weighted with the points' volumes, in which the stiffness is symmetric.
 module pd_motion_static_krylov
   use pd_base_kinds, only: wp, i1
-  use pd_base_numbers, only: block_length
+  use pd_base_reduce, only: add_block, add_point, block_points, inner, largest_of_ranks, &
+    & largest_over, new_running, new_sums, put_block, running_type, take_block, total_of, &
+    & total_of_running, summed_type => sums_type
+  use pd_body_body, only: share_halo
   use pd_force_model, only: force_options_type, options_of
   use pd_motion_conditions, only: number_of_loads
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
@@ -38,6 +41,7 @@ contains
       & krylov%origin, source=0.0_wp*mass)
     allocate (krylov%product, krylov%inverse, source=0.0_wp*mass)
     where (mass > 0.0_wp .and. system%held == 0_i1) krylov%inverse = 1/mass
+    call share_halo(system%body, krylov%inverse)
   end subroutine make_room
 
   !> The residual from the system's forces and the loads at `t`, and its sums.
@@ -73,6 +77,7 @@ contains
         largest = max(largest, abs(krylov%direction(k, c)))
       end do
     end do
+    largest = largest_of_ranks(system%body%order, largest)
     krylov%scale = 1.0_wp
     krylov%rho = volume_inner(system, krylov%residual, krylov%direction)
     krylov%norm = krylov%rho
@@ -106,6 +111,7 @@ contains
         largest = max(largest, abs(krylov%direction(k, c)))
       end do
     end do
+    largest = largest_of_ranks(system%body%order, largest)
     krylov%largest = largest
     if (largest > largest_size*system%family%rule%delta) &
       & call rescale(krylov, direction_size*system%family%rule%delta/largest)
@@ -150,11 +156,11 @@ contains
   !> Take a displacement for the direction; `scale` is 0 if it is none.
   subroutine take_direction(system, displacement, krylov)
     type(system_type), intent(in) :: system     !! its horizon
-    real(wp), intent(in) :: displacement(:, :)  !! (n_slots, dim) [m]
+    real(wp), intent(in), contiguous :: displacement(:, :)  !! (n_slots, dim) [m]
     type(krylov_type), intent(inout) :: krylov  !! gets the direction, made small, and its scale
     real(wp) :: largest
 
-    largest = maxval(abs(displacement))
+    largest = largest_over(system%body%order, displacement)
     krylov%scale = 0.0_wp
     if (.not. largest > 0.0_wp) return
     krylov%direction = displacement
@@ -230,111 +236,143 @@ contains
     if (system%terms%number() == number_of_loads(system%terms)) return
     call view_of(system, system%time, view, krylov%origin)
     call system%terms%add_tangent(view, krylov%direction, krylov%product)
+    call share_halo(system%body, krylov%product)
   end subroutine apply_stiffness
 
-  !> Go `length` along the direction: displacements, the forces that follow linearly, the residual.
-  !> The sums are formed in blocks of fixed length.
+  !> Go `length` along the direction: displacements, the forces that follow linearly, the residual,
+  !> and the sums, in blocks of points.
   subroutine go_along(system, length, krylov, sums)
     type(system_type), intent(inout) :: system  !! its displacements and forces move on
     real(wp), intent(in) :: length              !! in units of the direction [-]
     type(krylov_type), intent(inout) :: krylov  !! with direction and product; its residual moves on
     type(sums_type), intent(out) :: sums        !! after the step
-    type(sums_type), allocatable :: part(:)
-    integer :: block, blocks, c, first, last
+    type(summed_type) :: parts
+    real(wp) :: terms(block_points, 4), taken(block_points, 7), totals(4)
+    integer :: block, c, r, first, last, at
 
-    blocks = (size(krylov%residual, 1) + block_length - 1)/block_length
-    allocate (part(blocks))
-    !$omp parallel do schedule(static) default(none) shared(blocks, part, system, krylov, length) &
-    !$omp private(block, c, first, last)
-    do block = 1, blocks
-      first = (block - 1)*block_length + 1
-      last = min(block*block_length, size(krylov%residual, 1))
+    call new_sums(system%body%order, 4, parts)
+    !$omp parallel do schedule(static) default(none) shared(parts, system, krylov, length) &
+    !$omp private(block, c, r, first, last, at, terms, taken)
+    do block = 1, system%body%order%blocks
+      ! whole blocks in runs are filled by the first component
+      first = system%body%order%begin(block)
+      last = system%body%order%begin(block + 1) - 1
+      if (.not. system%body%order%in_runs) last = 0
+      if (sum(system%body%order%run_length(first:last)) < block_points) terms = 0.0_wp
       do c = 1, size(krylov%residual, 2)
-        call go_block(last - first + 1, length, system%body%volume(first:last), &
-          & krylov%direction(first:last, c), krylov%product(first:last, c), &
-          & krylov%inverse(first:last, c), system%state%u(first:last, c), &
-          & system%state%force(first:last, c), krylov%residual(first:last, c), part(block))
+        if (system%body%order%in_runs) then
+          do r = system%body%order%begin(block), system%body%order%begin(block + 1) - 1
+            first = system%body%order%run_slot(r)
+            last = first + system%body%order%run_length(r) - 1
+            at = system%body%order%run_at(r)
+            call go_run(last - first + 1, c == 1, length, system%body%volume(first:last), &
+              & krylov%direction(first:last, c), krylov%product(first:last, c), &
+              & krylov%inverse(first:last, c), system%state%u(first:last, c), &
+              & system%state%force(first:last, c), krylov%residual(first:last, c), &
+              & terms(at, 1), terms(at, 2), terms(at, 3), terms(at, 4))
+          end do
+          cycle
+        end if
+        associate (order => system%body%order)
+          call take_block(order, block, system%body%volume, taken(:, 1))
+          call take_block(order, block, krylov%direction(:, c), taken(:, 2))
+          call take_block(order, block, krylov%product(:, c), taken(:, 3))
+          call take_block(order, block, krylov%inverse(:, c), taken(:, 4))
+          call take_block(order, block, system%state%u(:, c), taken(:, 5))
+          call take_block(order, block, system%state%force(:, c), taken(:, 6))
+          call take_block(order, block, krylov%residual(:, c), taken(:, 7))
+          call go_run(block_points, c == 1, length, taken(:, 1), taken(:, 2), taken(:, 3), &
+            & taken(:, 4), taken(:, 5), taken(:, 6), taken(:, 7), terms(1, 1), terms(1, 2), &
+            & terms(1, 3), terms(1, 4))
+          call put_block(order, block, taken(:, 5), system%state%u(:, c))
+          call put_block(order, block, taken(:, 6), system%state%force(:, c))
+          call put_block(order, block, taken(:, 7), krylov%residual(:, c))
+        end associate
       end do
+      call add_block(system%body%order, block, terms, parts)
     end do
-    do block = 1, blocks
-      sums%residual = sums%residual + part(block)%residual
-      sums%change = sums%change + part(block)%change
-      sums%displacement = sums%displacement + part(block)%displacement
-      sums%rho = sums%rho + part(block)%rho
-    end do
+    totals = total_of(system%body%order, parts)
+    sums%residual = totals(1)
+    sums%rho = totals(2)
+    sums%change = totals(3)
+    sums%displacement = totals(4)
     sums%support = force_of_supports(system)
+    call share_halo(system%body, system%state%u)
   end subroutine go_along
 
-  !> One component of one block.
-  pure subroutine go_block(n, length, volume, direction, product, inverse, u, force, residual, sums)
+  !> One component of points in consecutive slots; the terms of the sums are added to what other
+  !> components have left, unless it is the `first`.
+  pure subroutine go_run(n, first, length, volume, direction, product, inverse, u, force, &
+    & residual, squared, rho, change, displacement)
     integer, intent(in) :: n
+    logical, intent(in) :: first
     real(wp), intent(in) :: length
     real(wp), intent(in) :: volume(n), direction(n), product(n), inverse(n)
     real(wp), intent(inout) :: u(n), force(n), residual(n)
-    type(sums_type), intent(inout) :: sums
-    real(wp) :: squared, rho, change, displacement, free
+    real(wp), intent(inout) :: squared(n), rho(n), change(n), displacement(n)
+    real(wp) :: free, left, now
     integer :: k
 
-    squared = 0.0_wp
-    rho = 0.0_wp
-    change = 0.0_wp
-    displacement = 0.0_wp
+    if (first) then
+      do k = 1, n
+        free = merge(1.0_wp, 0.0_wp, inverse(k) > 0.0_wp)
+        now = u(k) + length*direction(k)
+        u(k) = now
+        force(k) = force(k) - length*product(k)
+        left = residual(k) - free*length*product(k)
+        residual(k) = left
+        squared(k) = (left*volume(k))**2
+        rho(k) = volume(k)*left**2*inverse(k)
+        change(k) = free*(length*direction(k))**2
+        displacement(k) = free*now**2
+      end do
+      return
+    end if
     do k = 1, n
       free = merge(1.0_wp, 0.0_wp, inverse(k) > 0.0_wp)
-      u(k) = u(k) + length*direction(k)
+      now = u(k) + length*direction(k)
+      u(k) = now
       force(k) = force(k) - length*product(k)
-      residual(k) = residual(k) - free*length*product(k)
-      squared = squared + (residual(k)*volume(k))**2
-      rho = rho + volume(k)*residual(k)**2*inverse(k)
-      change = change + free*(length*direction(k))**2
-      displacement = displacement + free*u(k)**2
+      left = residual(k) - free*length*product(k)
+      residual(k) = left
+      squared(k) = squared(k) + (left*volume(k))**2
+      rho(k) = rho(k) + volume(k)*left**2*inverse(k)
+      change(k) = change(k) + free*(length*direction(k))**2
+      displacement(k) = displacement(k) + free*now**2
     end do
-    sums%residual = sums%residual + squared
-    sums%rho = sums%rho + rho
-    sums%change = sums%change + change
-    sums%displacement = sums%displacement + displacement
-  end subroutine go_block
+  end subroutine go_run
 
   !> (V F).(V F) over the constrained components.
-  pure real(wp) function force_of_supports(system) result(squared)
+  real(wp) function force_of_supports(system) result(squared)
     type(system_type), intent(in) :: system
-    integer :: m, c, i
+    type(running_type) :: running
+    real(wp) :: totals(6)
+    integer :: m, c, i, k
 
     squared = 0.0_wp
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
-        do c = 1, size(motion%held, 2)
-          do i = 1, size(motion%slots)
-            if (motion%held(i, c) == 1_i1) squared = squared &
-              & + (system%state%force(motion%slots(i), c)*system%body%volume(motion%slots(i)))**2
+        if (all(motion%held == 0_i1) .and. .not. associated(system%body%order%ranks)) cycle
+        call new_running(system%body%order, running)
+        do i = 1, size(motion%slots)
+          k = motion%slots(i)
+          do c = 1, size(motion%held, 2)
+            if (motion%held(i, c) == 1_i1) call add_point(system%body%order, system%body%point(k), &
+              & [(system%state%force(k, c)*system%body%volume(k))**2], running)
           end do
         end do
+        totals = total_of_running(system%body%order, running)
+        squared = squared + totals(1)
       end associate
     end do
   end function force_of_supports
 
-  !> Sum of V a b over all components, in blocks of fixed length.
+  !> Sum of V a b over all components.
   function volume_inner(system, a, b) result(sum_of_all)
     type(system_type), intent(in) :: system               !! its volumes
     real(wp), intent(in), contiguous :: a(:, :), b(:, :)  !! (n_slots, dim) fields
     real(wp) :: sum_of_all
-    real(wp), allocatable :: part(:)
-    integer :: block, blocks, first, last, c
-
-    blocks = (size(a, 1) + block_length - 1)/block_length
-    allocate (part(blocks))
-    !$omp parallel do schedule(static) default(none) shared(blocks, part, system, a, b) &
-    !$omp private(block, first, last, c)
-    do block = 1, blocks
-      first = (block - 1)*block_length + 1
-      last = min(block*block_length, size(a, 1))
-      part(block) = 0.0_wp
-      do c = 1, size(a, 2)
-        part(block) = part(block) &
-          & + sum(system%body%volume(first:last)*a(first:last, c)*b(first:last, c))
-      end do
-    end do
-    sum_of_all = sum(part)
+    sum_of_all = inner(system%body%order, system%body%volume, a, b)
   end function volume_inner
 
 end module pd_motion_static_krylov

@@ -9,12 +9,12 @@ module pd_motion_static_pieces
   private
   public :: pieces_type, find_pieces, piece_text
 
-  !> Which points belong together. Pieces are numbered by their first slots.
+  !> Which points belong together. Pieces are numbered by their first points.
   type :: pieces_type
     integer :: number = 0
     integer(i4), allocatable :: of(:)      !! piece of each slot, 0 at dead slots
     integer(i4), allocatable :: start(:)   !! first place of each piece in `slots` (number + 1)
-    integer(i4), allocatable :: slots(:)   !! piece by piece, ascending
+    integer(i4), allocatable :: slots(:)   !! piece by piece, in the order of points
   end type pieces_type
 
 contains
@@ -45,14 +45,15 @@ contains
       end do
     end do
     allocate (pieces%of(n), source=0_i4)
-    do k = 1, int(n, i4)
-      if (body%point(k) == 0) cycle
-      first = root(k)
-      if (first == k) pieces%number = pieces%number + 1
-      if (first == k) pieces%of(k) = int(pieces%number, i4)
-      pieces%of(k) = pieces%of(first)
+    do i = 1, body%n_points
+      first = root(body%slot(i))
+      if (pieces%of(first) == 0_i4) then
+        pieces%number = pieces%number + 1
+        pieces%of(first) = int(pieces%number, i4)
+      end if
+      pieces%of(body%slot(i)) = pieces%of(first)
     end do
-    call list_slots(pieces)
+    call list_slots(body, pieces)
 
   contains
 
@@ -68,11 +69,12 @@ contains
   end subroutine find_pieces
 
   !> Slots piece by piece.
-  pure subroutine list_slots(pieces)
+  pure subroutine list_slots(body, pieces)
+    type(body_type), intent(in) :: body
     type(pieces_type), intent(inout) :: pieces
     integer(i4), allocatable :: next(:)
     integer(i4) :: k
-    integer :: p
+    integer :: p, i
 
     allocate (pieces%start(pieces%number + 1), source=0_i4)
     do k = 1, size(pieces%of, kind=i4)
@@ -85,9 +87,9 @@ contains
     end do
     allocate (pieces%slots(pieces%start(pieces%number + 1) - 1))
     next = pieces%start
-    do k = 1, size(pieces%of, kind=i4)
+    do i = 1, body%n_points
+      k = body%slot(i)
       p = pieces%of(k)
-      if (p == 0) cycle
       pieces%slots(next(p)) = k
       next(p) = next(p) + 1_i4
     end do

@@ -4,7 +4,8 @@
 module pd_motion_static_relaxation
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_error, only: error_type, fail, status_input, status_no_answer
-  use pd_base_numbers, only: block_length
+  use pd_base_reduce, only: add_block, block_points, new_sums, slots_of_block, total_of, &
+    & summed_type => sums_type
   use pd_base_text, only: to_text
   use pd_motion_static_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
@@ -458,47 +459,48 @@ contains
     end do
   end subroutine accelerate
 
-  !> The sums that damping and convergence need, in blocks of fixed length.
+  !> The sums that damping and convergence need, in blocks of points.
   subroutine add_up(system, relaxation, rate, a, a_before, sums)
     type(system_type), intent(in) :: system
     type(relaxation_type), intent(in) :: relaxation
     real(wp), intent(in) :: rate(:, :), a(:, :), a_before(:, :)
     type(sums_type), intent(out) :: sums
-    type(sums_type), allocatable :: part(:)
-    integer :: blocks, block, k, c
-    real(wp) :: u2
+    type(summed_type) :: parts
+    real(wp) :: terms(block_points, 6), u2, totals(6)
+    integer :: block, i, k, c, n, at, slots(block_points)
 
-    blocks = (size(rate, 1) + block_length - 1)/block_length
-    allocate (part(blocks))
-    !$omp parallel do schedule(static) default(none) private(block, k, c, u2) &
-    !$omp shared(blocks, part, system, relaxation, rate, a, a_before)
-    do block = 1, blocks
+    call new_sums(system%body%order, 6, parts)
+    !$omp parallel do schedule(static) default(none) &
+    !$omp private(block, i, k, c, n, at, slots, terms, u2) &
+    !$omp shared(parts, system, relaxation, rate, a, a_before)
+    do block = 1, system%body%order%blocks
+      call slots_of_block(system%body%order, block, at, n, slots)
+      terms = 0.0_wp
       do c = 1, size(rate, 2)
-        do k = (block - 1)*block_length + 1, min(block*block_length, size(rate, 1))
+        do i = at, at + n - 1
+          k = slots(i - at + 1)
           if (system%held(k, c) == 1_i1) then
-            part(block)%support = part(block)%support &
-              & + (system%state%force(k, c)*system%body%volume(k))**2
+            terms(i, 1) = terms(i, 1) + (system%state%force(k, c)*system%body%volume(k))**2
             cycle
           end if
-          part(block)%residual = part(block)%residual &
-            & + (a(k, c)*relaxation%mass(k, c)*system%body%volume(k))**2
-          part(block)%change = part(block)%change + rate(k, c)**2
-          part(block)%displacement = part(block)%displacement + system%state%u(k, c)**2
+          terms(i, 2) = terms(i, 2) + (a(k, c)*relaxation%mass(k, c)*system%body%volume(k))**2
+          terms(i, 3) = terms(i, 3) + rate(k, c)**2
+          terms(i, 4) = terms(i, 4) + system%state%u(k, c)**2
           u2 = (system%state%u(k, c) - system%memory%base(k, c))**2
-          part(block)%moved = part(block)%moved + u2
-          if (abs(rate(k, c)) > 0.0_wp) part(block)%stiffness = part(block)%stiffness &
+          terms(i, 5) = terms(i, 5) + u2
+          if (abs(rate(k, c)) > 0.0_wp) terms(i, 6) = terms(i, 6) &
             & - u2*(a(k, c) - a_before(k, c))/rate(k, c)
         end do
       end do
+      call add_block(system%body%order, block, terms, parts)
     end do
-    do block = 1, blocks
-      sums%stiffness = sums%stiffness + part(block)%stiffness
-      sums%displacement = sums%displacement + part(block)%displacement
-      sums%moved = sums%moved + part(block)%moved
-      sums%change = sums%change + part(block)%change
-      sums%residual = sums%residual + part(block)%residual
-      sums%support = sums%support + part(block)%support
-    end do
+    totals = total_of(system%body%order, parts)
+    sums%support = totals(1)
+    sums%residual = totals(2)
+    sums%change = totals(3)
+    sums%displacement = totals(4)
+    sums%moved = totals(5)
+    sums%stiffness = totals(6)
   end subroutine add_up
 
 end module pd_motion_static_relaxation

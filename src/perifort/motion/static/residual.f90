@@ -2,6 +2,7 @@
 !> of balance.
 module pd_motion_static_residual
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: add_block, block_points, new_sums, slots_of_block, sums_type, total_of
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -18,15 +19,33 @@ module pd_motion_static_residual
 
 contains
 
-  !> (V F).(V F) over the free components of a force density [N2].
-  pure real(wp) function squared_force(system, density) result(squared)
+  !> (V F).(V F) over the free components of a force density, or over all with `held` [N2].
+  real(wp) function squared_force(system, density, held) result(squared)
     type(system_type), intent(in) :: system  !! its volumes and constrained components
-    real(wp), intent(in) :: density(:, :)    !! (n_slots, dim) force density [N/m3]
-    integer :: c
-    squared = 0.0_wp
-    do c = 1, size(density, 2)
-      squared = squared + sum((density(:, c)*system%body%volume)**2, mask=system%held(:, c) == 0_i1)
+    real(wp), intent(in) :: density(:, :)   !! (n_slots, dim) force density [N/m3]
+    logical, intent(in), optional :: held   !! constrained components, too
+    type(sums_type) :: parts
+    real(wp) :: terms(block_points, 1), totals(1)
+    integer :: block, c, i, k, at, n, slots(block_points)
+    logical :: everywhere
+
+    everywhere = .false.
+    if (present(held)) everywhere = held
+    call new_sums(system%body%order, 1, parts)
+    do block = 1, system%body%order%blocks
+      call slots_of_block(system%body%order, block, at, n, slots)
+      terms = 0.0_wp
+      do c = 1, size(density, 2)
+        do i = 1, n
+          k = slots(i)
+          if (system%held(k, c) == 1_i1 .and. .not. everywhere) cycle
+          terms(at + i - 1, 1) = terms(at + i - 1, 1) + (density(k, c)*system%body%volume(k))**2
+        end do
+      end do
+      call add_block(system%body%order, block, terms, parts)
     end do
+    totals = total_of(system%body%order, parts)
+    squared = totals(1)
   end function squared_force
 
 end module pd_motion_static_residual

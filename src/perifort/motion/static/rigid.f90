@@ -2,6 +2,8 @@
 !> problem nothing resists those, so the loads must not drive them.
 module pd_motion_static_rigid
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
+    & largest_of_ranks, largest_over
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
@@ -69,6 +71,10 @@ contains
           & rigid%piece(rigid%pieces%of(load%slots(i)))%loaded = .true.
       end do
     end do
+    do p = 1, rigid%pieces%number
+      rigid%piece(p)%loaded = largest_of_ranks(system%body%order, &
+        & merge(1.0_wp, 0.0_wp, rigid%piece(p)%loaded)) > 0.0_wp
+    end do
   end subroutine find_free_motions
 
   !> Place and extent of the piece that consists of `slots`.
@@ -79,14 +85,16 @@ contains
     integer :: c, dim
 
     dim = system%body%dim
-    piece%size = maxval(system%body%spacing(slots))
-    do c = 1, dim
-      piece%centre(c) = sum(system%body%volume(slots)*system%body%x(slots, c)) &
-        & /sum(system%body%volume(slots))
-      piece%size = max(piece%size, maxval(system%body%x(slots, c)) &
-        & - minval(system%body%x(slots, c)))
-    end do
-    piece%held = any(system%held(slots, :) == 1_i1)
+    piece%centre(:dim) = mean_over(system, slots, system%body%x)
+    associate (order => system%body%order)
+      piece%size = largest_of_ranks(order, maxval(system%body%spacing(slots)))
+      do c = 1, dim
+        piece%size = max(piece%size, largest_of_ranks(order, maxval(system%body%x(slots, c))) &
+          & + largest_of_ranks(order, -minval(system%body%x(slots, c))))
+      end do
+      piece%held = largest_of_ranks(order, &
+        & real(maxval(system%held(slots, :)), wp)) > 0.0_wp
+    end associate
   end subroutine place_piece
 
   !> What the terms of the force resist to the six unit motions of each piece alone, over the
@@ -97,6 +105,7 @@ contains
     real(wp), allocatable, intent(out) :: resistance(:, :, :)  !! (6, 6, pieces) [-]
     real(wp), allocatable :: w(:, :), kw(:, :), rows(:)
     type(term_view_type) :: view
+    type(running_type) :: running
     real(wp) :: mode(6), largest
     integer :: i, n, k, c, p
 
@@ -105,7 +114,8 @@ contains
     call view_of(system, system%time, view)
     allocate (rows(system%body%n_slots), source=0.0_wp)
     call system%terms%add_stiffness_bound(view, rows)
-    largest = maxval(rows*system%body%volume)
+    rows = rows*system%body%volume
+    largest = largest_over(system%body%order, rows)
     if (.not. largest > 0.0_wp) return
     allocate (w, kw, mold=system%state%u)
     w = 0.0_wp
@@ -121,14 +131,16 @@ contains
           end do
           kw = 0.0_wp
           call system%terms%add_tangent(view, w, kw)
-          do c = 1, system%body%dim
-            do n = 1, size(slots)
-              k = slots(n)
+          call new_running(system%body%order, running)
+          do n = 1, size(slots)
+            k = slots(n)
+            do c = 1, system%body%dim
               mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
-              resistance(:, i, p) = resistance(:, i, p) &
-                & + mode*(kw(k, c)*system%body%volume(k)/largest)
+              call add_point(system%body%order, system%body%point(k), &
+                & mode*(kw(k, c)*system%body%volume(k)/largest), running)
             end do
           end do
+          resistance(:, i, p) = total_of_running(system%body%order, running)
         end do
         w(slots, :) = 0.0_wp
       end associate
@@ -141,24 +153,34 @@ contains
     integer, intent(in) :: slots(:)
     real(wp), intent(in) :: of_terms(6, 6)      !! resistance of the terms of the force [-]
     type(piece_type), intent(inout) :: piece    !! in its place
-    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6)
+    type(running_type) :: of_mass(6), of_resistance(6)
+    real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6), held(6)
     integer :: n, k, c, i, j, dim
 
     dim = system%body%dim
-    resistance = of_terms
-    mass = 0.0_wp
-    do n = 1, size(slots)
-      k = slots(n)
-      do c = 1, dim
-        mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
-        do i = 1, 6
-          do j = 1, 6
-            mass(i, j) = mass(i, j) + mode(i)*mode(j)*system%body%volume(k)
-            if (system%held(k, c) == 1_i1) resistance(i, j) = resistance(i, j) + mode(i)*mode(j)
+    associate (order => system%body%order)
+      do i = 1, 6
+        call new_running(order, of_mass(i))
+        call new_running(order, of_resistance(i))
+      end do
+      do n = 1, size(slots)
+        k = slots(n)
+        do c = 1, dim
+          mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
+          do i = 1, 6
+            if (abs(mode(i)) <= 0.0_wp) cycle
+            held = mode(i)*mode
+            call add_point(order, system%body%point(k), held*system%body%volume(k), of_mass(i))
+            if (system%held(k, c) == 1_i1) &
+              & call add_point(order, system%body%point(k), held, of_resistance(i))
           end do
         end do
       end do
-    end do
+      do i = 1, 6
+        mass(:, i) = total_of_running(order, of_mass(i))
+        resistance(:, i) = of_terms(:, i) + total_of_running(order, of_resistance(i))
+      end do
+    end associate
     call eigenvectors(resistance, values, vectors)
     do i = 1, 6
       if (values(i) > held_at_all*max(1.0_wp, maxval(values))) cycle
@@ -173,6 +195,26 @@ contains
       piece%combination(:, piece%number) = mode/sqrt(dot_product(mode, matmul(mass, mode)))
     end do
   end subroutine describe_piece
+
+  !> The mean of a field (n_slots, dim) over a piece, weighted with volume.
+  function mean_over(system, slots, field) result(mean)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: slots(:)            !! of the piece, in the order of points
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: mean(size(field, 2))
+    type(running_type) :: running
+    real(wp) :: totals(6)
+    integer :: n, k
+
+    call new_running(system%body%order, running)
+    do n = 1, size(slots)
+      k = slots(n)
+      call add_point(system%body%order, system%body%point(k), &
+        & [system%body%volume(k)*field(k, :), system%body%volume(k)], running)
+    end do
+    totals = total_of_running(system%body%order, running)
+    mean = totals(:size(mean))/totals(size(mean) + 1)
+  end function mean_over
 
   !> Component `c` of the six unit motions at position `x`.
   pure function motion_at(centre, size_of, x, c) result(mode)
@@ -209,7 +251,8 @@ contains
     integer, intent(in) :: status            !! exit status of the error
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: loads(:, :)
-    real(wp) :: work(6), applied, mode(6), share(6)
+    type(running_type) :: of_work, of_applied
+    real(wp) :: work(6), applied, mode(6), share(6), totals(6)
     integer :: p, i, k, c
 
     if (system%terms%outside == 0 .or. all(rigid%piece%number == 0)) return
@@ -218,18 +261,23 @@ contains
     do p = 1, rigid%pieces%number
       associate (piece => rigid%piece(p), pieces => rigid%pieces)
         if (piece%number == 0 .or. .not. piece%loaded) cycle
-        work = 0.0_wp
-        applied = 0.0_wp
-        do c = 1, system%body%dim
-          do i = pieces%start(p), pieces%start(p + 1) - 1
-            k = pieces%slots(i)
+        call new_running(system%body%order, of_work)
+        call new_running(system%body%order, of_applied)
+        do i = pieces%start(p), pieces%start(p + 1) - 1
+          k = pieces%slots(i)
+          do c = 1, system%body%dim
             if (abs(loads(k, c)) <= 0.0_wp) cycle
             mode = motion_at(piece%centre, piece%size, system%body%x(k, :), c)
             share = matmul(mode, piece%combination)
-            work = work + loads(k, c)*system%body%volume(k)*share
-            applied = applied + abs(loads(k, c))*system%body%volume(k)*maxval(abs(share))
+            call add_point(system%body%order, system%body%point(k), &
+              & loads(k, c)*system%body%volume(k)*share, of_work)
+            call add_point(system%body%order, system%body%point(k), &
+              & [abs(loads(k, c))*system%body%volume(k)*maxval(abs(share))], of_applied)
           end do
         end do
+        work = total_of_running(system%body%order, of_work)
+        totals = total_of_running(system%body%order, of_applied)
+        applied = totals(1)
         if (maxval(abs(work)) <= balanced*applied) cycle
         call fail(error, piece_text(system%body, pieces, p)//' is free to move as a whole in '// &
           & to_text(piece%number)//' way(s), and the loads at t = '//to_text(t)// &
@@ -249,24 +297,25 @@ contains
     integer, intent(in) :: p
     real(wp), intent(in) :: loads(:, :)
     character(:), allocatable :: text
-    real(wp) :: force(3), moment(3), arm(3), part(3)
+    type(running_type) :: running
+    real(wp) :: arm(3), part(3), totals(6)
     integer :: i, k, dim
 
     dim = system%body%dim
-    force = 0.0_wp
-    moment = 0.0_wp
+    call new_running(system%body%order, running)
     do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
       k = rigid%pieces%slots(i)
       arm = 0.0_wp
       part = 0.0_wp
       arm(:dim) = system%body%x(k, :) - rigid%piece(p)%centre(:dim)
       part(:dim) = loads(k, :)*system%body%volume(k)
-      force = force + part
-      moment = moment + [arm(2)*part(3) - arm(3)*part(2), arm(3)*part(1) - arm(1)*part(3), &
-        & arm(1)*part(2) - arm(2)*part(1)]
+      call add_point(system%body%order, system%body%point(k), [part, arm(2)*part(3) &
+        & - arm(3)*part(2), arm(3)*part(1) - arm(1)*part(3), arm(1)*part(2) - arm(2)*part(1)], &
+        & running)
     end do
-    text = 'net force '//to_text(norm2(force), 3)//' N'
-    if (dim > 1) text = text//', net moment '//to_text(norm2(moment), 3)//' N m'
+    totals = total_of_running(system%body%order, running)
+    text = 'net force '//to_text(norm2(totals(:3)), 3)//' N'
+    if (dim > 1) text = text//', net moment '//to_text(norm2(totals(4:)), 3)//' N m'
   end function net_load
 
   !> Take the free rigid motions of every piece out of a field (n_slots, dim), by linear modes about
@@ -297,21 +346,25 @@ contains
   end subroutine remove_free_motions
 
   !> How much of each free motion of a piece is in a field.
-  pure function amounts(system, piece, slots, field) result(amount)
+  function amounts(system, piece, slots, field) result(amount)
     type(system_type), intent(in) :: system
     type(piece_type), intent(in) :: piece
     integer, intent(in) :: slots(:)
     real(wp), intent(in) :: field(:, :)
     real(wp) :: amount(6), mode(6)
-    integer :: n, c
+    type(running_type) :: running
+    integer :: n, k, c
 
-    mode = 0.0_wp
-    do c = 1, system%body%dim
-      do n = 1, size(slots)
-        mode = mode + motion_at(piece%centre, piece%size, system%body%x(slots(n), :), c) &
-          & *field(slots(n), c)*system%body%volume(slots(n))
+    call new_running(system%body%order, running)
+    do n = 1, size(slots)
+      k = slots(n)
+      mode = 0.0_wp
+      do c = 1, system%body%dim
+        mode = mode + motion_at(piece%centre, piece%size, system%body%x(k, :), c)*field(k, c)
       end do
+      call add_point(system%body%order, system%body%point(k), mode*system%body%volume(k), running)
     end do
+    mode = total_of_running(system%body%order, running)
     amount = matmul(mode, piece%combination)
   end function amounts
 
@@ -345,7 +398,7 @@ contains
             end do
             cycle
           end if
-          largest = maxval(abs(u(slots, :)))
+          largest = largest_of_ranks(system%body%order, maxval(abs(u(slots, :))))
           do turn = 1, most_turns
             mode = matmul(piece%combination, amounts(system, piece, slots, u))
             call move_rigidly(system, piece, slots, -mode, u)
@@ -360,7 +413,7 @@ contains
   !> [m] and rotations mode(4:6)/size [rad] about z, x and y through the centre as it has moved. The
   !> increments are formed without differences of large numbers, so that small motions keep their
   !> digits.
-  pure subroutine move_rigidly(system, piece, slots, mode, u)
+  subroutine move_rigidly(system, piece, slots, mode, u)
     type(system_type), intent(in) :: system
     type(piece_type), intent(in) :: piece
     integer, intent(in) :: slots(:)
@@ -371,10 +424,7 @@ contains
 
     dim = system%body%dim
     centre = piece%centre
-    do n = 1, dim
-      centre(n) = centre(n) + sum(system%body%volume(slots)*u(slots, n)) &
-        & /sum(system%body%volume(slots))
-    end do
+    centre(:dim) = centre(:dim) + mean_over(system, slots, u)
     axis = [mode(5), mode(6), mode(4)]/piece%size
     angle = norm2(axis)
     if (angle > 0.0_wp) axis = axis/angle
@@ -409,28 +459,34 @@ contains
     real(wp), intent(inout) :: u(:, :)
       !! (n_slots, dim) displacements; those of the piece change [m]
     real(wp) :: matrix(6, 6), vectors(6, 6), values(6), side(6), mode(6), part(6), centre(3)
+    type(running_type) :: of_matrix(6), of_side
     integer :: turn, n, k, c, i
 
     associate (piece => rigid%piece(p), pieces => rigid%pieces)
       associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
         do turn = 1, most_turns
-          matrix = 0.0_wp
-          side = 0.0_wp
           centre = piece%centre
-          do c = 1, system%body%dim
-            centre(c) = centre(c) + sum(system%body%volume(slots)*u(slots, c)) &
-              & /sum(system%body%volume(slots))
+          centre(:system%body%dim) = centre(:system%body%dim) + mean_over(system, slots, u)
+          call new_running(system%body%order, of_side)
+          do i = 1, 6
+            call new_running(system%body%order, of_matrix(i))
           end do
           do n = 1, size(slots)
             k = slots(n)
             do c = 1, system%body%dim
               if (.not. weight(k, c) > 0.0_wp) cycle
               part = motion_at(centre, piece%size, system%body%x(k, :) + u(k, :), c)
-              side = side + weight(k, c)*(target(k, c) - u(k, c))*part
+              call add_point(system%body%order, system%body%point(k), &
+                & weight(k, c)*(target(k, c) - u(k, c))*part, of_side)
               do i = 1, 6
-                matrix(:, i) = matrix(:, i) + weight(k, c)*part(i)*part
+                if (abs(part(i)) > 0.0_wp) call add_point(system%body%order, &
+                  & system%body%point(k), weight(k, c)*part(i)*part, of_matrix(i))
               end do
             end do
+          end do
+          side = total_of_running(system%body%order, of_side)
+          do i = 1, 6
+            matrix(:, i) = total_of_running(system%body%order, of_matrix(i))
           end do
           call eigenvectors(matrix, values, vectors)
           mode = 0.0_wp
@@ -441,7 +497,8 @@ contains
           ! at most a radian at a time
           mode = mode/max(1.0_wp, norm2(mode(4:))/piece%size)
           call move_rigidly(system, piece, slots, mode, u)
-          if (norm2(mode) <= negligible*maxval(abs(u(slots, :)))) exit
+          if (norm2(mode) <= negligible*largest_of_ranks(system%body%order, &
+            & maxval(abs(u(slots, :))))) exit
         end do
       end associate
     end associate

@@ -2,6 +2,8 @@
 !> which nothing acts are put into their equilibrium, which is known without an iteration.
 module pd_motion_static_start
   use pd_base_kinds, only: wp, i1
+  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
+    & largest_of_ranks
   use pd_base_text, only: to_text
   use pd_motion_conditions, only: impose, number_of_loads
   use pd_motion_static_pieces, only: piece_text
@@ -51,7 +53,7 @@ contains
       associate (piece => rigid%piece(p), pieces => rigid%pieces)
         associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
           if (size(slots) == 1 .and. .not. piece%held) cycle
-          before = sum((imposed(slots, :) - system%state%u(slots, :))**2)
+          before = misfit(system, slots, imposed, system%state%u, everywhere=.true.)
           done = .false.
           if (.not. acted(p)) call put_to_rest(p, slots, done)
           if (.not. done) then
@@ -81,11 +83,12 @@ contains
       integer :: i, pass
 
       done = .false.
-      largest = max(maxval(abs(imposed(slots, :))), maxval(abs(system%state%u(slots, :))))
+      largest = largest_of_ranks(system%body%order, max(maxval(abs(imposed(slots, :))), &
+        & maxval(abs(system%state%u(slots, :)))))
       if (.not. largest > 0.0_wp) return
       goal(slots, :) = system%state%u(slots, :)
       do pass = 1, most_passes
-        before = maxval(abs(goal(slots, :)))
+        before = largest_of_ranks(system%body%order, maxval(abs(goal(slots, :))))
         moved(slots, :) = 0.0_wp
         do i = 1, size(slots)
           weight(slots(i), :) = system%body%volume(slots(i))
@@ -95,7 +98,8 @@ contains
         weight(slots, :) = real(system%held(slots, :), wp)
         call fit_rigid_motion(system, rigid, p, imposed, weight, moved)
         ! a motion that comes back leaves the rounding of what it was: again, from where it is
-        if (.not. maxval(abs(moved(slots, :))) < before/2) exit
+        if (.not. largest_of_ranks(system%body%order, maxval(abs(moved(slots, :)))) &
+          & < before/2) exit
         goal(slots, :) = moved(slots, :)
       end do
       done = misfit(system, slots, imposed, moved) &
@@ -124,20 +128,29 @@ contains
       if (.not. system%model%thermal) cycle
       if (abs(system%model%expansion(k)) > 0.0_wp) acted(rigid%pieces%of(k)) = .true.
     end do
+    do k = 1, size(acted)
+      acted(k) = largest_of_ranks(system%body%order, merge(1.0_wp, 0.0_wp, acted(k))) > 0.0_wp
+    end do
   end subroutine find_acted
 
-  !> Sum of squares of what the constrained components miss [m2].
-  pure real(wp) function misfit(system, slots, imposed, moved) result(squares)
+  !> Sum of squares of what the constrained components miss [m2], or all of them.
+  real(wp) function misfit(system, slots, imposed, moved, everywhere) result(squares)
     type(system_type), intent(in) :: system
     integer, intent(in) :: slots(:)
     real(wp), intent(in) :: imposed(:, :), moved(:, :)
-    integer :: i
+    logical, intent(in), optional :: everywhere
+    type(running_type) :: running
+    real(wp) :: totals(6)
+    integer :: i, k
 
-    squares = 0.0_wp
+    call new_running(system%body%order, running)
     do i = 1, size(slots)
-      squares = squares + sum((imposed(slots(i), :) - moved(slots(i), :))**2, &
-        & mask=system%held(slots(i), :) == 1_i1)
+      k = slots(i)
+      call add_point(system%body%order, system%body%point(k), [sum((imposed(k, :) - moved(k, :)) &
+        & **2, mask=present(everywhere) .or. system%held(k, :) == 1_i1)], running)
     end do
+    totals = total_of_running(system%body%order, running)
+    squares = totals(1)
   end function misfit
 
   !> What to say about pieces that nothing holds, '' if there is nothing: `parts` was the number of

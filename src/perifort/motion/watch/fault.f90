@@ -1,7 +1,8 @@
 !> A motion that is none any more: where it went wrong, how, and the likely cause.
 module pd_motion_watch_fault
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i8
+  use pd_base_reduce, only: first_largest, first_where, largest_of_ranks, sum_of_ranks
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text, with_unit
   use pd_family_family, only: bonds_type, allocate_bonds
@@ -21,7 +22,8 @@ contains
 
   !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
   !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step. `squares`
-  !> gets the sum of the squares of all components, whose rounding depends on the number of threads.
+  !> gets the sum of the squares of all components, whose rounding depends on the number of threads:
+  !> it is a bound for those who watch, and no answer depends on its last digits.
   integer function faulty_slot(system, rate, dt, squares) result(slot)
     type(system_type), intent(in) :: system     !! its horizon
     real(wp), intent(in), contiguous :: rate(:, :)
@@ -45,9 +47,12 @@ contains
         largest_sum = max(largest_sum, sum_of_block)
       end do
     end do
+    sum_of_all = sum_of_ranks(system%body%order, sum_of_all)
+    largest_sum = largest_of_ranks(system%body%order, largest_sum)
     if (present(squares)) squares = sum_of_all
     slot = 0
-    if (.not. stays_within(system, rate, dt, sum_of_all, largest_sum)) slot = fastest_slot(rate)
+    if (.not. stays_within(system, rate, dt, sum_of_all, largest_sum)) &
+      & slot = fastest_slot(system, rate)
   end function faulty_slot
 
   !> An explicit shape, so that the loop runs in vector registers.
@@ -84,17 +89,21 @@ contains
           largest = max(largest, abs(rate(k, c)))
         end do
       end do
-      stays_within = largest*dt <= delta
+      stays_within = largest_of_ranks(system%body%order, largest)*dt <= delta
     end associate
   end function stays_within
 
-  !> The slot with a rate that is not finite, else that with the largest component.
-  integer function fastest_slot(rate) result(slot)
+  !> The slot of the first point with a rate that is not finite, else with the largest component.
+  !> Where another rank owns that point, it is a slot of this one.
+  integer function fastest_slot(system, rate) result(slot)
+    type(system_type), intent(in) :: system
     real(wp), intent(in) :: rate(:, :)
-    integer :: at(2)
-    at = findloc(ieee_is_finite(rate), .false.)
-    if (at(1) == 0) at = maxloc(abs(rate))
-    slot = at(1)
+    integer(i8) :: point
+
+    point = first_where(system%body%order, any(.not. ieee_is_finite(rate), dim=2))
+    if (point == 0_i8) point = first_largest(system%body%order, maxval(abs(rate), dim=2))
+    point = min(max(point, system%body%order%first), system%body%order%last)
+    slot = system%body%slot(point - system%body%order%before)
   end function fastest_slot
 
   !> The error for a motion that is none any more after `step` steps of `dt` [s]. Which of the two
@@ -108,7 +117,7 @@ contains
     real(wp) :: speed, stretch, energy, supply
     integer :: k
 
-    k = fastest_slot(system%state%v)
+    k = fastest_slot(system, system%state%v)
     speed = norm2(system%state%v(k, :))
     stretch = greatest_stretch(system, k)
     text = 'unstable at step '//to_text(step)//', t = '//with_unit(step*dt, 's')//': point '// &

@@ -1,7 +1,7 @@
 !> The field `damage`.
 module pd_output_fields_damage
   use pd_base_kinds, only: wp
-  use pd_body_body, only: in_point_order
+  use pd_body_body, only: gather
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type
   implicit none (type, external)
@@ -25,7 +25,7 @@ contains
 
     values = 0.0_wp
     associate (damage => now%system%state%damage)
-      if (size(damage) > 0) call in_point_order(now%system%body, damage, values(:, 1))
+      if (size(damage) > 0) call gather(now%system%body, damage, values(:, 1))
     end associate
   end subroutine fill
 

@@ -1,7 +1,7 @@
 !> The field `dilatation`.
 module pd_output_fields_dilatation
   use pd_base_kinds, only: wp
-  use pd_body_body, only: in_point_order
+  use pd_body_body, only: gather
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_reference, only: point_dilatation, reference_dilatation
   use pd_output_fields_exact, only: exact_type
@@ -29,7 +29,7 @@ contains
     associate (system => now%system)
       allocate (of_slots(system%body%n_slots))
       call reference_dilatation(system%family, system%model, system%state%u, of_slots)
-      call in_point_order(system%body, of_slots, values(:, 1))
+      call gather(system%body, of_slots, values(:, 1))
     end associate
   end subroutine fill
 

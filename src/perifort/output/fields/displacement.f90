@@ -1,7 +1,7 @@
 !> The field `displacement`.
 module pd_output_fields_displacement
   use pd_base_kinds, only: wp
-  use pd_body_body, only: in_point_order
+  use pd_body_body, only: gather
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type, rank_vector
   implicit none (type, external)
@@ -27,7 +27,7 @@ contains
     integer :: c
 
     do c = 1, size(values, 2)
-      call in_point_order(now%system%body, now%system%state%u(:, c), values(:, c))
+      call gather(now%system%body, now%system%state%u(:, c), values(:, c))
     end do
   end subroutine fill
 

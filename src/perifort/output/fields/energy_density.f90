@@ -1,7 +1,7 @@
 !> The field `energy_density`.
 module pd_output_fields_energy_density
   use pd_base_kinds, only: wp
-  use pd_body_body, only: in_point_order
+  use pd_body_body, only: gather
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
   use pd_force_reference, only: point_energy
@@ -31,7 +31,7 @@ contains
     associate (system => now%system)
       allocate (of_slots(system%body%n_slots))
       call energy_pass(system%family, system%model, system%state%u, of_slots)
-      call in_point_order(system%body, of_slots, values(:, 1))
+      call gather(system%body, of_slots, values(:, 1))
     end associate
   end subroutine fill
 

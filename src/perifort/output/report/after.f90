@@ -1,6 +1,7 @@
 !> What the user reads on the terminal when a run is over: what it came to.
 module pd_output_report_after
   use pd_base_kinds, only: wp
+  use pd_base_reduce, only: largest_over
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_motion_system, only: system_type
   use pd_output_report_recorder, only: recorder_type
@@ -35,7 +36,8 @@ contains
       if (system%model%breaking) then
         text = text//line('dissipated', with_unit(system%dissipated, 'J'))
         text = text//line('broken bonds', to_text(system%broken)//' pairs of points')
-        text = text//line('greatest damage', to_text(maxval(system%state%damage), 3))
+        text = text//line('greatest damage', to_text(largest_over(system%body%order, &
+          & system%state%damage), 3))
       end if
       text = text//line('external work', with_unit(system%external_work, 'J'))
       call recorder%energy_balance(system, balance, share)

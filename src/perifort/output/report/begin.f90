@@ -7,7 +7,7 @@ module pd_output_report_begin
   use pd_base_version, only: program_version
   use pd_scene_content_types, only: scene_type
   use pd_scene_content_write, only: scene_text
-  use pd_body_body, only: body_type, in_point_order
+  use pd_body_body, only: body_type, gather
   use pd_set_up_conditions, only: region_mask
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
@@ -70,7 +70,7 @@ contains
       end do
       allocate (positions(body%n_points, 3), source=0.0_wp)
       do c = 1, body%dim
-        call in_point_order(body, body%x(:, c), positions(:, c))
+        call gather(body, body%x(:, c), positions(:, c))
       end do
       command = text_of(options%command)
       call recorder%results%create(directory, stem, positions, &
@@ -188,26 +188,26 @@ contains
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: volume(:)
     integer(i4), allocatable :: number(:)
-    logical, allocatable :: mask(:)
+    logical, allocatable :: of_points(:)
     integer :: r
 
-    allocate (volume(body%n_points), number(body%n_points))
-    call in_point_order(body, body%volume, volume)
+    allocate (volume(body%n_points), number(body%n_points), of_points(body%n_points))
+    call gather(body, body%volume, volume)
     call recorder%results%put_points('volume', volume, error)
     if (allocated(error)) return
-    call in_point_order(body, body%body, number)
+    call gather(body, body%body, number)
     call recorder%results%put_points('body', number, error)
     if (allocated(error)) return
-    call in_point_order(body, body%material, number)
+    call gather(body, body%material, number)
     call recorder%results%put_points('material', number, error)
     if (allocated(error)) return
-    call in_point_order(body, body%layer, number)
+    call gather(body, body%layer, number)
     call recorder%results%put_points('layer', number, error)
     do r = 1, size(scene%regions)
       if (allocated(error)) return
-      mask = region_mask(scene, body, trim(scene%regions(r)%name))
+      call gather(body, region_mask(scene, body, trim(scene%regions(r)%name)), of_points)
       call recorder%results%put_points('region_'//trim(scene%regions(r)%name), &
-        & merge(1_i1, 0_i1, mask(body%slot)), error)
+        & merge(1_i1, 0_i1, of_points), error)
     end do
   end subroutine put_points
 

@@ -2,6 +2,7 @@
 !> with a name, then the fields of the probes.
 module pd_output_report_columns
   use pd_base_kinds, only: wp
+  use pd_base_reduce, only: largest_over
   use pd_motion_observer, only: instant_type
   use pd_motion_system, only: energies_type, system_type
   use pd_output_fields_field, only: moment_type
@@ -36,7 +37,7 @@ module pd_output_report_columns
 
   abstract interface
     !> The value of a column.
-    pure real(wp) function value_interface(now)
+    real(wp) function value_interface(now)
       import :: row_source_type, wp
       implicit none (type, external)
       type(row_source_type), intent(in) :: now
@@ -46,7 +47,7 @@ module pd_output_report_columns
 contains
 
   !> The table of columns. A column joins with a line here, and a function that gives its value.
-  pure type(history_table_type) function history_table(relaxation) result(table)
+  type(history_table_type) function history_table(relaxation) result(table)
     logical, intent(in) :: relaxation
 
     allocate (table%entries(0))
@@ -65,7 +66,7 @@ contains
   end function history_table
 
   !> Add a column at the end.
-  pure subroutine put(table, name, unit, value)
+  subroutine put(table, name, unit, value)
     type(history_table_type), intent(inout) :: table
     character(*), intent(in) :: name, unit
     procedure(value_interface) :: value
@@ -77,7 +78,7 @@ contains
   end subroutine put
 
   !> The columns of the history, in the order of `history_row`.
-  pure function history_columns(system, probes, relaxation) result(columns)
+  function history_columns(system, probes, relaxation) result(columns)
     type(system_type), intent(in) :: system
     type(probe_type), intent(in) :: probes(:)
     logical, intent(in) :: relaxation
@@ -96,7 +97,7 @@ contains
   end function history_columns
 
   !> The columns that a scene's history will have, without those of probes.
-  pure function columns_of_scene(scene) result(columns)
+  function columns_of_scene(scene) result(columns)
     type(scene_type), intent(in) :: scene
     type(column_type), allocatable :: columns(:)
     type(history_table_type) :: table
@@ -177,10 +178,11 @@ contains
   end function broken_bonds
 
   !> 0 where nothing can be damaged.
-  pure real(wp) function maximum_damage(now)
+  real(wp) function maximum_damage(now)
     type(row_source_type), intent(in) :: now
     maximum_damage = 0.0_wp
-    if (size(now%system%state%damage) > 0) maximum_damage = maxval(now%system%state%damage)
+    if (size(now%system%state%damage) > 0) &
+      & maximum_damage = largest_over(now%system%body%order, now%system%state%damage)
   end function maximum_damage
 
   pure real(wp) function step_size(now)

@@ -2,7 +2,7 @@
 !> first pair of points that do, so that a run can say so.
 module pd_output_report_contact
   use pd_base_kinds, only: wp, i4
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, gather
   use pd_family_cells, only: cells_type, sort_into_cells, neighbours_of
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
@@ -28,10 +28,9 @@ contains
     integer :: i, m, j
 
     allocate (y(body%n_points, body%dim), half_reach(body%n_points), other(body%n_points))
-    do i = 1, body%n_points
-      y(i, :) = body%x(body%slot(i), :) + u(body%slot(i), :)
-      half_reach(i) = too_close*body%spacing(body%slot(i))/2
-    end do
+    call gather(body, body%x + u, y)
+    call gather(body, body%spacing, half_reach)
+    half_reach = too_close*half_reach/2
     other = 0_i4
     call sort_into_cells(y, 2*maxval(half_reach), cells)
     !$omp parallel default(none) shared(body, family, y, half_reach, cells, other) &

@@ -3,6 +3,7 @@ module pd_output_report_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
   use pd_base_error, only: internal_fault
+  use pd_base_reduce, only: largest_over
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_scene_content_types, only: scene_type
@@ -68,9 +69,9 @@ contains
   end function summary_before
 
   !> The largest spacing of all points [m].
-  pure real(wp) function greatest_spacing(system) result(spacing)
+  real(wp) function greatest_spacing(system) result(spacing)
     type(system_type), intent(in) :: system
-    spacing = maxval(system%body%spacing, mask=system%body%point > 0)
+    spacing = largest_over(system%body%order, system%body%spacing)
   end function greatest_spacing
 
   !> How static equilibrium is found.

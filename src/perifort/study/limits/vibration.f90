@@ -2,11 +2,11 @@
 !> temperature and breaking, constrained components held at rest; also shifted or in another size.
 !> What the program measures of a body's motion, it measures on this.
 module pd_study_limits_vibration
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i2, i4
   use pd_base_lanes, only: lanes
   use pd_base_error, only: error_type, internal_fault
-  use pd_base_numbers, only: noise
-  use pd_body_body, only: body_type, allocate_points, in_point_order
+  use pd_base_reduce, only: largest_of_ranks, noise, noise_after
+  use pd_body_body, only: body_type, allocate_points, gather, scatter
   use pd_body_material, only: material_type, never
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
@@ -100,18 +100,27 @@ contains
     type(body_type), intent(in) :: body
     real(wp), intent(in) :: shift, factor
     type(body_type), intent(out) :: copy
+    integer(i4), allocatable :: number(:)
     integer :: c, g
 
     call allocate_points(copy, body%dim, body%n_points)
+    allocate (number(body%n_points))
     do c = 1, body%dim
-      copy%x(:, c) = factor*body%x(body%slot, c) + shift
+      call gather(body, body%x(:, c), copy%x(:, c))
+      copy%x(:, c) = factor*copy%x(:, c) + shift
     end do
-    copy%volume = body%volume(body%slot)*factor**body%dim
-    copy%spacing = body%spacing(body%slot)*factor
-    copy%body = body%body(body%slot)
-    copy%material = body%material(body%slot)
-    copy%layer = body%layer(body%slot)
-    copy%grid = body%grid(body%slot)
+    call gather(body, body%volume, copy%volume)
+    copy%volume = copy%volume*factor**body%dim
+    call gather(body, body%spacing, copy%spacing)
+    copy%spacing = copy%spacing*factor
+    call gather(body, body%body, number)
+    copy%body = int(number, i2)
+    call gather(body, body%material, number)
+    copy%material = int(number, i2)
+    call gather(body, body%layer, number)
+    copy%layer = int(number, i2)
+    call gather(body, body%grid, number)
+    copy%grid = int(number, i2)
     copy%grids = body%grids
     do g = 1, size(copy%grids)
       copy%grids(g)%origin(:body%dim) = factor*copy%grids(g)%origin(:body%dim) + shift
@@ -183,8 +192,8 @@ contains
     integer :: i, c, state
 
     allocate (shape(system%body%n_slots, system%body%dim), source=0.0_wp)
-    state = 4711
-    do i = 1, system%body%n_points
+    state = noise_after(4711, system%body%dim*(system%body%order%first - 1))
+    do i = system%body%first_owned, system%body%last_owned
       do c = 1, system%body%dim
         shape(system%body%slot(i), c) = noise(state)
         if (system%held(system%body%slot(i), c) == 1_i1) shape(system%body%slot(i), c) = 0.0_wp
@@ -239,6 +248,7 @@ contains
       end do
     end do
     !$omp end parallel
+    largest = largest_of_ranks(system%body%order, largest)
     if (.not. largest > 0.0_wp) largest = 1.0_wp
   end function largest_gradient
 
@@ -247,12 +257,9 @@ contains
     type(body_type), intent(in) :: body   !! gives the slot of each point
     real(wp), intent(in) :: values(:, :)  !! (n_slots, components)
     real(wp), allocatable, intent(out) :: ordered(:, :)  !! (n_points, components)
-    integer :: c
 
     allocate (ordered(body%n_points, size(values, 2)))
-    do c = 1, size(values, 2)
-      call in_point_order(body, values(:, c), ordered(:, c))
-    end do
+    call gather(body, values, ordered)
   end subroutine in_points
 
   !> `factor` times values in the order of the points into their slots.
@@ -263,7 +270,7 @@ contains
     real(wp), intent(inout) :: values(:, :)  !! (n_slots, components); 0 in dead slots
 
     values = 0.0_wp
-    values(body%slot, :) = factor*ordered
+    call scatter(body, factor*ordered, values)
   end subroutine put_points
 
   !> Look at the energy every `every` steps. No error is set.

@@ -105,7 +105,7 @@ contains
   end subroutine resolve_measure
 
   !> Columns of the history without those of probes, the step and the time.
-  pure function measurable_columns(scene) result(columns)
+  function measurable_columns(scene) result(columns)
     type(scene_type), intent(in) :: scene
     type(column_type), allocatable :: columns(:)
 
