@@ -206,11 +206,14 @@ contains
 
     select case (dim)
     case (3)
-      call fast_energy_3(kind, n, weight, stretch, shift, geometry, first, m, u, stretches, theta)
+      call fast_energy_3(kind, n, weight, stretch, shift, geometry, first, m, u, u, stretches, &
+        & theta)
     case (2)
-      call fast_energy_2(kind, n, weight, stretch, shift, geometry, first, m, u, stretches, theta)
+      call fast_energy_2(kind, n, weight, stretch, shift, geometry, first, m, u, u, stretches, &
+        & theta)
     case (1)
-      call fast_energy_1(kind, n, weight, stretch, shift, geometry, first, m, u, stretches, theta)
+      call fast_energy_1(kind, n, weight, stretch, shift, geometry, first, m, u, u, stretches, &
+        & theta)
     case default
       call internal_fault('an energy in a dimension that no fast loop is there for')
     end select
@@ -456,19 +459,19 @@ contains
     include 'fast_force.inc'
   end subroutine wide_force_plain_3
 
-  subroutine fast_energy_1(kind, n, weight, stretch, shift, geometry, first, n_slots, u, &
+  subroutine fast_energy_1(kind, n, weight, stretch, shift, geometry, first, n_slots, u, low, &
     & stretches, theta)
     integer, parameter :: dim = 1
     include 'fast_energy.inc'
   end subroutine fast_energy_1
 
-  subroutine fast_energy_2(kind, n, weight, stretch, shift, geometry, first, n_slots, u, &
+  subroutine fast_energy_2(kind, n, weight, stretch, shift, geometry, first, n_slots, u, low, &
     & stretches, theta)
     integer, parameter :: dim = 2
     include 'fast_energy.inc'
   end subroutine fast_energy_2
 
-  subroutine fast_energy_3(kind, n, weight, stretch, shift, geometry, first, n_slots, u, &
+  subroutine fast_energy_3(kind, n, weight, stretch, shift, geometry, first, n_slots, u, low, &
     & stretches, theta)
     integer, parameter :: dim = 3
     include 'fast_energy.inc'
