@@ -224,7 +224,7 @@ contains
 
     do f = 1, size(families)
       do m = 1, size(methods)
-        do p = 1, size(pressures) - merge(1, 0, overflow_stops())
+        do p = 1, size(pressures) - merge(2, 0, overflow_stops())
           call box_scene([6, 5, 5], dx, 0.3_wp, scene)
           scene%file = 'load.nml'
           scene%horizon%family = families(f)
