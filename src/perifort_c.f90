@@ -221,7 +221,7 @@ contains
 
     call put_pointer(handle, c_null_ptr)
     if (.not. c_associated(handle)) then
-      call fail(error, 'the place for the handle of the scene is NULL', status_usage)
+      call fail(error, 'the pointer for the handle of the scene is NULL', status_usage)
       return
     end if
     allocate (holder)

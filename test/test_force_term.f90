@@ -6,7 +6,7 @@ module test_force_term
   use pd_base_archive, only: archive_type
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
   use pd_base_kinds, only: wp
-  use pd_base_shelf, only: shelf_type
+  use pd_base_snapshot, only: snapshot_type
   use pd_force_term, only: force_term_type, term_list_type, term_view_type, has_tangent, &
     & no_stiffness
   use pd_motion_explicit_integrators, only: run_explicit
@@ -99,7 +99,7 @@ module test_force_term
   !> Keeps the system at one step.
   type, extends(observer_type) :: keeper_type
     integer :: step = 0
-    type(shelf_type) :: shelf
+    type(snapshot_type) :: snapshot
   contains
     procedure :: observe => keep_at_step
   end type keeper_type
@@ -905,9 +905,9 @@ contains
       call run(again%system, trim(integrators(i)), dt, 40, keeper, error)
       call plate_with(terms, again, error)
       if (allocated(error)) return
-      call keeper%shelf%rewind(reading=.true.)
-      call keep_system(keeper%shelf, again%system)
-      call expect_true(error, .not. allocated(keeper%shelf%error), 'the state is not put back')
+      call keeper%snapshot%rewind(reading=.true.)
+      call keep_system(keeper%snapshot, again%system)
+      call expect_true(error, .not. allocated(keeper%snapshot%error), 'the state is not put back')
       call expect_true(error, again%system%memory%step == 25, 'step of the state put back')
       diary = diary_type()
       rest = diary_type()
@@ -961,9 +961,9 @@ contains
       call rest(again, keeper, error)
       call ready_with(scene, terms, again, error)
       if (allocated(error)) return
-      call keeper%shelf%rewind(reading=.true.)
-      call keep_system(keeper%shelf, again%system)
-      call expect_true(error, .not. allocated(keeper%shelf%error), 'the state is not put back')
+      call keeper%snapshot%rewind(reading=.true.)
+      call keep_system(keeper%snapshot, again%system)
+      call expect_true(error, .not. allocated(keeper%snapshot%error), 'the state is not put back')
       associate (memory => again%system%memory)
         call expect_true(error, memory%load_step == 2 .and. &
           & (memory%iteration > 0 .or. allocated(memory%newton)), trim(scene%relaxation%solver)// &
@@ -987,8 +987,8 @@ contains
     type(fault_type), allocatable, intent(out) :: error
 
     if (instant%step /= observer%step .or. allocated(error)) return
-    call observer%shelf%rewind(reading=.false.)
-    call keep_system(observer%shelf, system)
+    call observer%snapshot%rewind(reading=.false.)
+    call keep_system(observer%snapshot, system)
   end subroutine keep_at_step
 
   !> A start in which every point moves in its own way.

@@ -4,7 +4,7 @@ module test_motion_newton
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i8
   use pd_base_error, only: fault_type => error_type, fail, status_interrupted, status_no_answer
-  use pd_base_shelf, only: shelf_type
+  use pd_base_snapshot, only: snapshot_type
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_keep, only: keep_system
   use pd_motion_observer, only: observer_type, instant_type
@@ -22,7 +22,7 @@ module test_motion_newton
   !> Looks at a relaxation, or stops it at the first instant that it sees and keeps it.
   type, extends(observer_type) :: cutter_type
     logical :: cuts = .false.
-    type(shelf_type) :: shelf
+    type(snapshot_type) :: snapshot
     integer :: seen = 0                       !! instants
     integer :: undeformed = 0, tangent = 0    !! in the midst of a solve with that stiffness
     integer :: ahead = 0                      !! ... of one that goes uphill
@@ -74,8 +74,8 @@ contains
       observer%dynamic = observer%dynamic + 1
     end if
     if (.not. observer%cuts .or. instant%last .or. instant%rescued) return
-    call observer%shelf%rewind(reading=.false.)
-    call keep_system(observer%shelf, system)
+    call observer%snapshot%rewind(reading=.false.)
+    call keep_system(observer%snapshot, system)
     call fail(error, 'cut', status_interrupted)
   end subroutine observe
 
@@ -96,10 +96,10 @@ contains
       call ready(scene, set_up, error)
       if (allocated(error)) exit
       if (piece > 1) then
-        call cutter%shelf%rewind(reading=.true.)
-        call keep_system(cutter%shelf, set_up%system)
-        if (allocated(cutter%shelf%error)) then
-          call test_failed(error, cutter%shelf%error%message)
+        call cutter%snapshot%rewind(reading=.true.)
+        call keep_system(cutter%snapshot, set_up%system)
+        if (allocated(cutter%snapshot%error)) then
+          call test_failed(error, cutter%snapshot%error%message)
           exit
         end if
       end if
@@ -319,8 +319,8 @@ contains
       call ready(scene, set_up, error)
       if (allocated(error)) return
       if (piece > 1) then
-        call cutter%shelf%rewind(reading=.true.)
-        call keep_system(cutter%shelf, set_up%system)
+        call cutter%snapshot%rewind(reading=.true.)
+        call keep_system(cutter%snapshot, set_up%system)
       end if
       cutter%cuts = piece < 4
       call run_relaxation(set_up%system, set_up%plan%relaxation, cutter, fault)

@@ -233,7 +233,7 @@ contains
 
   subroutine test_initial(error)
     type(error_type), allocatable, intent(out) :: error
-    call expect_fault(error, base//'&initial /', '&initial gives nothing|a/b.nml:5')
+    call expect_fault(error, base//'&initial /', '&initial is empty|a/b.nml:5')
     call expect_fault(error, base//'&initial velocity_z = 1 /', &
       & "'velocity_z' in a scene of dimension 2|a/b.nml:5|no direction z")
     call expect_fault(error, base//'&initial displacement_gradient = 1 0 1 /', &

@@ -165,7 +165,7 @@ contains
     call wrong('&wind speed = 3 /', "group &wind lacks the key 'name'|a/b.nml:4|name of the wind")
     call wrong("&wind name = 'n' speed = -1 /", 'out of range in group &wind|expected > 0')
     call wrong("&wind name = 'n' name = 'm' /", "duplicate key 'name' in group &wind")
-    call wrong('&weather /&weather /', 'group &weather is given twice|it may stand only once')
+    call wrong('&weather /&weather /', 'group &weather is given twice|it may be given only once')
     call wrong('&wnd /', "unknown group &wnd|did you mean '&wind'?|study, wind, weather")
 
   contains

@@ -268,7 +268,7 @@ contains
     call expect_fault(error, "&material model = 'state_basd' /", &
       & "unknown value 'state_basd' of key 'model'|did you mean 'state_based'?|"// &
       & 'allowed: state_based, bond_based|a/b.nml:1')
-    call expect_fault(error, "&output fields = 'damage', 'Damage' /", "'damage' stands twice")
+    call expect_fault(error, "&output fields = 'damage', 'Damage' /", "'damage' is given twice")
     call expect_fault(error, "&boundary side = 'left' /", "unknown value 'left'|x_min, x_max")
   end subroutine test_choices
 

@@ -126,7 +126,7 @@ contains
     call expect_parts(error, found, "unknown column '1'|must name the columns|allowed: velocity_x")
     if (allocated(error)) return
     call read_table_text('heat heat', 't.txt', table, found, allowed=names)
-    call expect_parts(error, found, "column 'heat' stands twice|t.txt:1")
+    call expect_parts(error, found, "column 'heat' is given twice|t.txt:1")
     if (allocated(error)) return
     call read_table_text('heat'//line//'1 2', 't.txt', table, found, allowed=names)
     call expect_parts(error, found, 'wrong number of columns|t.txt:2|expected 1, found 2')

@@ -188,7 +188,7 @@ contains
     select case (line%command)
     case ('run', 'check', 'limits', 'study', 'choose')
       if (line%restart .and. line%overwrite) then
-        call usage(error, line, "'--restart' goes on with a run and '--overwrite' begins it "// &
+        call usage(error, line, "'--restart' continues a run and '--overwrite' starts it "// &
           & 'anew: give one of them')
       else if (len(line%argument) == 0) then
         call usage(error, line, "'"//line%command//"' needs the scene file")

@@ -400,7 +400,7 @@ contains
     text = ''
     if (tally%farther_in + tally%empty + tally%covered + tally%shared == 0) return
     text = 'the layer of &boundary number '//to_text(tally%boundary)//' ('// &
-      & trim(scene%boundaries(tally%boundary)%side)//') stands on '//to_text(tally%columns)// &
+      & trim(scene%boundaries(tally%boundary)%side)//') covers '//to_text(tally%columns)// &
       & ' of '//to_text(tally%columns + tally%farther_in + tally%empty + tally%covered)//' columns'
     if (tally%farther_in > 0) text = text//'; '//to_text(tally%farther_in)// &
       & ' begin farther in than the horizon'

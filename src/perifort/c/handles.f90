@@ -87,7 +87,7 @@ contains
       if (c_associated(handle, c_loc(holder))) return
       holder => holder%next
     end do
-    call fail(error, where//': this is no scene (NULL, freed, or a handle of something else)', &
+    call fail(error, where//': this is not a scene (NULL, freed, or a handle of another object)', &
       & status_usage)
   end subroutine find_scene
 
@@ -106,7 +106,7 @@ contains
       holder => holder%next
     end do
     if (.not. associated(holder)) call fail(fault, where// &
-      & ': this is no answer (NULL, freed, or a handle of something else)', status_usage)
+      & ': this is not an answer (NULL, freed, or a handle of another object)', status_usage)
     if (present(error)) then
       if (allocated(fault)) call move_alloc(fault, error)
     else

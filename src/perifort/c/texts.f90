@@ -75,7 +75,7 @@ contains
     real(c_double), pointer :: values(:)
 
     if (.not. c_associated(place)) then
-      call fail(error, where//': the place for the values is NULL', status_usage)
+      call fail(error, where//': the array for the values is NULL', status_usage)
     else if (room < size(found, kind=c_int64_t)) then
       call fail(error, where//': there are '//to_text(size(found))//' values, more than there '// &
         & 'is room for', status_usage)

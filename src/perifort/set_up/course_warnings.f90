@@ -86,12 +86,12 @@ contains
             & 'speeds: velocity_'//directions(c:c)//' of &boundary number '//to_text(i)// &
             & ' displaces its points by '//with_unit(way, 'm', 3)//' over the load steps, '// &
             & 'whose time runs from 0 to 1 s; displacement_'//directions(c:c)// &
-            & ' says that directly', tell=.false.)
+            & ' gives this directly', tell=.false.)
         end associate
       end do
     end do
     if (any(abs(system%state%v) > 0.0_wp .and. system%held == 0)) call warnings%add( &
-      & 'initial velocity', 'relaxation has no speeds: the velocities of &initial mean nothing', &
+      & 'initial velocity', 'relaxation has no velocities: those of &initial have no effect', &
       & tell=.false.)
   end subroutine warn_of_velocities
 

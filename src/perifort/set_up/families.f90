@@ -38,7 +38,7 @@ contains
     end if
     if (scene%horizon%family == 'lattice' .and. .not. suits) then
       call scene_fault(error, scene, 'horizon', 1, 'family', &
-        & 'the scene cannot have lattice families, which &horizon family asks for', reason)
+        & 'the scene cannot have the lattice families that &horizon family requests', reason)
       return
     end if
     mixed = scene%header%precision == 'mixed'

@@ -80,7 +80,7 @@ contains
     if (is_set(scene%time%step)) plan%step = scene%time%step
     if (.not. plan%step > 0.0_wp) then
       call scene_fault(error, scene, 'time', 1, 'step', 'a time step of '//to_text(plan%step)// &
-        & ' s leads nowhere', 'it must be above 0 (the stable step is '//to_text(plan%limit)//' s)')
+        & ' s is too small', 'it must be above 0 (the stable step is '//to_text(plan%limit)//' s)')
       return
     end if
     plan%steps = scene%time%steps

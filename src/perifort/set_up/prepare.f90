@@ -121,7 +121,7 @@ contains
       do i = 1, size(scene%cracks)
         call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
         if (cut == 0_i8) call set_up%warnings%add('idle crack '//to_text(i), '&crack number '// &
-          & to_text(i)//' cuts no bond, or none that another has not cut', tell=.false.)
+          & to_text(i)//' cuts no bond, or only bonds that another crack has cut', tell=.false.)
         set_up%cut = set_up%cut + cut
       end do
       if (set_up%cut > 0_i8) then

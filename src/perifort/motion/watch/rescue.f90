@@ -3,7 +3,7 @@
 module pd_motion_watch_rescue
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
-  use pd_base_shelf, only: shelf_type
+  use pd_base_snapshot, only: snapshot_type
   use pd_motion_keep, only: keep_system
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
@@ -13,7 +13,7 @@ module pd_motion_watch_rescue
 
   type :: good_state_type
     private
-    type(shelf_type) :: shelf
+    type(snapshot_type) :: snapshot
     type(instant_type) :: instant
     real(wp) :: most = huge(1.0_wp)   !! energy beyond which it is no good one after all [J]
     logical :: there = .false.
@@ -30,12 +30,12 @@ contains
     type(instant_type), intent(in) :: instant  !! of the state
     real(wp), intent(in), optional :: most     !! energy that the state may have; any by default [J]
 
-    call good%shelf%rewind(reading=.false.)
-    call keep_system(good%shelf, system)
+    call good%snapshot%rewind(reading=.false.)
+    call keep_system(good%snapshot, system)
     good%instant = instant
     good%most = huge(good%most)
     if (present(most)) good%most = most
-    good%there = .not. allocated(good%shelf%error)
+    good%there = .not. allocated(good%snapshot%error)
   end subroutine keep_good
 
   !> Put the last good state back and let the observer see it as what is left of the motion. An
@@ -51,9 +51,9 @@ contains
     real(wp), allocatable :: v(:, :)
 
     if (.not. good%there) return
-    call good%shelf%rewind(reading=.true.)
-    call keep_system(good%shelf, system)
-    if (allocated(good%shelf%error)) return
+    call good%snapshot%rewind(reading=.true.)
+    call keep_system(good%snapshot, system)
+    if (allocated(good%snapshot%error)) return
     system%time = good%instant%time
     if (good%most < huge(good%most)) then
       call velocities_now(system, good%instant%time, good%instant%kick, v)

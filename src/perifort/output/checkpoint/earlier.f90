@@ -57,11 +57,11 @@ contains
       & path = checkpoint_path(directory, stem)
     if (path == '') return
     if (unfinished(directory, stem)) then
-      call fail(error, 'there are results of an unfinished run already: '//path// &
-        & ' (--restart goes on with them, --overwrite replaces them, --output DIR puts the new '// &
+      call fail(error, 'results of an unfinished run exist already: '//path// &
+        & ' (--restart continues them, --overwrite replaces them, --output DIR puts the new '// &
         & 'ones elsewhere)')
     else
-      call fail(error, 'there are results already: '//path// &
+      call fail(error, 'results exist already: '//path// &
         & ' (--overwrite replaces them, --output DIR puts the new ones elsewhere)')
     end if
   end subroutine refuse_existing
@@ -76,8 +76,8 @@ contains
 
     call mark%open(mark_of(directory, stem), error)
     if (allocated(error)) return
-    call mark%line('The run that writes the results beside this file is under way, or was '// &
-      & 'stopped before its end.'//newline//'Started again with --restart, it goes on.', error)
+    call mark%line('The run that writes the results beside this file is in progress, or was '// &
+      & 'stopped before its end.'//newline//'With --restart it continues.', error)
     call mark%close(late)
     if (.not. allocated(error)) call move_alloc(late, error)
   end subroutine mark_unfinished

@@ -82,8 +82,8 @@ contains
     if (.not. restart%about%finished .or. restart%longer) return
     restart%complete = .true.
     call mark_complete(directory, stem)
-    restart%note = restart%note//newline//'  complete        the run has come to its end; '// &
-      & 'a longer one goes on with more &time steps or duration'
+    restart%note = restart%note//newline//'  complete        the run is finished; '// &
+      & 'increase &time steps or duration to continue it'
   end subroutine find_restart
 
   !> No checkpoint: from the beginning, or nothing to do, or results that must not go.
@@ -102,7 +102,7 @@ contains
     end if
     call scene_of_results(in_directory(directory, stem//'.vtkhdf'), text, ignored)
     if (.not. allocated(ignored)) restart%complete = text == scene_text(scene)
-    restart%note = '  complete        the results of this scene are there already: '// &
+    restart%note = '  complete        the results of this scene exist already: '// &
       & existing_results(directory, stem)
     if (.not. restart%complete) call refuse_existing(directory, stem, .false., error)
   end subroutine find_nothing
@@ -130,17 +130,17 @@ contains
 
     if (.not. file_exists(path)) then
       error%message = error%message//newline//'  there is no older one: --overwrite without '// &
-        & '--restart begins anew'
+        & '--restart starts again'
       return
     end if
     call open_checkpoint(path, older, fault)
     if (allocated(fault)) then
-      error%message = error%message//newline//'  so is the one before it ('//fault%message// &
-        & '): --overwrite without --restart begins anew'
+      error%message = error%message//newline//'  the one before it is damaged, too ('// &
+        & fault%message//'): --overwrite without --restart starts again'
     else
       call older%reader%close()
       error%message = error%message//newline//'  the one before it, of step '// &
-        & to_text(older%about%step)//', is whole; to go on from there: '//command//' '//path
+        & to_text(older%about%step)//', is intact; to continue from there: '//command//' '//path
     end if
   end subroutine offer_older
 
@@ -230,9 +230,9 @@ contains
         & '  may change: '//changeable(table)//newline//'  --overwrite without --restart '// &
         & 'computes the new scene from the beginning')
     else if (other_files /= '' .and. existing_results(directory, stem) /= '') then
-      call fail(error, 'the results that are there have another form than the scene asks for:'// &
-        & other_files//newline//'  with this checkpoint named and --output, the run goes on '// &
-        & 'into another folder, whose results begin there')
+      call fail(error, 'the existing results have another form than the scene requires:'// &
+        & other_files//newline//'  --restart CHECKPOINT --output OTHER continues the run in '// &
+        & 'another folder, whose results begin at the checkpoint')
     end if
     if (allocated(error)) call restart%reader%close()
   end subroutine compare

@@ -13,7 +13,7 @@ contains
   !> Its description.
   type(output_field_type) function damage_field() result(field)
     field%name = 'damage'
-    field%meaning = 'broken part of the bonds that a point had, 0 where none can break'
+    field%meaning = 'broken part of the initial bonds of a point, 0 where bonds cannot break'
     field%fill => fill
     field%at_slot => at_slot
     field%exact => exact

@@ -67,7 +67,7 @@ contains
     end if
     n = max(0, watch%n)
     if (n == 0) then
-      text = line('run time', 'not predicted: the run is over too soon')
+      text = line('run time', 'not predicted: the run is too short to time')
       return
     end if
     order = ascending(watch%seconds(:n))
@@ -78,8 +78,8 @@ contains
     call time_output(system, output)
     bytes = bytes_of_output(scene, table, system)
     if (plan%relaxes) then
-      text = line('run time', 'depends on the number of iterations, which is not known before')// &
-        & line('an iteration', with_unit(step, 's', 3)//' (measured)')
+      text = line('run time', 'depends on the number of iterations, which is not known '// &
+        & 'before the run')//line('an iteration', with_unit(step, 's', 3)//' (measured)')
     else
       least = set_up + plan%steps*fast + planned_rows(schedule)*row &
         & + planned_outputs(schedule, plan%step)*(output + bytes/fast_disk)

@@ -147,9 +147,9 @@ contains
     if (recorder%gave_way_at == instant%load_step) return
     recorder%gave_way_at = instant%load_step
     recorder%gave_way = recorder%gave_way + 1
-    call recorder%warn('conjugate gradient', 'the conjugate gradient finds no static '// &
-      & 'equilibrium in load step '//to_text(instant%load_step)//': dynamic relaxation goes on '// &
-      & 'from where it stands')
+    call recorder%warn('conjugate gradient', 'the conjugate gradient solver finds no static '// &
+      & 'equilibrium in load step '//to_text(instant%load_step)//': dynamic relaxation '// &
+      & 'continues from the present state')
   end subroutine note_giving_way
 
   !> Whether the run has had the time that it was given.
@@ -193,7 +193,7 @@ contains
     character(:), allocatable :: text
 
     text = ''
-    if (recorder%command /= '') text = newline//'  to go on: '//recorder%command
+    if (recorder%command /= '') text = newline//'  to continue: '//recorder%command
   end function way_on
 
   !> Write a checkpoint. If that fails, the run goes on with the one before it.

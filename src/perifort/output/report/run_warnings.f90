@@ -31,7 +31,7 @@ contains
     if (first > 0) text = 'at t = '//to_text(time)//' s points '// &
       & to_text(first)//' and '//to_text(second)// &
       & ', which share no intact bond, are closer than half a spacing: '// &
-      & 'there is no contact, pieces pass through each other from here on'
+      & 'there is no contact: pieces pass through each other'
   end function contact_warning
 
   !> Parts of the body have turned where the dilatation is projected.
@@ -47,8 +47,8 @@ contains
     if (share > least_turned) text = 'at t = '//to_text(time)//' s '// &
       & to_text(100*share, 2)//' % of the points are turned by more than 10 degrees, up to '// &
       & to_text(largest*180/pi, 3)//': the projected dilatation shrinks by the cosine of a '// &
-      & "rotation, so forces and energies are off; &horizon dilatation = 'unprojected' has no "// &
-      & 'such error'
+      & "rotation, so forces and energies are wrong; &horizon dilatation = 'unprojected' has "// &
+      & 'no such error'
   end function rotation_warning
 
   !> Strains are too large for a law that is linear in the stretch.
@@ -64,7 +64,7 @@ contains
     if (number > 0) text = 'at t = '//to_text(time)//' s intact bonds of '// &
       & counted(number, 'point')//' are strained by more than '//to_text(nint(100*large_strain))// &
       & ' %, the most by '//to_text(100*stretch, 3)//' % (point '//to_text(point)// &
-      & '): the material is linear in the strain and not meant for that'
+      & '): the material is linear in the strain and not valid for large strains'
   end function strain_warning
 
 end module pd_output_report_run_warnings

@@ -110,7 +110,7 @@ contains
       text = text//line('equation 7.25', with_unit(plan%equation, 's', 6)// &
         & '; the stable step is '//to_text(plan%limit/plan%equation, 3)//' times as long')
     else if (scene%time%limit == 'spectral') then
-      text = text//line('', 'the largest frequency allows no longer step')
+      text = text//line('', 'the largest frequency does not allow a larger step')
     end if
     text = text//line('7.25 as printed', printed(plan))
     text = text//line('book''s estimate', with_unit(plan%book, 's', 6))

@@ -135,7 +135,7 @@ contains
     end if
     if (.not. allocated(tokens)) then
       call source_fault(source, line, before + 1, max(1, last), "bad value '"//trim(value)// &
-        & "' for key '"//target%key//"'", 'expected what may stand behind key = in the file', error)
+        & "' for key '"//target%key//"'", 'expected a value as after key = in the file', error)
       return
     end if
     do i = 1, size(tokens)
@@ -374,7 +374,8 @@ contains
     element = element_of(target%subscript, extents)
     if (element == 0) then
       call source_fault(source, token%line, token%column, token%width, "'"//target%key//'('// &
-        & target%subscript//")' is no element of '"//target%key//"'", 'it is '//target%kind, error)
+        & target%subscript//")' is not an element of '"//target%key//"'", 'it is '// &
+        & target%kind, error)
       return
     end if
     allocate (used(size(source%entries)))

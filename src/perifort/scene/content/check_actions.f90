@@ -44,7 +44,7 @@ contains
         & is_set(initial%temperature_change) .or. &
         & any(abs(initial%displacement_gradient) > 0.0_wp) .or. &
         & any(abs(initial%velocity_gradient) > 0.0_wp))) then
-        call rule_fault(error, 'initial', number, '', 'group &initial gives nothing', &
+        call rule_fault(error, 'initial', number, '', 'group &initial is empty', &
           & 'expected displacement_x.., velocity_x.., a gradient, temperature_change or file', &
           & source)
       end if

@@ -339,7 +339,7 @@ contains
         kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', or a disc: "// &
           & "'centre', 'normal', 'radius'"
       end if
-      call rule_fault(error, 'crack', number, '', 'this is no crack of dimension '// &
+      call rule_fault(error, 'crack', number, '', 'this is not a crack of dimension '// &
         & to_text(dimension), kinds, source)
     else if (segment) then
       call check_vector(crack%from, 2, 'from', 'crack', number, error, source)

@@ -26,8 +26,8 @@ contains
     type(group_table), intent(out) :: table  !! all groups, in the order of the reference
     logical, parameter :: once = .false., repeated = .true.
 
-    call table%add('scene', 'The problem as a whole: its title, its dimension and what that '// &
-      & 'takes for granted.', once, header_type(), one=header)
+    call table%add('scene', 'The problem as a whole: its title, its dimension and the '// &
+      & 'assumptions that come with it.', once, header_type(), one=header)
     call table%add('body', 'Material points: a lattice that fills a box, or a cloud read from '// &
       & 'a file.', repeated, body_group(), all=bodies)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
@@ -44,7 +44,7 @@ contains
     call table%add('no_fail', 'A zone where no bond breaks: a region by its name, or a shape.', &
       & repeated, no_fail_group(), all=no_fail)
     call table%add('initial', 'The state at the start, of all points or of a region. The '// &
-      & 'groups are applied in order, each setting what it names.', repeated, initial_group(), &
+      & 'groups are applied in order, each sets the values it gives.', repeated, initial_group(), &
       & all=initial)
     call table%add('boundary', 'Imposed motion of a layer added outside a side, or of a '// &
       & 'region. Components not named stay free.', repeated, boundary_group(), all=boundaries)
@@ -58,7 +58,7 @@ contains
     call table%add('probe', 'The values of the nearest point in every row of the history.', &
       & repeated, probe_group(), all=probes)
     call table%add('study', 'A key that `perifort study` and `choose` vary. Several groups '// &
-      & 'make the product of their values; what is measured has to be given in one of them '// &
+      & 'make the product of their values; measure and against are given in one of them '// &
       & 'only. `run` ignores it.', repeated, study_group(), all=studies)
   end subroutine list_groups
 

@@ -128,7 +128,7 @@ contains
         do earlier = 1, s - 1
           if (source%sections(earlier)%name /= section%name) cycle
           call source_fault(source, section%line, section%column, section%width, &
-            & 'group &'//section%name//' is given twice', 'it may stand only once', error)
+            & 'group &'//section%name//' is given twice', 'it may be given only once', error)
           return
         end do
       end associate

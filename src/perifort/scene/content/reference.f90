@@ -57,10 +57,10 @@ contains
 
     write (unit, '(a)') '# Input reference', '', &
       & 'A scene is a text file of namelist groups, `&name key = value ... /`. Names of groups', &
-      & 'and keys may be written in any case; a `!` starts a comment; texts stand in quotes;', &
-      & 'several values are parted by commas or blanks, `3*0.0` repeats a value. Values are in', &
-      & 'SI units. `key(2) = ...` sets one element. Vectors have as many components as the', &
-      & 'scene has dimensions. A 3 x 3 matrix without subscripts runs down its columns:', &
+      & 'and keys may be written in any case; a `!` starts a comment; texts are in quotes;', &
+      & 'several values are separated by commas or blanks, `3*0.0` repeats a value. Values are', &
+      & 'in SI units. `key(2) = ...` sets one element. Vectors have as many components as the', &
+      & 'scene has dimensions. A 3 x 3 matrix without subscripts is read column by column:', &
       & '(1,1), (2,1), (3,1), (1,2), ...', '', &
       & 'Files named in a scene are looked for in the folder of the scene file, then in the', &
       & 'working directory.'

@@ -64,7 +64,7 @@ contains
       do k = 1, size(keys)
         if (.not. given(group, 1, trim(keys(k)), source)) cycle
         call warnings%add('idle key '//group//' '//trim(keys(k)), '&'//group//' '// &
-          & trim(keys(k))//' means nothing '//where_it_stands, tell=.false.)
+          & trim(keys(k))//' has no effect '//where_it_stands, tell=.false.)
       end do
     end subroutine warn_of_keys
 

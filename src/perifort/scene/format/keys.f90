@@ -449,7 +449,7 @@ contains
       if (allocated(keys%fault)) return
       value(i) = lower_case(value(i))
       if (any(value(:i - 1) == value(i))) then
-        call keys%complain(slots(i), "'"//trim(value(i))//"' stands twice in '"//name//"'", &
+        call keys%complain(slots(i), "'"//trim(value(i))//"' is given twice in '"//name//"'", &
           & 'once is enough')
         return
       end if

@@ -133,7 +133,7 @@ contains
         end if
         if (any(names(:i - 1) == word)) then
           call source_fault(source, line, first, final - first + 1, &
-            & "column '"//word//"' stands twice", 'once is enough', error)
+            & "column '"//word//"' is given twice", 'name each column once', error)
           return
         end if
       end do

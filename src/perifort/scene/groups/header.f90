@@ -34,7 +34,7 @@ contains
     class(header_type), intent(inout) :: group  !! its components are read or shown
     type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
-    call keys%key('title', group%title, 'what the scene shows')
+    call keys%key('title', group%title, 'title of the scene')
     call keys%key('dimension', group%dimension, '', 'number of directions', required=.true., &
       & at_least=1, at_most=3)
     call keys%key('plane', group%plane, '2D: plane stress or plane strain', &

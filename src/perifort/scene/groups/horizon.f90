@@ -37,13 +37,14 @@ contains
       & 'none'])
     call keys%key('surface_correction', group%surface_correction, 'correction of points with '// &
       & 'incomplete families (7.7)', allowed=[character(6) :: 'energy', 'none'])
-    call keys%key('dilatation', group%dilatation, 'unprojected: Lambda = 1, whatever way parts '// &
-      & 'are turned; projected: Lambda as in the book, for small rotations (default of 0.1)', &
+    call keys%key('dilatation', group%dilatation, 'unprojected: Lambda = 1, valid '// &
+      & 'for any rotation; projected: Lambda as in the book, for small rotations (default '// &
+      & 'of 0.1)', &
       & allowed=[character(11) :: 'unprojected', 'projected'], &
       & default="'unprojected'")
     call keys%key('family', group%family, &
       & 'how families are kept: a lattice where all points lie on grids, else lists; or one of '// &
-      & 'them by force', &
+      & 'them on request', &
       & allowed=[character(9) :: 'automatic', 'lattice', 'list'])
   end subroutine visit
 

@@ -41,10 +41,10 @@ contains
       & 'instead of making the product')
     call keys%key('measure', group%measure, 'a probe, a column of the history, or a field in '// &
       & 'the final state', default='required in one group')
-    call keys%key('against', group%against, 'what it is compared with: analytic, a closed '// &
+    call keys%key('against', group%against, 'reference for the error: analytic, a closed '// &
       & 'form; finest, the run that is the finest in every varied key; or the name of a file, '// &
-      & 'history.csv, '// &
-      & 'a table of positions and values, or results (.vtkhdf)', default='required in one group')
+      & 'history.csv, a table of positions and values, or results (.vtkhdf)', &
+      & default='required in one group')
     call keys%key('analytic', group%analytic, 'the closed form', allowed=closed_forms, &
       & default='the one that fits the scene')
     call keys%key('norm', group%norm, 'root mean square of the differences, the largest, or '// &

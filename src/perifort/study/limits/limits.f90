@@ -80,7 +80,7 @@ contains
         & to_text(system%family%n_bonds)//' bonds, '//system%family%describe()
       if (scene%time%method == 'relaxation') write (out, '(a)') '  The scene is static: '// &
         & 'these are the limits of explicit steps of its body, with the', &
-        & '  densities given in &material, 1 kg/m3 where none is given'
+        & '  densities given in &material, or 1 kg/m3 without one'
       write (out, '(a)') '  measuring the largest frequency, in a few hundred evaluations of '// &
         & 'the forces ...'
       flush (out)
@@ -178,7 +178,7 @@ contains
       & to_text(100*limits%spectrum%residual/limits%spectrum%squared, 1)//' %)'//newline
     if (limits%lasting > 0.0_wp) text = text//'  bonds breaking   '// &
       & with_unit(limits%lasting, 's', 6)//', '//to_text(limits%lasting/limits%equation, 4)// &
-      & " of 7.25 as used: valid for any broken bonds, taken by &time limit = 'spectral'"//newline
+      & " of 7.25 as used: valid for any broken bonds, used by &time limit = 'spectral'"//newline
     text = text//'Check by the growth of a small random disturbance:'
   end function text_of
 
@@ -209,7 +209,7 @@ contains
       if (growth >= unbounded) then
         text = text//'unstable'
       else if (steps < most_steps) then
-        text = text//'undecided, out of time'
+        text = text//'undecided: the time was used up'
       else if (growth < bounded) then
         text = text//'stable'
       else
@@ -219,7 +219,7 @@ contains
       if ((i == 1 .and. growth >= unbounded) .or. &
         & (i == 2 .and. growth < unbounded .and. steps == most_steps)) then
         call fail(error, 'the runs contradict the measured limit of '//with_unit(limit, 's', 6)// &
-          & '. Is the body about to buckle, or strained so far that it is not stable by itself?', &
+          & '. Is the body near buckling, or unstable because of large strain?', &
           & status_no_answer)
         return
       end if

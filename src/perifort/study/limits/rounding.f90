@@ -103,7 +103,8 @@ contains
       if (other%family%n_bonds /= body%family%n_bonds) then
         least = 0.0_wp
         write (unit, '(a)') '  '//label//': has '//to_text(other%family%n_bonds)// &
-          & ' bonds instead of '//to_text(body%family%n_bonds)//': rounding of positions decides'
+          & ' bonds instead of '//to_text(body%family%n_bonds)// &
+          & ': rounding of positions changes which bonds exist'
         return
       end if
       call vibrate(other, factor*start, usual, factor*step, steps, there, error)

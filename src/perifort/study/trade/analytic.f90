@@ -110,10 +110,10 @@ contains
       reason = 'the scene has a temperature change'
     end if
     do i = 1, size(scene%loads)
-      if (allocated(scene%loads(i)%times)) reason = 'a load has times of its own'
+      if (allocated(scene%loads(i)%times)) reason = 'a load has its own times'
     end do
     do i = 1, size(scene%boundaries)
-      if (allocated(scene%boundaries(i)%times)) reason = 'a boundary has times of its own'
+      if (allocated(scene%boundaries(i)%times)) reason = 'a boundary has its own times'
     end do
   end subroutine common_ground
 

@@ -252,7 +252,7 @@ contains
       if (allocated(outcomes(t)%fault)) then
         why = 'not used: no answer'
       else if (outcomes(t)%truth) then
-        why = 'not used: it is the run that all are compared with'
+        why = 'not used: it is the reference run'
       else if (.not. outcomes(t)%judged) then
         why = 'not used: its error is not known'
       else

@@ -108,7 +108,7 @@ contains
       end do
     end do
     if (.not. any(of)) then
-      fault = 'no position and time of the run lies within those compared with'
+      fault = 'no position and time of the run is inside the range of the reference'
       return
     end if
     error_norm = difference(measure%norm, record, reference, of)

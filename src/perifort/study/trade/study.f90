@@ -301,7 +301,7 @@ contains
       if (outcome%done) call judge(session, record, form, t, error)
       if (allocated(error)) return
       if (truth .and. .not. outcome%done) then
-        call fail(error, 'the finest run, with which all are compared, has no answer: '// &
+        call fail(error, 'the finest run, the reference, has no answer: '// &
           & outcome%fault, status_no_answer)
         return
       end if

@@ -1,12 +1,12 @@
 !> An archive in memory, for a state that may be wanted back before the program ends.
-module pd_base_shelf
+module pd_base_snapshot
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
   use pd_base_archive, only: archive_type
   use pd_base_error, only: fail
   use pd_base_kinds, only: i1, i8
   implicit none (type, external)
   private
-  public :: shelf_type
+  public :: snapshot_type
 
   !> One value that is kept.
   type :: parcel_type
@@ -16,33 +16,33 @@ module pd_base_shelf
 
   !> Values in the order in which they came. Between writing and reading, and before each use, call
   !> `rewind`. Writing again takes the room that is there.
-  type, extends(archive_type) :: shelf_type
+  type, extends(archive_type) :: snapshot_type
     private
     type(parcel_type), allocatable :: parcels(:)
     integer :: at = 0                          !! the parcel in hand
   contains
     procedure :: describe
     procedure :: move
-    procedure :: rewind => rewind_shelf
-  end type shelf_type
+    procedure :: rewind => rewind_snapshot
+  end type snapshot_type
 
 contains
 
   !> Begin anew, to read or to write.
-  subroutine rewind_shelf(self, reading)
-    class(shelf_type), intent(inout) :: self  !! the archive, set to its first value and without an
-                                              !! error; values that it keeps stay
+  subroutine rewind_snapshot(self, reading)
+    class(snapshot_type), intent(inout) :: self  !! the archive, set to its first value and without
+                                                 !! an error; values that it keeps stay
     logical, intent(in) :: reading  !! whether values are to be put back; else they are taken
 
     self%reading = reading
     self%at = 0
     if (allocated(self%error)) deallocate (self%error)
     if (.not. allocated(self%parcels)) allocate (self%parcels(32))
-  end subroutine rewind_shelf
+  end subroutine rewind_snapshot
 
   !> Go to the next value: note its extents, or in reading return them.
   subroutine describe(self, name, kind_name, extents)
-    class(shelf_type), intent(inout) :: self  !! the archive, at the next value on return; its
+    class(snapshot_type), intent(inout) :: self  !! the archive, at the next value on return; its
                                               !! `error` is set if none of this rank is kept
     character(*), intent(in) :: name          !! of the value, for the message; it is not compared
     character(*), intent(in) :: kind_name     !! kind of its elements, for the message; it is not
@@ -78,7 +78,7 @@ contains
 
   !> Copy the bytes of the value that was described last, from `place` or back to it.
   subroutine move(self, place, bytes)
-    class(shelf_type), intent(inout) :: self  !! the archive, with the value described
+    class(snapshot_type), intent(inout) :: self  !! the archive, with the value described
     type(c_ptr), intent(in) :: place          !! address of the value's first byte
     integer(i8), intent(in) :: bytes          !! length of the value [bytes]
     integer(i1), pointer, contiguous :: there(:)
@@ -97,4 +97,4 @@ contains
     end associate
   end subroutine move
 
-end module pd_base_shelf
+end module pd_base_snapshot
