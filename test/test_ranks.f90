@@ -159,8 +159,12 @@ contains
     end do
     do way = 1, 3
       select case (way)
-      case (1); slot = [(int(i, i4), i=1, n)]
-      case (2); slot = [(int(5 + i + 11*(i/37), i4), i=1, n)]
+      case (1)
+        slot = [(int(i, i4), i=1, n)]
+      case (2)  ! rows of 37 with gaps of 11
+        do i = 1, n
+          slot(i) = int(5 + i + 11*(i/37), i4)
+        end do
       case default
         other = [(int(1.0e9_wp*noise(state), i4), i=1, n)]
         slot = int(ascending_order(other), i4)
