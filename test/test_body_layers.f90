@@ -302,7 +302,7 @@ contains
       call expect_true(error, one%boundary == 1 .and. one%columns == 5 .and. one%farther_in == 3 &
         & .and. one%empty == 2 .and. one%covered == 0 .and. one%shared == 0, 'columns at the left')
       call expect_true(error, layer_count_text(scene, one) == 'the layer of &boundary number 1 '// &
-        & '(x_min) stands on 5 of 10 columns; 3 begin farther in than the horizon; 2 hold no '// &
+        & '(x_min) covers 5 of 10 columns; 3 begin farther in than the horizon; 2 hold no '// &
         & 'point', layer_count_text(scene, one))
     end associate
     call expect_true(error, count(body%layer == 1) == 15 .and. count(body%layer == 2) == 24, &
