@@ -214,7 +214,7 @@ contains
     call expect_fault(error, base//'&crack centre = 0 0 normal = 1 0 radius = 1 /', &
       & 'not a crack of dimension 2|a/b.nml:5|segment')
     call expect_fault(error, base_3d//'&crack from = 0 0 to = 1 1 /', &
-      & 'no crack of dimension 3|parallelogram|disc')
+      & 'not a crack of dimension 3|parallelogram|disc')
     call expect_fault(error, base//'&crack /', 'not a crack of dimension 2')
     call expect_fault(error, base//'&crack from = 0 0 /', "&crack lacks the key 'to'")
     call expect_fault(error, base//'&crack from = 0 0 to = 0 0 /', 'a crack without length')
@@ -223,7 +223,7 @@ contains
     call expect_fault(error, base_3d//'&crack centre = 3*0 normal = 3*0 radius = 1 /', 'is zero')
     call expect_fault(error, base_3d//'&crack centre = 3*0 normal = 1 0 0 /', "'radius'")
     call expect_fault(error, base_3d//'&crack centre = 3*0 normal = 1 0 0 radius = 1 to = 3*0 /', &
-      & 'no crack of dimension 3')
+      & 'not a crack of dimension 3')
     call expect_fault(error, '&scene dimension = 1 /'//soft// &
       & '&body lower = 0 upper = 1 points = 3 /'//go//'&crack from = 0 to = 1 /', &
       & 'a crack in a scene of dimension 1')
