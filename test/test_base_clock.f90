@@ -13,15 +13,15 @@ contains
   subroutine collect_base_clock(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('durations are said in words', test_durations), &
-      & new_unittest('durations that cannot be are said so', test_strange_durations), &
+      & new_unittest('durations are written in words', test_durations), &
+      & new_unittest('impossible durations are marked', test_strange_durations), &
       & new_unittest('the clock runs forward', test_clock), &
       & new_unittest('a phase counts only its own time', test_phases), &
       & new_unittest('many phases are kept apart', test_many_phases), &
       & new_unittest('the table names phases, other time and total', test_table), &
-      & new_unittest('the progress line tells all', test_progress_text), &
-      & new_unittest('100 % is said only at the end', test_not_yet), &
-      & new_unittest('a log gets few lines and the last one', test_log), &
+      & new_unittest('the progress line is complete', test_progress_text), &
+      & new_unittest('100 % is printed only at the end', test_not_yet), &
+      & new_unittest('a log has few lines and the last one', test_log), &
       & new_unittest('a terminal is rewritten in place', test_terminal), &
       & new_unittest('a quiet run shows nothing', test_quiet), &
       & new_unittest('showing progress is cheap', test_cheap)]

@@ -23,7 +23,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('the first signal is noted', test_signals), &
-      & new_unittest('what a queue repeats does no harm', test_repeated)]
+      & new_unittest('repeated signals are harmless', test_repeated)]
   end subroutine collect_base_interrupt
 
   !> Interrupt, termination and warning, each after watching anew.

@@ -20,7 +20,7 @@ contains
       & new_unittest('distances of words', test_distance), &
       & new_unittest('a distance is symmetric', test_symmetry), &
       & new_unittest('the nearest name is found', test_nearest), &
-      & new_unittest('a far name has no neighbour', test_far), &
+      & new_unittest('a very different name has no suggestion', test_far), &
       & new_unittest('things are counted', test_counted), &
       & new_unittest('names are joined', test_join)]
   end subroutine collect_base_text

@@ -20,11 +20,11 @@ contains
     testsuite = [ &
       & new_unittest('lattice points run x fastest, at the centres of cells', test_order), &
       & new_unittest('shapes cut points out', test_removed), &
-      & new_unittest('a body cut away is refused', test_nothing_left), &
+      & new_unittest('a completely removed body is refused', test_nothing_left), &
       & new_unittest('clouds come from files', test_cloud), &
       & new_unittest('bad clouds are refused', test_bad_cloud), &
       & new_unittest('layers follow the body, group by group', test_layers), &
-      & new_unittest('layers continue the outermost bodies alone', test_layers_of_bodies), &
+      & new_unittest('layers continue only the outermost bodies', test_layers_of_bodies), &
       & new_unittest('rows of layers do not depend on rounding', test_rows)]
   end subroutine collect_body_generate
 

@@ -24,13 +24,13 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('a body cut to size has the layers of a smaller one', test_cut), &
-      & new_unittest('a cut strip pulls as it must', test_pull), &
+      & new_unittest('a cut strip has the exact reaction', test_pull), &
       & new_unittest('reactions of layers on all sides', test_reactions), &
-      & new_unittest('columns of holes and curved sides start where they must', test_columns), &
+      & new_unittest('columns at holes and curved sides start correctly', test_columns), &
       & new_unittest('columns without a layer are counted', test_counts), &
       & new_unittest('at a cut corner the earlier layer has the cells', test_corner), &
-      & new_unittest('bodies that stand before others have the layer', test_cover), &
-      & new_unittest('layers that join nothing, or overlap, are refused', test_refused), &
+      & new_unittest('only the outermost of several bodies has a layer', test_cover), &
+      & new_unittest('layers without bonds, or that overlap, are refused', test_refused), &
       & new_unittest('initial states and no-fail shapes hold for layers', test_state)]
   end subroutine collect_body_layers
 

@@ -22,10 +22,10 @@ contains
       & test_expansion), &
       & new_unittest('pure shear has the classical energy', test_shear), &
       & new_unittest('bars have E/2 strain^2', test_bar), &
-      & new_unittest('a vanishes at the special ratio, and there alone', test_special), &
-      & new_unittest('bond constants are the known ones', test_bond_constants), &
+      & new_unittest('a vanishes only at the special ratio', test_special), &
+      & new_unittest('bond constants have the published values', test_bond_constants), &
       & new_unittest('the critical stretch releases Gc', test_critical_stretch), &
-      & new_unittest('what all bonds through a plane release, by quadrature', test_released)]
+      & new_unittest('energy released by all bonds through a plane, by quadrature', test_released)]
   end subroutine collect_body_material
 
   !> Integrals over a whole horizon of the unit vector's function, done with Gauss points in angle:

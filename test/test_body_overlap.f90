@@ -20,7 +20,7 @@ contains
       & new_unittest('a point of one lattice in another is an overlap', test_lattices), &
       & new_unittest('lattices of different spacing', test_spacings), &
       & new_unittest('cells that were removed are free', test_hole), &
-      & new_unittest('points of clouds may be near, but not in one place', test_clouds)]
+      & new_unittest('points of clouds may be close, but not coincide', test_clouds)]
   end subroutine collect_body_overlap
 
   !> Two boxes of 6 cells along each axis, the second one shifted. Depth by which the second one's

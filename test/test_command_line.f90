@@ -23,18 +23,18 @@ contains
       & new_unittest('run with all its options', test_run), &
       & new_unittest('options may stand before the file and take =', test_order), &
       & new_unittest('defaults', test_defaults), &
-      & new_unittest('going on with a run', test_restart), &
+      & new_unittest('continuing a run', test_restart), &
       & new_unittest('keys that are set', test_set), &
-      & new_unittest('commands as a shell needs them', test_quoted), &
+      & new_unittest('commands are quoted for a shell', test_quoted), &
       & new_unittest('the texts in doc/printed are up to date', test_printed), &
       & new_unittest('bench with all its options', test_bench), &
       & new_unittest('limits with its options', test_limits), &
       & new_unittest('names after -- may begin with a dash', test_dashes), &
-      & new_unittest('help is there for every command', test_help), &
-      & new_unittest('--help excuses what is missing', test_help_excuses), &
+      & new_unittest('every command has help', test_help), &
+      & new_unittest('--help needs no other arguments', test_help_excuses), &
       & new_unittest('--version is version', test_version), &
-      & new_unittest('wrong command lines are told so', test_wrong), &
-      & new_unittest('what was meant is suggested', test_suggestions)]
+      & new_unittest('wrong command lines are errors', test_wrong), &
+      & new_unittest('the nearest name is suggested', test_suggestions)]
   end subroutine collect_command_line
 
   subroutine test_run(error)

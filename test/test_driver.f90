@@ -34,17 +34,17 @@ contains
       & new_unittest('a flying plate arrives in its files', test_flight), &
       & new_unittest('results are not overwritten unasked', test_refuses), &
       & new_unittest('other formats are written as asked', test_formats), &
-      & new_unittest('a relaxation leaves its history', test_relaxation), &
-      & new_unittest('a run without an answer keeps its history', test_unstable), &
-      & new_unittest('a relaxation without rest keeps its history', test_restless), &
+      & new_unittest('a relaxation writes its history', test_relaxation), &
+      & new_unittest('a failed run keeps its history', test_unstable), &
+      & new_unittest('a relaxation without convergence keeps its history', test_restless), &
       & new_unittest('the last good state is the last output', test_last_good), &
       & new_unittest('a wrong condition has a place', test_bounds), &
       & new_unittest('warnings are counted and kept', test_warnings), &
-      & new_unittest('dissipated energy that is hardly known is warned of', test_dissipation), &
-      & new_unittest('a body that is unstable before any load is warned of', test_unstable_body), &
-      & new_unittest('rotations are told where they matter', test_rotation), &
+      & new_unittest('inaccurate dissipated energy causes a warning', test_dissipation), &
+      & new_unittest('a body unstable before any load causes a warning', test_unstable_body), &
+      & new_unittest('rotations are reported for the projected dilatation', test_rotation), &
       & new_unittest('results cannot leave their folder', test_inside), &
-      & new_unittest('a scene that cannot be leaves no files', test_impossible), &
+      & new_unittest('an impossible scene leaves no files', test_impossible), &
       & new_unittest('checking a scene leaves no files', test_check), &
       & new_unittest('quiet prints nothing', test_quiet)]
   end subroutine collect_driver

@@ -28,14 +28,14 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('the modulus of a chain at every horizon ratio', test_modulus), &
-      & new_unittest('bonds at the edge: where a family jumps and where it does not', test_edge), &
-      & new_unittest('bars strained alike at every ratio with surface correction', test_uniform), &
+      & new_unittest('bonds at the horizon: rules with and without a jump', test_edge), &
+      & new_unittest('corrected bars have the same strain at every ratio', test_uniform), &
       & new_unittest('horizons from a spacing to beyond the body', test_ratios), &
       & new_unittest('bodies of one point''s thickness', test_thin), &
       & new_unittest('a chain in space is a bar held from contracting', test_chain), &
       & new_unittest('a chain or sheet bends without force', test_membrane), &
-      & new_unittest('one point alone is refused, or flies', test_one_point), &
-      & new_unittest('two points swing as their formula says', test_two_points)]
+      & new_unittest('one point alone is refused, or moves freely', test_one_point), &
+      & new_unittest('two points vibrate as their closed form', test_two_points)]
   end subroutine collect_extremes_geometry
 
   !> A bar without surface correction under the strain e, long enough for full families in its

@@ -30,11 +30,11 @@ contains
   subroutine collect_extremes_materials(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('plane waves feel the lattice sum at every Poisson''s ratio', test_waves), &
+      & new_unittest('plane waves have the lattice sum at every Poisson''s ratio', test_waves), &
       & new_unittest('no wave is faster than the step allows', test_step_covers), &
       & new_unittest('7.25 as printed has no step where its sum is negative', test_printed), &
       & new_unittest('beside the special ratio forces differ by its distance', test_special), &
-      & new_unittest('towards 1/2 the step falls with the root of 1/2 - nu', test_incompressible), &
+      & new_unittest('the step decreases with the root of 1/2 - nu', test_incompressible), &
       & new_unittest('at -0.9 a free block keeps its energy', test_auxetic), &
       & new_unittest('a body that gains energy by straining is refused', test_negative)]
   end subroutine collect_extremes_materials

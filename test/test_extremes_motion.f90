@@ -24,13 +24,13 @@ contains
   subroutine collect_extremes_motion(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('a point that lost all its bonds flies on alone', test_lone_point), &
-      & new_unittest('long: halves of a torn plate fly apart for a million steps', test_torn), &
-      & new_unittest('a bond crushed through its own length gives back its energy', test_crushed), &
-      & new_unittest('a body turned 10,000 times has no force', test_turned), &
-      & new_unittest('long: a dumbbell is where it was after 10,000 turns', test_dumbbell), &
+      & new_unittest('a point that lost all its bonds keeps its velocity', test_lone_point), &
+      & new_unittest('long: halves of a broken plate separate for a million steps', test_torn), &
+      & new_unittest('a bond compressed through zero length returns its energy', test_crushed), &
+      & new_unittest('a body rotated 10,000 times has no force', test_turned), &
+      & new_unittest('long: a dumbbell returns to its place after 10,000 turns', test_dumbbell), &
       & new_unittest('vibrations of 1e-150 and 0.5 are one, scaled', test_strains), &
-      & new_unittest('rest under strains from 1e-14 to 1', test_rest)]
+      & new_unittest('static equilibrium at strains from 1e-14 to 1', test_rest)]
   end subroutine collect_extremes_motion
 
   !> Run and fail the test where the run does.

@@ -30,9 +30,9 @@ contains
     testsuite = [ &
       & new_unittest('a step of 0 is refused', test_no_step), &
       & new_unittest('steps of 1e-30 s move by v dt', test_tiny_step), &
-      & new_unittest('beyond the limit a run stops no later than the formula says', test_beyond), &
-      & new_unittest('an unstable step does not pass for fracture', test_dust), &
-      & new_unittest('loads beyond all bounds are refused as such', test_loads), &
+      & new_unittest('above the limit a run stops as early as predicted', test_beyond), &
+      & new_unittest('an unstable step is not mistaken for fracture', test_dust), &
+      & new_unittest('excessive loads are named in the message', test_loads), &
       & new_unittest('denormal numbers are flushed on every thread', test_denormals)]
   end subroutine collect_extremes_steps
 

@@ -22,8 +22,8 @@ contains
       & new_unittest('random clouds of varying spacing: the same families as brute force', &
       & test_clouds), &
       & new_unittest('whole families have the known numbers of members', test_counts), &
-      & new_unittest('membership at the edge is free of rounding', test_edge), &
-      & new_unittest('far-flung points cost no memory', test_far_flung), &
+      & new_unittest('membership at the horizon does not depend on rounding', test_edge), &
+      & new_unittest('distant points need no extra memory', test_far_flung), &
       & new_unittest('work grows linearly with the points', test_work), &
       & new_unittest('long: a million points', test_million)]
   end subroutine collect_family_cells

@@ -20,13 +20,13 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('local damage beside a straight crack', test_damage), &
-      & new_unittest('a segment cuts what passes through it', test_segment), &
+      & new_unittest('a segment cuts the bonds through it', test_segment), &
       & new_unittest('a point on the crack''s plane lies on its normal''s side', test_on_plane), &
-      & new_unittest('touching the rim is passing through', test_rim), &
+      & new_unittest('a bond that touches the rim is cut', test_rim), &
       & new_unittest('a parallelogram, aslant and not rectangular', test_parallelogram), &
       & new_unittest('a disc, aslant', test_disc), &
-      & new_unittest('a crack through a row of points, wherever the body lies', test_shifted), &
-      & new_unittest('a disc in a block cuts what was counted', test_disc_in_block), &
+      & new_unittest('a crack through a row of points at any position', test_shifted), &
+      & new_unittest('a disc in a block cuts the counted bonds', test_disc_in_block), &
       & new_unittest('two cracks through one bond cut it once', test_twice)]
   end subroutine collect_family_cracks
 

@@ -17,7 +17,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('bonds between bodies are counted pair by pair', test_count), &
-      & new_unittest('nothing is told where no bond joins bodies', test_none)]
+      & new_unittest('no warning if no bond joins bodies', test_none)]
   end subroutine collect_family_joints
 
   !> Three bodies in a row, the third one first in the scene and turned, on one grid and on three,

@@ -39,14 +39,14 @@ contains
       & new_unittest('bodies that no bond joins keep their grids', test_apart), &
       & new_unittest('a bond between two grids makes a list', test_joined), &
       & new_unittest('bodies on one grid share a lattice', test_shared), &
-      & new_unittest('lattice asked for and impossible is refused', test_refused), &
-      & new_unittest('list asked for is a list', test_list), &
+      & new_unittest('an impossible lattice is refused', test_refused), &
+      & new_unittest('a requested list is a list', test_list), &
       & new_unittest('two grids move as two lists do', test_motion), &
       & new_unittest('overlapping bodies are refused', test_overlap), &
       & new_unittest('every bond has its bit', test_bits), &
-      & new_unittest('breaking leaves what it leaves in lists', test_breaking), &
+      & new_unittest('breaking has the same result as in lists', test_breaking), &
       & new_unittest('random holes agree with the theory', test_holes), &
-      & new_unittest('the kinds that most blocks share have tables', test_most_used), &
+      & new_unittest('the most common kinds of blocks have tables', test_most_used), &
       & new_unittest('long: more kinds of blocks than tables', test_on_the_fly), &
       & new_unittest('a chain in space keeps its ends', test_chain)]
   end subroutine collect_family_lattice

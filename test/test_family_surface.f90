@@ -34,7 +34,7 @@ contains
       & new_unittest('factors of a bar', test_bar), &
       & new_unittest('the factor of a bond is an ellipsoid''s', test_ellipsoid), &
       & new_unittest('uniform strain of bars, plates and blocks', test_uniform), &
-      & new_unittest('without correction the same surfaces are far off', test_uncorrected), &
+      & new_unittest('without correction the same surfaces have a large error', test_uncorrected), &
       & new_unittest('no stretch across a chain or a sheet leaves factors of 1', test_thin), &
       & new_unittest('factors don''t know of cracks', test_cracks)]
   end subroutine collect_family_surface

@@ -20,7 +20,7 @@ contains
       & new_unittest('cells of a bar: covered lengths', test_bar), &
       & new_unittest('cells of a grid add up to the disc and the ball', test_ball), &
       & new_unittest('cells cut by a plane-like or quarter horizon', test_known_cells), &
-      & new_unittest('covered parts know no direction', test_symmetry), &
+      & new_unittest('covered parts do not depend on direction', test_symmetry), &
       & new_unittest('a cell halved in each direction keeps its covered volume', test_halves), &
       & new_unittest('rules by name', test_names)]
   end subroutine collect_family_volume

@@ -20,7 +20,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('bonds hold up to the critical stretch and break beyond', test_limit), &
-      & new_unittest('compression breaks only what may break in it', test_compression), &
+      & new_unittest('compression breaks only materials that allow it', test_compression), &
       & new_unittest('a broken bond stays broken', test_for_good), &
       & new_unittest('between materials the smaller critical stretch counts', test_interface), &
       & new_unittest('no-fail zones hold bonds with an end in them', test_no_fail), &
@@ -28,7 +28,7 @@ contains
       & new_unittest('pre-cracks are damage but not broken bonds', test_counts), &
       & new_unittest('a body torn apart dissipates all its strain energy', test_energy), &
       & new_unittest('forces after breaking are those of the bonds left', test_forces), &
-      & new_unittest('material that cannot fail costs no look', test_no_breaking)]
+      & new_unittest('unbreakable material needs no detection', test_no_breaking)]
   end subroutine collect_force_breaking
 
   !> A plate with critical stretch.

@@ -29,19 +29,19 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('fast loops agree with the theory point by point', test_reference), &
-      & new_unittest('turned bodies agree with the theory, too', test_turned), &
+      & new_unittest('rotated bodies agree with the theory', test_turned), &
       & new_unittest('a heated body has forces without its thermal strain', test_unheated), &
       & new_unittest('net force and moment vanish', test_balance), &
       & new_unittest('rigid motions give no force', test_rigid), &
       & new_unittest('the force is the gradient of the energy', test_gradient), &
-      & new_unittest('bonds keep no memory of the order of their ends', test_mirror), &
+      & new_unittest('bonds do not depend on the order of their ends', test_mirror), &
       & new_unittest('stretch keeps its digits from 1e-16 to 10', test_stretch), &
       & new_unittest('crushed bonds give finite forces', test_crushed), &
       & new_unittest('breaking is the same from both ends', test_breaking), &
       & new_unittest('the same bits on 1, 2 and 4 threads', test_threads), &
       & new_unittest('keys that collide change nothing', test_collisions), &
       & new_unittest('clusters of lists share tables', test_shared), &
-      & new_unittest('any critical stretch leaves the fast formulas their range', test_critical)]
+      & new_unittest('the fast formulas keep their range for any critical stretch', test_critical)]
   end subroutine collect_force_contract
 
   !> Force, dilatation and energy by both ways, from tiny strains to large ones, since loops may

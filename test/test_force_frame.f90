@@ -29,12 +29,12 @@ contains
   subroutine collect_force_frame(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('a turned body has turned forces and the same energy', test_turned), &
+      & new_unittest('a rotated body has rotated forces and the same energy', test_turned), &
       & new_unittest('the projected dilatation vanishes at a right angle', test_projected), &
-      & new_unittest('mixed precision keeps its digits wherever a body lies', test_moved), &
+      & new_unittest('mixed precision keeps its digits for any position of a body', test_moved), &
       & new_unittest('a spinning, vibrating body keeps its energy', test_spinning), &
       & new_unittest('rotations are found at any strain', test_angle), &
-      & new_unittest('turned bodies are told from strained and broken ones', test_part)]
+      & new_unittest('rotated bodies are distinguished from strained and broken ones', test_part)]
   end subroutine collect_force_frame
 
   !> The axis of rotations in so many dimensions.

@@ -109,21 +109,21 @@ contains
   subroutine collect_force_term(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('a body on springs swings as leapfrog''s formula says', test_frequency), &
-      & new_unittest('every integrator converges to the swing', test_orders), &
-      & new_unittest('dashpots damp as the discrete equation says', test_damping), &
+      & new_unittest('a body on springs vibrates as leapfrog''s formula says', test_frequency), &
+      & new_unittest('every integrator converges to the vibration', test_orders), &
+      & new_unittest('dashpots damp as the discrete equation predicts', test_damping), &
       & new_unittest('friction dissipates yield times slip', test_friction), &
       & new_unittest('the step is stable up to the limit and not beyond', test_step), &
-      & new_unittest('the limit from the largest frequency knows terms', test_spectral_step), &
+      & new_unittest('the limit from the largest frequency includes terms', test_spectral_step), &
       & new_unittest('a link keeps momentum and energy', test_link), &
       & new_unittest('an external term is a load', test_external), &
       & new_unittest('a restart has the same bits', test_restart), &
-      & new_unittest('a restart amid a relaxation has the same bits', test_static_restart), &
+      & new_unittest('a restart within a relaxation has the same bits', test_static_restart), &
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('static equilibrium on springs, by both solvers', test_static), &
       & new_unittest('static equilibrium of two bodies with a link', test_static_link), &
       & new_unittest('a term without a tangent is refused by name', test_refusal), &
-      & new_unittest('a list adds up what its terms say', test_list)]
+      & new_unittest('a list sums its terms', test_list)]
   end subroutine collect_force_term
 
   ! ---------------------------------------------------------------- springs to the ground

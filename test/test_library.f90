@@ -47,13 +47,13 @@ contains
     testsuite = [ &
       & new_unittest('a scene needs no list that it does not use', test_no_lists), &
       & new_unittest('every group can be filled', test_groups), &
-      & new_unittest('a complete scene stays as it is', test_twice), &
+      & new_unittest('a complete scene is not changed', test_twice), &
       & new_unittest('words may be written in any case', test_case), &
-      & new_unittest('faults are told as in files, but for the place', test_faults), &
-      & new_unittest('what a run finds has its group', test_late_fault), &
+      & new_unittest('errors are reported as in files, except for the place', test_faults), &
+      & new_unittest('errors of a run name their group', test_late_fault), &
       & new_unittest('a preview is a text and leaves no files', test_preview), &
       & new_unittest('an observer sees every instant', test_observer), &
-      & new_unittest('an observer stops a run in order', test_stop), &
+      & new_unittest('an observer stops a run cleanly', test_stop), &
       & new_unittest('an observer ends a run by an error', test_fail), &
       & new_unittest('results in memory are those in files', test_files), &
       & new_unittest('results before a fault are kept', test_unstable), &

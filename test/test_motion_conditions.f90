@@ -21,8 +21,8 @@ contains
       & new_unittest('tables are linear between and constant outside', test_table), &
       & new_unittest('integrals of tables are exact', test_integral), &
       & new_unittest('imposed velocity and displacement', test_imposed), &
-      & new_unittest('of several motions the last holds a component', test_last), &
-      & new_unittest('loads add up to what was asked', test_loads), &
+      & new_unittest('of several motions the last constrains a component', test_last), &
+      & new_unittest('loads have the prescribed sum', test_loads), &
       & new_unittest('initial gradients and regions', test_initial), &
       & new_unittest('initial states from a file are in the order of points', test_file), &
       & new_unittest('uniform heating: free expansion has no force', test_heating), &

@@ -39,7 +39,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('leapfrog''s invariant holds to rounding while bonds break', test_invariant), &
-      & new_unittest('long: the balance closes at second order, whatever the body', &
+      & new_unittest('long: the balance closes at second order for every body', &
       & test_bodies), &
       & new_unittest('long: the balance closes at second order with every integrator', &
       & test_integrators), &

@@ -40,16 +40,16 @@ contains
   subroutine collect_motion_energy_watch(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('energy that is exchanged is no fault', test_exchange), &
-      & new_unittest('energy that is supplied is no fault', test_supplied), &
-      & new_unittest('a load that begins to push is no fault', test_begin), &
-      & new_unittest('energy from nowhere is found', test_nowhere), &
-      & new_unittest('no number is no energy', test_no_number), &
-      & new_unittest('states are kept rarely and only good ones', test_kept), &
-      & new_unittest('where nobody looks, kinetic energy decides', test_kept_alone), &
-      & new_unittest('a velocity that is none is found in its step', test_at_once), &
-      & new_unittest('what grows is found within ten steps', test_growth), &
-      & new_unittest('a kept state is looked at before it is shown', test_shown)]
+      & new_unittest('exchanged energy is not an error', test_exchange), &
+      & new_unittest('supplied energy is not an error', test_supplied), &
+      & new_unittest('a load that starts to push is not an error', test_begin), &
+      & new_unittest('unsupplied energy is detected', test_nowhere), &
+      & new_unittest('NaN is not an energy', test_no_number), &
+      & new_unittest('snapshots are rare and only of good states', test_kept), &
+      & new_unittest('without rows kinetic energy decides', test_kept_alone), &
+      & new_unittest('a non-finite velocity is detected in its step', test_at_once), &
+      & new_unittest('growth is detected within ten steps', test_growth), &
+      & new_unittest('a snapshot is checked before it is written', test_shown)]
   end subroutine collect_motion_energy_watch
 
   subroutine observe(observer, system, instant, error)

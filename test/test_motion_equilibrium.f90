@@ -39,15 +39,15 @@ contains
     testsuite = [ &
       & new_unittest('a load on a support that has moved', test_moved), &
       & new_unittest('a stiff block pressed into a soft pad', test_pad), &
-      & new_unittest('supports that turn a body', test_turned), &
-      & new_unittest('a load that vanishes in rounding', test_drowned), &
+      & new_unittest('supports that rotate a body', test_turned), &
+      & new_unittest('a load below rounding error', test_drowned), &
       & new_unittest('supports that strain less than rounding', test_drowned_supports), &
       & new_unittest('a small load on a heated body', test_heated), &
-      & new_unittest('a loose piece and isolated points stay', test_loose), &
-      & new_unittest('a piece torn off with its load', test_torn_off), &
-      & new_unittest('a piece torn off without load', test_goes_on), &
+      & new_unittest('a detached piece and isolated points keep their place', test_loose), &
+      & new_unittest('a detached piece with its load', test_torn_off), &
+      & new_unittest('a detached piece without load', test_goes_on), &
       & new_unittest('a free body is written as it was found', test_curl), &
-      & new_unittest('a rigid motion is taken back exactly', test_turn_back)]
+      & new_unittest('a rigid motion is undone exactly', test_turn_back)]
   end subroutine collect_motion_equilibrium
 
   subroutine observe(observer, system, instant, error)

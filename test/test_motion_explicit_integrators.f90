@@ -30,7 +30,7 @@ contains
       & new_unittest('an oscillator moves as leapfrog''s formula says', test_oscillator), &
       & new_unittest('waves in a chain have the discrete frequency', test_dispersion), &
       & new_unittest('free flight is exact', test_flight), &
-      & new_unittest('a body that falls apart is an error with step and point', test_unstable)]
+      & new_unittest('a diverged run is an error with step and point', test_unstable)]
   end subroutine collect_motion_explicit_integrators
 
   !> A plate that moves smoothly and not linearly: initial velocities and displacements of long

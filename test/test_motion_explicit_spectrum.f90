@@ -33,11 +33,11 @@ contains
       & new_unittest('a chain of 2000: the top of the dispersion relation', test_dispersion), &
       & new_unittest('seven bodies: the ratios of a sparse eigenvalue solver', test_ratios), &
       & new_unittest('the same bits on any number of threads', test_threads), &
-      & new_unittest('everything held: nothing vibrates', test_held), &
+      & new_unittest('everything constrained: no vibration', test_held), &
       & new_unittest('no breaking exceeds the lasting bound', test_lasting), &
       & new_unittest('two materials: each point''s own share in the lasting bound', &
       & test_two_materials), &
-      & new_unittest('two materials torn to pieces at 0.95 of the lasting bound', test_torn)]
+      & new_unittest('two materials fragmented at 0.95 of the lasting bound', test_torn)]
   end subroutine collect_motion_explicit_spectrum
 
   !> Points that see their nearest neighbours only, q = E/(A delta^2): each is held by springs of

@@ -26,7 +26,7 @@ contains
     testsuite = [ &
       & new_unittest('a held bar is heated over the load steps', test_load_steps), &
       & new_unittest('a table of temperatures in statics', test_table), &
-      & new_unittest('heating works on a body: the energies balance', test_balance), &
+      & new_unittest('heating does work on a body: the energies balance', test_balance), &
       & new_unittest('a constant course changes nothing', test_constant), &
       & new_unittest('warnings about courses', test_warnings), &
       & new_unittest('the predicted memory', test_memory)]

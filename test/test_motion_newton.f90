@@ -41,13 +41,13 @@ contains
     testsuite = [ &
       & new_unittest('small strains in load steps', test_linear), &
       & new_unittest('Newton''s iterations at large strains', test_large), &
-      & new_unittest('solves that go uphill', test_uphill), &
+      & new_unittest('solves with growing residual', test_uphill), &
       & new_unittest('a growing crack', test_crack), &
       & new_unittest('a body without support', test_unsupported), &
       & new_unittest('left to dynamic relaxation', test_fallback), &
       & new_unittest('a list of bonds', test_list), &
       & new_unittest('a block in mixed precision', test_mixed), &
-      & new_unittest('no rest amid a load step is shown for good', test_no_rest)]
+      & new_unittest('no unconverged state within a load step becomes an output', test_no_rest)]
   end subroutine collect_motion_newton
 
   !> Count what this instant is amid, and stop there if asked for.

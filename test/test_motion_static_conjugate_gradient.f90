@@ -36,16 +36,16 @@ contains
   subroutine collect_motion_static_conjugate_gradient(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('the answer is that of the linear equations', test_linear), &
+      & new_unittest('the result is that of the linear equations', test_linear), &
       & new_unittest('a uniform field at any strain', test_uniform), &
-      & new_unittest('the same rest as dynamic relaxation', test_same_rest), &
+      & new_unittest('the same equilibrium as dynamic relaxation', test_same_rest), &
       & new_unittest('bonds break as in dynamic relaxation', test_breaking), &
-      & new_unittest('a bar torn in two rests again', test_torn), &
-      & new_unittest('a body without support turns to its loads', test_unsupported), &
-      & new_unittest('the trend carries to the next load step', test_trend), &
-      & new_unittest('what has not converged is no answer', test_unconverged), &
-      & new_unittest('loads that nothing bears end in words', test_no_rest), &
-      & new_unittest('nothing to do is done at once', test_nothing), &
+      & new_unittest('a bar broken in two reaches equilibrium again', test_torn), &
+      & new_unittest('a body without support aligns with its loads', test_unsupported), &
+      & new_unittest('the last increment is used in the next load step', test_trend), &
+      & new_unittest('a state that has not converged is an error', test_unconverged), &
+      & new_unittest('loads beyond the strength end with a message', test_no_rest), &
+      & new_unittest('a solved problem needs no iteration', test_nothing), &
       & new_unittest('the same bits on one and two threads', test_threads)]
   end subroutine collect_motion_static_conjugate_gradient
 

@@ -23,16 +23,16 @@ contains
   subroutine collect_motion_static_relaxation(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('the answer is that of the linear system', test_direct), &
-      & new_unittest('all density matrices lead to the same answer', test_masses), &
-      & new_unittest('load steps come to rest one by one', test_load_steps), &
+      & new_unittest('the result is that of the linear system', test_direct), &
+      & new_unittest('all density matrices lead to the same result', test_masses), &
+      & new_unittest('load steps converge one by one', test_load_steps), &
       & new_unittest('balanced loads need no support', test_balanced), &
       & new_unittest('unbalanced loads without support are refused', test_unbalanced), &
-      & new_unittest('what has not converged is no answer', test_unconverged), &
-      & new_unittest('a strained body without loads comes to rest', test_released), &
-      & new_unittest('bonds break at rest alone', test_breaks_at_rest), &
-      & new_unittest('a bar torn in two rests again', test_torn), &
-      & new_unittest('long way of a slender body: conjugate gradients go on', test_slender)]
+      & new_unittest('a state that has not converged is an error', test_unconverged), &
+      & new_unittest('a strained body without loads reaches equilibrium', test_released), &
+      & new_unittest('bonds break only in equilibrium', test_breaks_at_rest), &
+      & new_unittest('a bar broken in two reaches equilibrium again', test_torn), &
+      & new_unittest('long: conjugate gradients continue for a slender body', test_slender)]
   end subroutine collect_motion_static_relaxation
 
   !> Bodies held at x_min by a layer and pulled at x_max: thick and thin, one material and two, with

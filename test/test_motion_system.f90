@@ -22,9 +22,9 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('a free body keeps its energy', test_free), &
-      & new_unittest('imposed motion and loads pay for the energy', test_work), &
+      & new_unittest('imposed motion and loads supply the energy', test_work), &
       & new_unittest('kinks and jumps of the imposed speed keep the balance', test_kink), &
-      & new_unittest('breaking bonds take their energy out', test_fracture), &
+      & new_unittest('breaking bonds dissipate their energy', test_fracture), &
       & new_unittest('a bond pulls once more if it breaks after the forces', test_break_late), &
       & new_unittest('a run has the same bits on 1, 2 and 4 threads', test_threads)]
   end subroutine collect_motion_system

@@ -31,12 +31,12 @@ contains
   subroutine collect_output_checkpoint_checkpoint(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('everything comes back', test_round), &
-      & new_unittest('the size is known before', test_size), &
-      & new_unittest('any changed byte is found', test_damaged), &
-      & new_unittest('any cut is found', test_cut), &
+      & new_unittest('all values are restored', test_round), &
+      & new_unittest('the size is known before writing', test_size), &
+      & new_unittest('any changed byte is detected', test_damaged), &
+      & new_unittest('any truncation is detected', test_cut), &
       & new_unittest('other files are refused', test_others), &
-      & new_unittest('what does not fit is refused', test_misfits)]
+      & new_unittest('data that do not fit are refused', test_misfits)]
   end subroutine collect_output_checkpoint_checkpoint
 
   subroutine keep_values(archive, values)

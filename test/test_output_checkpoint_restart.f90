@@ -35,16 +35,16 @@ contains
       & new_unittest('a list, bonds that break late', test_list), &
       & new_unittest('temperatures that vary in time', test_heated), &
       & new_unittest('a relaxation with a growing crack', test_relaxation), &
-      & new_unittest('relaxations that go other ways', test_ways_to_rest), &
+      & new_unittest('relaxations with a change of method', test_ways_to_rest), &
       & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
-      & new_unittest('results beyond the checkpoint are cut back', test_beyond), &
+      & new_unittest('results beyond the checkpoint are removed', test_beyond), &
       & new_unittest('a finished run is prolonged', test_longer), &
       & new_unittest('a changed scene is refused', test_changed), &
       & new_unittest('from a damaged checkpoint to the older one', test_damaged), &
       & new_unittest('without a checkpoint from the beginning', test_none), &
       & new_unittest('into another folder with other fields', test_elsewhere), &
       & new_unittest('checkpoints by time, and never', test_minutes), &
-      & new_unittest('a run outlives a failing checkpoint', test_failing)]
+      & new_unittest('a run continues after a failed checkpoint', test_failing)]
   end subroutine collect_output_checkpoint_restart
 
   !> A notched plate whose halves fly apart: 30 steps in which the crack grows. A load acts on all

@@ -21,7 +21,7 @@ contains
   subroutine collect_output_report_contact(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('nothing touches at rest', test_rest), &
+      & new_unittest('no contact in the undeformed body', test_rest), &
       & new_unittest('a body that meets another is found', test_bodies), &
       & new_unittest('the mean spacing counts', test_spacings), &
       & new_unittest('intact neighbours may come close, broken ones not', test_crushed), &

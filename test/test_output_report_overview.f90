@@ -21,9 +21,9 @@ contains
   subroutine collect_output_report_overview(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('points, lengths and waves are told', test_overview), &
+      & new_unittest('points, lengths and waves are printed', test_overview), &
       & new_unittest('the run time is predicted', test_estimate), &
-      & new_unittest('a run that fails at once is told', test_failing)]
+      & new_unittest('a run that fails at once is reported', test_failing)]
   end subroutine collect_output_report_overview
 
   !> Fail unless a text has a line with this label and content.

@@ -34,9 +34,9 @@ contains
       & new_unittest('a group that is not there is made', test_new_group), &
       & new_unittest('other keys and groups stay', test_others), &
       & new_unittest('names in all their forms', test_names), &
-      & new_unittest('names that mean nothing', test_bad_names), &
-      & new_unittest('a refused value has the place of its word', test_place), &
-      & new_unittest('options change what the file would change', test_options), &
+      & new_unittest('unknown names', test_bad_names), &
+      & new_unittest('a refused value has its place', test_place), &
+      & new_unittest('options have the effect of a changed file', test_options), &
       & new_unittest('options that are refused', test_bad_options), &
       & new_unittest('rules find what options change', test_places_of_options)]
   end subroutine collect_scene_content_change
@@ -187,8 +187,8 @@ contains
     call refused('material(3)%density', 'no group &material number 3')
     call refused('crack%radius', 'the scene has no group &crack')
     call refused('study%vary', 'no group &study can be varied')
-    call refused('body%points(4)', 'no element')
-    call refused('displacement_gradient(1)', 'no element|real(3,3)')
+    call refused('body%points(4)', 'not an element')
+    call refused('displacement_gradient(1)', 'not an element|real(3,3)')
 
   contains
 
@@ -288,7 +288,7 @@ contains
     call refused('horizon%ratio=0.5', "'ratio' is out of range|expected >= 1")
     call refused('horizon%ratio=abc', "bad value 'abc' for key 'ratio'|expected a number")
     call refused('horizon%ratio=2 3', "too many values for 'ratio'")
-    call refused('horizon%ratio(1)=2', "no element of 'ratio'|it is real")
+    call refused('horizon%ratio(1)=2', "not an element of 'ratio'|it is real")
     call refused('horizon%ratio=2 /', "bad value '2 /' for key 'ratio'")
     call refused('horizon%ratio=2 length = 3', "bad value '2 length = 3' for key 'ratio'")
     call refused('horizon%ratio=2 ! rest', "bad value '2 ! rest'")

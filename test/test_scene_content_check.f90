@@ -42,7 +42,7 @@ contains
       & new_unittest('courses in time', test_courses), &
       & new_unittest('clouds', test_clouds), &
       & new_unittest('probes', test_probes), &
-      & new_unittest('what goes without saying is filled in', test_filled), &
+      & new_unittest('defaults are filled in', test_filled), &
       & new_unittest('a scene built in memory', test_memory)]
   end subroutine collect_scene_content_check
 
@@ -212,10 +212,10 @@ contains
     character(*), parameter :: base_3d = scene_3d//soft//cube//go
 
     call expect_fault(error, base//'&crack centre = 0 0 normal = 1 0 radius = 1 /', &
-      & 'no crack of dimension 2|a/b.nml:5|segment')
+      & 'not a crack of dimension 2|a/b.nml:5|segment')
     call expect_fault(error, base_3d//'&crack from = 0 0 to = 1 1 /', &
-      & 'no crack of dimension 3|parallelogram|disc')
-    call expect_fault(error, base//'&crack /', 'no crack of dimension 2')
+      & 'not a crack of dimension 3|parallelogram|disc')
+    call expect_fault(error, base//'&crack /', 'not a crack of dimension 2')
     call expect_fault(error, base//'&crack from = 0 0 /', "&crack lacks the key 'to'")
     call expect_fault(error, base//'&crack from = 0 0 to = 0 0 /', 'a crack without length')
     call expect_fault(error, base_3d//'&crack corner = 3*0 edge_1 = 1 0 0 edge_2 = 2 0 0 /', &
@@ -223,7 +223,7 @@ contains
     call expect_fault(error, base_3d//'&crack centre = 3*0 normal = 3*0 radius = 1 /', 'is zero')
     call expect_fault(error, base_3d//'&crack centre = 3*0 normal = 1 0 0 /', "'radius'")
     call expect_fault(error, base_3d//'&crack centre = 3*0 normal = 1 0 0 radius = 1 to = 3*0 /', &
-      & 'no crack of dimension 3')
+      & 'not a crack of dimension 3')
     call expect_fault(error, '&scene dimension = 1 /'//soft// &
       & '&body lower = 0 upper = 1 points = 3 /'//go//'&crack from = 0 to = 1 /', &
       & 'a crack in a scene of dimension 1')

@@ -48,7 +48,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('an added group is read', test_read), &
-      & new_unittest('what is wrong in an added group', test_wrong), &
+      & new_unittest('errors in an added group', test_wrong), &
       & new_unittest('without the table it is unknown', test_unknown), &
       & new_unittest('an added group is written and read back', test_write), &
       & new_unittest('its reference and its template', test_reference), &

@@ -21,7 +21,7 @@ contains
       & new_unittest('every group and key is there', test_complete), &
       & new_unittest('one group', test_group), &
       & new_unittest('a group that does not exist', test_unknown), &
-      & new_unittest('every key says what it means', test_meaning), &
+      & new_unittest('every key has a meaning', test_meaning), &
       & new_unittest('the page in doc is up to date', test_page)]
   end subroutine collect_scene_content_reference
 

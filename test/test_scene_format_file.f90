@@ -14,9 +14,9 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('lines', test_lines), &
-      & new_unittest('a file comes whole', test_whole), &
-      & new_unittest('a folder is no file', test_folder), &
-      & new_unittest('where a name leads', test_resolve)]
+      & new_unittest('a file is read completely', test_whole), &
+      & new_unittest('a folder is not a file', test_folder), &
+      & new_unittest('the path of a name', test_resolve)]
   end subroutine collect_scene_format_file
 
   subroutine test_lines(error)

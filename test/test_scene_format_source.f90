@@ -22,7 +22,7 @@ contains
       & new_unittest('values that are empty', test_empty), &
       & new_unittest('quotes that are not closed', test_quotes), &
       & new_unittest('equals signs out of place', test_equals), &
-      & new_unittest('carets stand under the fault', test_carets)]
+      & new_unittest('carets are under the error', test_carets)]
   end subroutine collect_scene_format_source
 
   subroutine scan(error, text, source)

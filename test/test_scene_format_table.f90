@@ -18,9 +18,9 @@ contains
     testsuite = [ &
       & new_unittest('rows, comments and separators', test_rows), &
       & new_unittest('a header names the columns', test_header), &
-      & new_unittest('faults have a place', test_faults), &
+      & new_unittest('errors have a place', test_faults), &
       & new_unittest('faults of headers', test_header_faults), &
-      & new_unittest('numbers too small to matter are 0', test_tiny), &
+      & new_unittest('numbers that are too small become 0', test_tiny), &
       & new_unittest('many rows', test_many), &
       & new_unittest('a table from a file', test_file)]
   end subroutine collect_scene_format_table

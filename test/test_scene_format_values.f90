@@ -14,7 +14,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('reals', test_reals), &
-      & new_unittest('words that are no reals', test_no_reals), &
+      & new_unittest('words that are not reals', test_no_reals), &
       & new_unittest('whole numbers', test_integers), &
       & new_unittest('true and false', test_logicals), &
       & new_unittest('a real is written with all its bits', test_exact), &

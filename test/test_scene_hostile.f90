@@ -30,7 +30,7 @@ contains
       & new_unittest('values of a wrong kind are refused at every key', test_wrong_kind), &
       & new_unittest('texts that are too long are refused at every key', test_too_long), &
       & new_unittest('too many values are refused at every key', test_too_many), &
-      & new_unittest('control characters are no text', test_control), &
+      & new_unittest('control characters are refused', test_control), &
       & new_unittest('lines end in three ways', test_line_ends), &
       & new_unittest('a file without size is not opened', test_no_size), &
       & new_unittest('more points than there is room for', test_too_many_points)]

@@ -28,13 +28,13 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('a measurement counts points and bonds', test_counts), &
-      & new_unittest('bodies move but little', test_motion), &
+      & new_unittest('bodies move only slightly', test_motion), &
       & new_unittest('operations and bytes by the formulas', test_formulas), &
-      & new_unittest('memory is foreseen on the safe side', test_memory), &
+      & new_unittest('memory is predicted as an upper bound', test_memory), &
       & new_unittest('the machine is measured', test_machine), &
-      & new_unittest('what is measured by default and by choice', test_plan), &
+      & new_unittest('default and chosen measurements', test_plan), &
       & new_unittest('threads: ascending, once, with 1', test_threads), &
-      & new_unittest('wrong options are told so', test_options), &
+      & new_unittest('wrong options are errors', test_options), &
       & new_unittest('table and CSV file of a whole run', test_files), &
       & new_unittest('a file that cannot be written', test_no_file), &
       & new_unittest('a body that does not fit', test_too_large)]

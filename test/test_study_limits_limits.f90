@@ -27,13 +27,13 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('both forms of 7.25 and the true limit of a chain', test_chain), &
-      & new_unittest('a disturbance grows above the limit as theory says', test_growth), &
+      & new_unittest('a disturbance grows above the limit as predicted', test_growth), &
       & new_unittest('the step of a run follows the limit asked for', test_plan), &
-      & new_unittest('a body elsewhere or in another size vibrates alike', test_free_body), &
-      & new_unittest('what is watched of the energy is kept to rounding', test_energy), &
+      & new_unittest('a moved or scaled body has the same vibration', test_free_body), &
+      & new_unittest('the observed energy is constant to rounding', test_energy), &
       & new_unittest('slope and digits', test_numbers), &
       & new_unittest('the whole command ends with its three numbers', test_command), &
-      & new_unittest('nothing to vibrate is refused', test_held)]
+      & new_unittest('a body that cannot vibrate is refused', test_held)]
   end subroutine collect_study_limits_limits
 
   !> Points that see their nearest neighbours only, spring = 2 q V/(rho dx) with q = E/(A delta^2):

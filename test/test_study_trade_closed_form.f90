@@ -22,7 +22,7 @@ contains
       & new_unittest('the plate around the hole is in balance', test_hole_balance), &
       & new_unittest('far from the hole stress is uniaxial', test_hole_far), &
       & new_unittest('energy of a linear field by the law of Hooke', test_linear), &
-      & new_unittest('a chain turns with its frequency', test_chain)]
+      & new_unittest('a chain vibrates with its frequency', test_chain)]
   end subroutine collect_study_trade_closed_form
 
   real(wp) function value_of(form, field, x, t)

@@ -15,10 +15,10 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('second degree is exact in every dimension', test_quadratic), &
-      & new_unittest('a place that is there is taken', test_same), &
+      & new_unittest('the value of an existing point is used', test_same), &
       & new_unittest('too few places', test_few), &
       & new_unittest('a cubic in time is exact', test_time), &
-      & new_unittest('rows end where they end', test_ends)]
+      & new_unittest('no value beyond the last row', test_ends)]
   end subroutine collect_study_trade_interpolate
 
   !> Places of a box of n^dim cells of the edge `h`, shaken by a tenth of it.

@@ -31,7 +31,7 @@ contains
       & new_unittest('points follow in proportion', test_points), &
       & new_unittest('vectors take several values', test_vectors), &
       & new_unittest('columns', test_columns), &
-      & new_unittest('what cannot be planned', test_refused), &
+      & new_unittest('invalid plans', test_refused), &
       & new_unittest('keys set on the command line', test_set), &
       & new_unittest('the Pareto front', test_front), &
       & new_unittest('observed orders', test_orders)]

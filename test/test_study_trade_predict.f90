@@ -15,12 +15,12 @@ contains
   subroutine collect_study_trade_predict(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('a power law goes on', test_power), &
+      & new_unittest('a power law is extrapolated', test_power), &
       & new_unittest('against the finest run', test_reference), &
       & new_unittest('the true error behind errors against a finest run', test_true), &
-      & new_unittest('an error that levels off is not promised away', test_level), &
-      & new_unittest('a lucky coarse run is not trusted', test_luck), &
-      & new_unittest('scatter asks for a margin', test_margin), &
+      & new_unittest('the prediction is not optimistic for an error that levels off', test_level), &
+      & new_unittest('an accidentally small error of a coarse run is not used', test_luck), &
+      & new_unittest('scatter requires a margin', test_margin), &
       & new_unittest('a single run predicts nothing', test_single)]
   end subroutine collect_study_trade_predict
 

@@ -42,7 +42,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('the error is that of the run''s own history', test_error), &
-      & new_unittest('the table has what was promised', test_table), &
+      & new_unittest('the table is complete', test_table), &
       & new_unittest('errors do not depend on threads', test_threads), &
       & new_unittest('a linear field stays', test_patch), &
       & new_unittest('a chain''s wave: the order in time', test_chain), &
@@ -53,10 +53,10 @@ contains
       & new_unittest('every scene is set up before the first run', test_checked_first), &
       & new_unittest('why runs are not used', test_notes), &
       & new_unittest('against files of a run', test_files), &
-      & new_unittest('a run without an answer is reported', test_unstable), &
+      & new_unittest('a run without a result is reported', test_unstable), &
       & new_unittest('closed forms that do not fit', test_misfits), &
       & new_unittest('a choice meets its error', test_choice), &
-      & new_unittest('what cannot be met', test_missed)]
+      & new_unittest('targets that cannot be met', test_missed)]
   end subroutine collect_study_trade_study
 
   subroutine options_for(name, options)

@@ -1,5 +1,5 @@
-!> Where a part of the program keeps what it must find again to go on after a restart, without
-!> knowing of files: one list of calls serves for writing, reading and measuring.
+!> Interface by which a part of the program stores the data that a restart needs, independent of
+!> files: the same list of calls is used for writing, reading and measuring.
 !>
 !>     call archive%keep('displacement', state%u)
 !>     call archive%keep('broken bonds', broken)

@@ -12,7 +12,7 @@ module pd_base_checksum
   integer(i8), parameter :: polynomial = not(int(z'3693A86A2878F0BD', i8))  ! C96C5795D7870F42
   integer(i8), parameter :: byte = 255_i8
 
-  !> A checksum under way.
+  !> A checksum in progress.
   type :: checksum_type
     private
     integer(i8) :: state = -1_i8

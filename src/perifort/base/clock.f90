@@ -33,9 +33,9 @@ module pd_base_clock
     procedure, private :: find => find_phase
   end type phase_timer_type
 
-  !> The one line that tells how far a run is: rewritten in place on a terminal, now and then a full
-  !> line in a log file. `update` may be called every step: it looks at the clock only about twenty
-  !> times a second.
+  !> The line with the progress of a run: rewritten in place on a terminal, now and then a full line
+  !> in a log file. `update` may be called every step: it looks at the clock only about twenty times
+  !> a second.
   type :: progress_type
     private
     integer(i8) :: total = 0                   !! steps of the whole run
@@ -120,7 +120,7 @@ contains
     text = to_text(whole/large)//large_name//rest//small_name
   end function two_parts
 
-  !> Begin an interval of the phase `name`; a phase that is already running goes on.
+  !> Begin an interval of the phase `name`; a phase that is already running continues.
   subroutine start_phase(self, name)
     class(phase_timer_type), intent(inout) :: self  !! the timer; notes the time
     character(*), intent(in) :: name                !! of the phase; 32 characters count
@@ -241,7 +241,7 @@ contains
     logical, intent(in) :: quiet                      !! show nothing at all
     integer, intent(in), optional :: unit             !! default: standard output
     integer(i8), intent(in), optional :: first_step   !! steps that were done before, default 0
-    logical, intent(in), optional :: load             !! the time told is the part of the load
+    logical, intent(in), optional :: load             !! the printed time is the part of the load
 
     self%total = total_steps
     self%terminal = is_terminal
@@ -290,7 +290,7 @@ contains
     if (present(note)) line = line//'  '//note
     if (self%terminal) then
       line = line(:min(len(line), line_width))
-      ! Return to the first column, write, and clear what an older, longer line has left.
+      ! Return to the first column, write, and clear the rest of an older, longer line.
       write (self%unit, '(a)', advance='no') achar(13)//line//achar(27)//'[K'
       self%open_line = .true.
     else
@@ -300,7 +300,7 @@ contains
     if (step >= self%total) call self%finish()
   end subroutine update_progress
 
-  !> Leave the line, so that what is written next begins a new one. May be called at any time.
+  !> End the line, so that the next output starts on a new one. May be called at any time.
   subroutine finish_progress(self)
     class(progress_type), intent(inout) :: self  !! the progress line; no longer open on return
     if (self%open_line) write (self%unit, '(a)') ''

@@ -22,7 +22,7 @@ module pd_base_error
 contains
 
   !> Allocate `error` with a message and an exit status (default: `status_input`). `group` and
-  !> `number` say which group of a scene is to blame, for those who know its place in the file.
+  !> `number` name the group of a scene with the error; its place in the file is added later.
   pure subroutine fail(error, message, status, group, number)
     type(error_type), allocatable, intent(out) :: error  !! allocated on return, with what follows
     character(*), intent(in) :: message  !! what was wrong, what was expected, what is allowed
@@ -41,7 +41,7 @@ contains
   end subroutine fail
 
   !> Stop where the program contradicts itself, as in a choice between things of which one is not
-  !> known: no input leads there, and an answer would be wrong without a sign of it.
+  !> known: no input can cause it, and the result would be wrong without notice.
   pure subroutine internal_fault(what)
     character(*), intent(in) :: what  !! what was asked for and is not there
     error stop 'perifort: internal fault: '//what

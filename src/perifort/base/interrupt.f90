@@ -56,8 +56,8 @@ contains
     end do
   end function signal_handlers
 
-  !> Put back what a program does at the signals. A request to end that was noted stays noted until
-  !> the next `watch_for_interrupt`.
+  !> Restore the signal handlers of the calling program. A request to end that was noted stays noted
+  !> until the next `watch_for_interrupt`.
   subroutine put_back_handlers(handlers)
     type(handlers_type), intent(in) :: handlers
     type(c_funptr) :: ours
@@ -69,7 +69,7 @@ contains
   end subroutine put_back_handlers
 
   !> A file beyond the size that the system allows the user (`ulimit -f`) ends the program by a
-  !> signal unless that is ignored; then the write fails, and can be told like a full disk.
+  !> signal unless that is ignored; then the write fails, and can be reported like a full disk.
   subroutine let_writes_fail()
     type(c_funptr) :: before
     before = posix_signal(sigxfsz, c_funloc(ignore))

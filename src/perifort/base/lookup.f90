@@ -65,7 +65,7 @@ contains
     number = table%count
   end subroutine own_number
 
-  !> Where `key` stands or would stand.
+  !> Index at which `key` is or would be stored.
   pure integer function place(table, key) result(at)
     type(lookup_type), intent(in) :: table
     integer(i8), intent(in) :: key

@@ -1,4 +1,4 @@
-!> An archive in memory, for a state that may be wanted back before the program ends.
+!> An archive in memory, for a state that may be restored later in the same run.
 module pd_base_snapshot
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
   use pd_base_archive, only: archive_type
@@ -14,8 +14,8 @@ module pd_base_snapshot
     integer(i1), allocatable :: bytes(:)
   end type parcel_type
 
-  !> Values in the order in which they came. Between writing and reading, and before each use, call
-  !> `rewind`. Writing again takes the room that is there.
+  !> Values in the order of the calls. Call `rewind` before each use and between writing and
+  !> reading. Writing again reuses the allocated memory.
   type, extends(archive_type) :: snapshot_type
     private
     type(parcel_type), allocatable :: parcels(:)
@@ -28,7 +28,7 @@ module pd_base_snapshot
 
 contains
 
-  !> Begin anew, to read or to write.
+  !> Go to the start, to read or to write.
   subroutine rewind_snapshot(self, reading)
     class(snapshot_type), intent(inout) :: self  !! the archive, set to its first value and without
                                                  !! an error; values that it keeps stay

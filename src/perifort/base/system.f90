@@ -1,4 +1,4 @@
-!> What Linux tells of the machine; elsewhere nothing is known.
+!> Data about the machine from Linux; other systems give no data.
 module pd_base_system
   use pd_base_kinds, only: wp, i8
   implicit none (type, external)
@@ -7,14 +7,14 @@ module pd_base_system
 
 contains
 
-  !> The processor's name, as Linux tells it; 'unknown' elsewhere.
+  !> The processor's name, as reported by Linux; 'unknown' elsewhere.
   function processor_name() result(name)
     character(:), allocatable :: name
     name = entry_of('/proc/cpuinfo', 'model name')
     if (name == '') name = 'unknown'
   end function processor_name
 
-  !> Memory that this program can still have [bytes], as Linux tells it: what is free, and what a
+  !> Memory that this program can still have [bytes], as reported by Linux: what is free, and what a
   !> limit on its address space leaves (`ulimit -v`, which queues set); huge elsewhere.
   function available_memory() result(bytes)
     integer(i8) :: bytes

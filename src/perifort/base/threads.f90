@@ -3,7 +3,7 @@
 !> Threads meet at the end of every loop, and OpenMP's usual way is to wait there actively. On a
 !> machine where other programs run, the thread that all wait for may have no processor core, and a
 !> run on many threads then is many times slower than one on a single thread. So the team watches
-!> what share of its time it had cores. If cores were missing, it goes on with fewer threads, as
+!> what share of its time it had cores. If cores were missing, it continues with fewer threads, as
 !> many as meet without waiting for each other, and tries more again later. Answers do not depend on
 !> the number of threads, so that it may change at any instant. What the user has set (`--threads`,
 !> OMP_NUM_THREADS, a way to wait) is kept.
@@ -67,9 +67,9 @@ contains
     is_worth_threads = bonds >= worth_a_thread
   end function is_worth_threads
 
-  !> Threads to use when nobody has asked for a number: as many as OpenMP offers, which knows the
-  !> cores that the program may run on, and no more than a limit on its processor time allows
-  !> (containers and queues set one). With OMP_NUM_THREADS it is that number.
+  !> Default number of threads: as many as OpenMP offers, which knows the cores that the program may
+  !> run on, and no more than a limit on its processor time allows (containers and queues set one).
+  !> With OMP_NUM_THREADS it is that number.
   integer function default_threads()
     default_threads = omp_get_max_threads()
     if (is_given('OMP_NUM_THREADS')) return
@@ -88,8 +88,8 @@ contains
     call use_threads(self, self%most)
   end subroutine begin_team
 
-  !> Take one thread for a body that is not worth more, unless the user has asked for a number. For
-  !> others see whether the cores are free: where they are not, begin with one thread.
+  !> Use one thread for a small body, unless the user has set a number. For others see whether the
+  !> cores are free: where they are not, begin with one thread.
   subroutine fit(self, bonds, asked)
     class(team_type), intent(inout) :: self  !! the threads of a run; their number may be lowered
     integer(i8), intent(in) :: bonds  !! ordered pairs of the body
@@ -164,7 +164,7 @@ contains
     if (.not. short .and. (self%now == self%most .or. now < self%next_rise)) return
     before = self%now
     call try_threads(self)
-    ! who has to give way soon after it took more threads waits longer for the next time
+    ! if the number must be reduced soon after an increase, wait longer before the next increase
     if (self%now < before) self%wait = min(2*self%wait, longest_wait)
   end subroutine note_measurement
 
@@ -192,7 +192,7 @@ contains
     threads = self%most
   end function threads
 
-  !> What the threads came to, where that is worth a line; else ''.
+  !> A line about the number of threads, if it changed; else ''.
   pure function report(self) result(text)
     class(team_type), intent(in) :: self  !! the threads of a run, at its end
     character(:), allocatable :: text

@@ -1,4 +1,4 @@
-!> Which perifort this is, and what it was built with.
+!> Version of perifort, its compiler and its libraries.
 module pd_base_version
   use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
   implicit none (type, external)

@@ -1,4 +1,4 @@
-!> Warnings of a run: each is told once, counted, and kept for the results.
+!> Warnings of a run: each is printed once, counted, and kept for the results.
 module pd_base_warnings
   use, intrinsic :: iso_fortran_env, only: error_unit
   use pd_base_archive, only: archive_type

@@ -77,7 +77,7 @@ contains
   end subroutine generate_body
 
   !> An error if the horizon holds more points than any computation is meant to have in a family;
-  !> what is counted in families and offsets below then fits its integers.
+  !> counts in families and offsets below then fit their integers.
   subroutine check_family_size(scene, dim, delta, spacing, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: dim

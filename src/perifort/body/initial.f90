@@ -16,7 +16,7 @@ module pd_body_initial
 
 contains
 
-  !> The groups are applied in order, each setting what it names. An error if a file of initial
+  !> The groups are applied in order; each sets the values it gives. An error if a file of initial
   !> values cannot be read or does not have a row for each point.
   subroutine initial_state(scene, body, u, v, temperature_change, heated_by, error)
     type(scene_type), intent(in) :: scene  !! gives the groups and their regions

@@ -20,8 +20,8 @@ module pd_body_layers
   !> Overlap of columns of two bodies that touch up to the digits of their corners [spacings].
   real(wp), parameter :: sliver = 1.0e-2_wp
 
-  !> How many columns of a side have the layer and why the others have none. Bodies without a column
-  !> that has it are not counted.
+  !> Number of columns of a side with the layer and reasons why others have none. Bodies without a
+  !> column that has it are not counted.
   type :: layer_count_type
     integer :: boundary = 0     !! number of the `&boundary` group
     integer :: columns = 0      !! columns that have the layer
@@ -31,8 +31,8 @@ module pd_body_layers
     integer :: shared = 0       !! points left out, because an earlier layer has their cell
   end type layer_count_type
 
-  !> The side of one lattice body: what is left of each column. Levels are numbers of cells along
-  !> the axis, counted so that they grow outwards.
+  !> The side of one lattice body: the remaining cells of each column. Levels are numbers of cells
+  !> along the axis, counted so that they grow outwards.
   type :: side_type
     type(grid_type) :: grid
     integer(i2) :: number = 0_i2       !! of the grid; 0: nothing is left of the body
@@ -124,7 +124,7 @@ contains
 
   contains
 
-    !> What is wrong with a layer without points.
+    !> The error message for a layer without points.
     function why_empty() result(text)
       character(:), allocatable :: text
 

@@ -51,7 +51,7 @@ module pd_output_run
 contains
 
   !> See to it that the scene's fields are known and that no earlier results are overwritten
-  !> unasked, or find the checkpoint that a run is to go on from.
+  !> unasked, or find the checkpoint from which a run continues.
   subroutine look_back(self, scene, options, error)
     class(run_output_type), intent(inout) :: self
     type(scene_type), intent(in) :: scene
@@ -74,7 +74,7 @@ contains
     end if
   end subroutine look_back
 
-  !> What is known of the output before the first step; warnings and notes go to the set-up.
+  !> Data of the output known before the first step; warnings and notes go to the set-up.
   subroutine foresee(self, scene, options, set_up, error)
     class(run_output_type), intent(inout) :: self
     type(scene_type), intent(in) :: scene
@@ -84,8 +84,8 @@ contains
     call foresee_output(scene, fields_of(options), set_up, self%probes, error)
   end subroutine foresee
 
-  !> Put the system back to where its checkpoint stands, if it has one, say what will be computed,
-  !> and open the files. With `in_memory` the last output stays in memory, too.
+  !> Set the system to the state of its checkpoint, if there is one, print the summary, and open the
+  !> files. With `in_memory` the last output stays in memory, too.
   subroutine open_output(self, scene, options, set_up, in_memory, error)
     class(run_output_type), intent(inout) :: self
     type(scene_type), intent(in) :: scene
@@ -166,8 +166,8 @@ contains
     call self%recorder%results%answer(found)
   end subroutine answer
 
-  !> Warn if energy was gained or lost that nothing explains: much of what is in play, or, where
-  !> bonds have broken, much of what they dissipated.
+  !> Warn of a large error of the energy balance: relative to the largest energy, or, if bonds have
+  !> broken, to the dissipated energy.
   subroutine warn_of_balance(system, recorder, balance, share)
     type(system_type), intent(in) :: system
     type(recorder_type), intent(inout) :: recorder

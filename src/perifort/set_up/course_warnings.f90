@@ -1,5 +1,5 @@
-!> Warnings about the course in time of conditions: what a run never reaches, what relaxation
-!> ignores, temperatures that strain nothing.
+!> Warnings about conditions that vary in time: times after the end of a run, settings that
+!> relaxation ignores, temperatures that strain nothing.
 module pd_set_up_course_warnings
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type

@@ -104,7 +104,7 @@ contains
   end function steps_of
 
   !> The limit of the step from the largest frequency at the start: of the body as it is, or, where
-  !> bonds can break, one that no breaking can lower, so that it needs no second look.
+  !> bonds can break, one that holds for any broken bonds, so that it is computed only once.
   subroutine measure_limit(system, stiffness, damping, plan)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: stiffness  !! what the terms of the force add to omega^2 [1/s2]

@@ -32,7 +32,7 @@ module pd_set_up_prepare
   private
   public :: prepare, set_up_type
 
-  !> Everything that stands before the first step.
+  !> All work before the first step.
   type :: set_up_type
     type(system_type) :: system
     type(plan_type) :: plan
@@ -48,9 +48,9 @@ contains
 
   !> Points, families, corrections, cracks, conditions and the plan of a scene. With `threads` a
   !> run's team begins, with so many threads or, if that is 0, with a number that suits the body;
-  !> without, threads are the caller's. `terms` of the force act beside those of the scene. An error
-  !> is set if the scene does not fit into the memory, or if its points, families, conditions or
-  !> plan are impossible.
+  !> without, threads are the caller's. `terms` of the force act in addition to those of the scene.
+  !> An error is set if the scene does not fit into the memory, or if its points, families,
+  !> conditions or plan are impossible.
   subroutine prepare(scene, set_up, error, threads, terms)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(set_up_type), intent(out) :: set_up             !! ready for the first step

@@ -1,5 +1,5 @@
-!> Checkpoints of a run: what they hold, when they are due, and how they are written, so that there
-!> is a whole one at any moment.
+!> Checkpoints of a run: their contents, their intervals, and how they are written, so that there is
+!> a whole one at any moment.
 !>
 !> The newest is `STEM.checkpoint`, the one before it `STEM.checkpoint.old`. A new one is written
 !> beside them, brought to the disk, and then takes its name in one step; what it counts on in the
@@ -21,7 +21,7 @@ module pd_output_checkpoint_checkpoint
   public :: about_type, checkpoint_type, new_about, keep_about, checkpoint_path, older_path, &
     & remove_checkpoints, checkpoint_bytes
 
-  !> What a checkpoint holds beside the system.
+  !> Data of a checkpoint besides the system.
   type :: about_type
     character(:), allocatable :: version, compiler, flags  !! of the program that wrote it
     type(kept_type) :: kept             !! of the results, with the resolved scene
@@ -36,7 +36,7 @@ module pd_output_checkpoint_checkpoint
     type(warnings_type) :: warnings     !! so far
   end type about_type
 
-  !> The checkpoints of a run that is under way.
+  !> The checkpoints of a run in progress.
   type :: checkpoint_type
     character(:), allocatable :: path   !! of the newest
     integer :: every = 0                !! steps (iterations) between them; 0: not by steps

@@ -1,5 +1,5 @@
-!> Results of earlier runs: whether there are any, and whether the run that wrote them came to its
-!> end. Until it does, a file `STEM.unfinished` stands beside them.
+!> Results of earlier runs: whether there are any, and whether the run that wrote them was finished.
+!> Until then there is a file `STEM.unfinished` beside them.
 module pd_output_checkpoint_earlier
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline
@@ -28,14 +28,14 @@ contains
     if (.not. file_exists(path)) path = ''
   end function existing_results
 
-  !> Whether earlier results are of a run that never came to its end.
+  !> Whether earlier results are of an unfinished run.
   logical function unfinished(directory, stem)
     character(*), intent(in) :: directory  !! folder of the results; '' for the current one
     character(*), intent(in) :: stem       !! name of the results' files without their endings
     unfinished = file_exists(mark_of(directory, stem))
   end function unfinished
 
-  !> The file that stands beside results until they are complete.
+  !> The file that is beside results until they are complete.
   pure function mark_of(directory, stem) result(path)
     character(*), intent(in) :: directory, stem
     character(:), allocatable :: path

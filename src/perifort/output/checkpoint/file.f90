@@ -22,7 +22,7 @@ module pd_output_checkpoint_file
   integer(i8), parameter :: block_bytes = 1048576_i8
   integer, parameter :: longest_name = 64
 
-  !> Measures what a file would hold.
+  !> Measures the size of a file.
   type, extends(archive_type) :: meter_type
     integer(i8) :: bytes = head_bytes + tail_bytes  !! of the whole file
   contains
@@ -57,7 +57,7 @@ module pd_output_checkpoint_file
 
 contains
 
-  !> Add what name, kind and extents of a value take in a file.
+  !> Add the size of name, kind and extents of a value in a file.
   subroutine measure_description(self, name, kind_name, extents)
     class(meter_type), intent(inout) :: self  !! has the size of the head of this value more on
                                               !! return
@@ -67,7 +67,7 @@ contains
     self%bytes = self%bytes + len(description(name, kind_name)) + 8_i8*(1 + size(extents))
   end subroutine measure_description
 
-  !> Add what the elements of a value take in a file.
+  !> Add the size of the elements of a value in a file.
   subroutine measure_bytes(self, place, bytes)
     class(meter_type), intent(inout) :: self  !! has these bytes more on return
     type(c_ptr), intent(in) :: place          !! not used
@@ -265,7 +265,7 @@ contains
       return
     end if
     self%left = self%left - 8*rank
-    ! a file from a stranger may ask for any size
+    ! a file of unknown origin may request any size
     bytes = 1
     if (kind_name(len(kind_name):) == '8') bytes = 8
     do i = 1, size(extents)

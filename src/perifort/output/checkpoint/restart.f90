@@ -24,7 +24,7 @@ module pd_output_checkpoint_restart
   private
   public :: restart_type, find_restart, put_back
 
-  !> Where a run goes on.
+  !> The state from which a run continues.
   type :: restart_type
     logical :: found = .false.         !! there is a checkpoint to go on from
     logical :: complete = .false.      !! the run is complete: there is nothing to do
@@ -107,7 +107,7 @@ contains
     if (.not. restart%complete) call refuse_existing(directory, stem, .false., error)
   end subroutine find_nothing
 
-  !> Open a checkpoint and read what it says of itself.
+  !> Open a checkpoint and read its description.
   subroutine open_checkpoint(path, restart, error)
     character(*), intent(in) :: path
     type(restart_type), intent(inout) :: restart
@@ -121,7 +121,7 @@ contains
     call restart%reader%close()
   end subroutine open_checkpoint
 
-  !> Add to the error of the newest checkpoint how to go on from the one before it.
+  !> Add to the error of the newest checkpoint how to continue from the one before it.
   subroutine offer_older(path, command, error)
     character(*), intent(in) :: path, command
     type(error_type), allocatable, intent(inout) :: error
@@ -156,7 +156,7 @@ contains
     end associate
   end subroutine check_build
 
-  !> What a change of a key means to a run that goes on: its group knows.
+  !> Effect of a changed key on a restart, as defined by its group.
   integer function meaning_of(difference, table) result(meaning)
     type(difference_type), intent(in) :: difference
     type(group_table), intent(in) :: table
@@ -194,7 +194,7 @@ contains
     end do
   end function changeable
 
-  !> Compare the scenes: say what has changed, or refuse.
+  !> Compare the scenes: list the changes, or refuse them.
   subroutine compare(directory, stem, scene, restart, error)
     character(*), intent(in) :: directory, stem
     type(scene_type), intent(in) :: scene
@@ -237,9 +237,9 @@ contains
     if (allocated(error)) call restart%reader%close()
   end subroutine compare
 
-  !> Put a system that was made from the scene back to where the checkpoint stands, and let the plan
-  !> go on with its time step. An error if the points or the initial state are others, if the
-  !> checkpoint is beyond the end of the run, or if it does not hold what the system needs.
+  !> Set a system made from the scene to the state of the checkpoint, and the plan to its time step.
+  !> An error if the points or the initial state are others, if the checkpoint is beyond the end of
+  !> the run, or if it does not hold what the system needs.
   subroutine put_back(restart, scene, system, plan, error)
     type(restart_type), intent(inout) :: restart  !! with the checkpoint's file open; closed on
                                                   !! return

@@ -1,4 +1,4 @@
-!> What the user reads on the terminal when a run is over: what it came to.
+!> The summary printed at the end of a run.
 module pd_output_report_after
   use pd_base_kinds, only: wp
   use pd_base_reduce, only: largest_over
@@ -11,7 +11,7 @@ module pd_output_report_after
 
 contains
 
-  !> What the run came to: time per phase, speed, energies, damage, where the results are.
+  !> Summary of the run: time per phase, speed, energies, damage, where the results are.
   function summary_after(system, recorder, directory) result(text)
     type(system_type), intent(in) :: system
     type(recorder_type), intent(in) :: recorder

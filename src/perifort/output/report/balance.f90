@@ -17,14 +17,14 @@ module pd_output_report_balance
 
 contains
 
-  !> Take the energy of the first row for what was there.
+  !> Take the energy of the first row as the initial energy.
   pure subroutine begin(balance, system)
     class(balance_type), intent(inout) :: balance
     type(system_type), intent(in) :: system
     balance%supply = balance%energies%kinetic + balance%energies%strain + system%dissipated
   end subroutine begin
 
-  !> How far the energies of the last row are from what was there and has been supplied.
+  !> Deviation of the energies of the last row from the initial plus the supplied energy.
   pure subroutine gap(balance, system, off, share)
     class(balance_type), intent(in) :: balance
     type(system_type), intent(in) :: system

@@ -103,8 +103,8 @@ contains
     if (options%output_directory /= '') directory = options%output_directory
   end function output_directory
 
-  !> Let the recorder write checkpoints and know when to stop; after a restart it knows what it knew
-  !> then.
+  !> Let the recorder write checkpoints and stop in time; after a restart it has the data that it
+  !> had then.
   subroutine keep_checkpoints(scene, options, plan, start, directory, stem, restart, recorder)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
@@ -153,7 +153,7 @@ contains
     if (verify(stem, '.') == 0) stem = 'scene'
   end function stem_of
 
-  !> The command that goes on with a run.
+  !> The command that continues a run.
   pure function command_of(options) result(text)
     type(run_options_type), intent(in) :: options
     character(:), allocatable :: text

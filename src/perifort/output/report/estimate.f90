@@ -1,5 +1,5 @@
 !> How long a run will take: its first steps are taken and timed, and so are a row of the history
-!> and what an output looks for.
+!> and checks made at an output.
 module pd_output_report_estimate
   use pd_base_kinds, only: wp
   use pd_base_clock, only: duration_text, wall_time
@@ -145,7 +145,7 @@ contains
     end do
   end subroutine time_row
 
-  !> Time of what an output looks for [s]: points that touch, and large strains.
+  !> Time of the checks at an output [s]: contact and large strains.
   subroutine time_output(system, seconds)
     type(system_type), intent(inout) :: system
     real(wp), intent(out) :: seconds

@@ -1,4 +1,4 @@
-!> What is told of an instant of a run in a line: where it is, and how far a relaxation has come.
+!> The line about an instant of a run: its step or load step, and the progress of a relaxation.
 module pd_output_report_lines
   use pd_base_clock, only: duration_text
   use pd_base_interrupt, only: interrupted

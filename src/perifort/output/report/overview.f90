@@ -1,6 +1,6 @@
-!> What an engineer checks before a run, beyond what `run` tells: wave speeds and what a crack costs
-!> for each material, how many points each group of the scene acts on, and how long the horizon is
-!> beside bodies and cracks.
+!> Data to check before a run, in addition to the output of `run`: wave speeds, the energy of a
+!> crack for each material, how many points each group of the scene acts on, and how long the
+!> horizon is beside bodies and cracks.
 module pd_output_report_overview
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
@@ -66,7 +66,7 @@ contains
       & 'J/m2', 4)//', from the critical stretch at this horizon')
   end function material_lines
 
-  !> The horizon beside spacings, bodies and cracks.
+  !> The horizon compared with spacings, bodies and cracks.
   function lengths(scene, system) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
@@ -139,7 +139,7 @@ contains
     end function points_of_load
   end function counts
 
-  !> A name before what is told of it.
+  !> A name in front of its data.
   pure function named(name) result(text)
     character(*), intent(in) :: name
     character(:), allocatable :: text

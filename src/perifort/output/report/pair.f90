@@ -22,7 +22,7 @@ contains
 
   !> Let the caller's observer see the instant, then the recorder. An error of the former with
   !> `status_interrupted` stops the run in order: the recorder writes this state first. The last
-  !> good state of a motion that has gone wrong is shown to the recorder alone.
+  !> good state of a diverged run is passed only to the recorder.
   subroutine observe(observer, system, instant, error)
     class(pair_type), intent(inout) :: observer
     type(system_type), intent(inout) :: system

@@ -1,4 +1,4 @@
-!> Probes: points whose values stand in every row of the history.
+!> Probes: points whose values are in every row of the history.
 module pd_output_report_probes
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4
@@ -41,7 +41,7 @@ contains
       least = huge(least)
       do i = 1, body%n_points
         distance = norm2(body%x(body%slot(i), :) - scene%probes(p)%point(:body%dim))
-        ! a hair's breadth nearer is no nearer: ties must not depend on rounding
+        ! differences within the tolerance are ties, so that ties do not depend on rounding
         if (distance >= least - touch*body%spacing(body%slot(i))) cycle
         least = distance
         probes(p)%slot = body%slot(i)

@@ -1,5 +1,5 @@
-!> Writes what a run is asked to keep: outputs of fields, rows of history with energies, reactions
-!> and probes, and the progress line.
+!> Writes the output of a run: outputs of fields, rows of history with energies, reactions and
+!> probes, and the progress line.
 module pd_output_report_recorder
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: phase_timer_type, progress_type
@@ -44,16 +44,16 @@ module pd_output_report_recorder
     integer :: gave_way = 0                  !! load steps left to dynamic relaxation
     integer :: gave_way_at = 0               !! the last of them
     type(warnings_type) :: warnings
-    logical :: turned = .false.              !! parts have turned, which was told
-    logical :: quiet = .false.               !! warnings are kept, but not told
+    logical :: turned = .false.              !! parts have rotated, which was reported
+    logical :: quiet = .false.               !! warnings are kept, but not printed
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
     integer :: more_outputs = 0              !! which goes on would not have
     real(wp) :: most_seconds = 0.0_wp        !! wall time until the run stops by itself, if > 0 [s]
-    character(:), allocatable :: command     !! goes on with the run; '' = nothing does
+    character(:), allocatable :: command     !! continues the run; '' = not possible
     character(:), allocatable :: wish        !! why another observer asks to stop in order
-    character(:), allocatable :: rescued     !! what was saved of a motion that has gone wrong
+    character(:), allocatable :: rescued     !! message on the saved state of a diverged run
   contains
     procedure :: observe
     procedure :: keep_state
@@ -63,7 +63,7 @@ module pd_output_report_recorder
 
 contains
 
-  !> Look at one instant: write what is due.
+  !> Process one instant: write the outputs, rows and checkpoints that are due.
   subroutine observe(observer, system, instant, error)
     class(recorder_type), intent(inout) :: observer
     type(system_type), intent(inout) :: system
@@ -121,7 +121,7 @@ contains
     if (output) then
       call observer%timer%start('output')
       call write_output(observer, system, instant, v, error)
-      ! a run that goes on does not have the output that is written because it stops
+      ! a restarted run does not have the output that is written because the run stops
       if (output_due .or. instant%last) then
         call tell(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
@@ -160,8 +160,8 @@ contains
       & time_is_over = recorder%timer%total() >= recorder%most_seconds
   end function time_is_over
 
-  !> The last good state of a motion that has gone wrong becomes the last output, unless there is
-  !> one of its step or a later one. Rows of the history go on to the fault.
+  !> The last good state of a diverged run becomes the last output, unless there is one of its step
+  !> or a later one. Rows of the history extend to the failure.
   subroutine write_rescued(recorder, system, instant, error)
     class(recorder_type), intent(inout) :: recorder
     type(system_type), intent(inout) :: system
@@ -187,7 +187,7 @@ contains
     recorder%rescued = state//' is the last output'
   end subroutine write_rescued
 
-  !> A line that says how a run that has stopped goes on, if it can.
+  !> A line with the command that continues a stopped run, if that is possible.
   function way_on(recorder) result(text)
     class(recorder_type), intent(in) :: recorder
     character(:), allocatable :: text
@@ -196,7 +196,7 @@ contains
     if (recorder%command /= '') text = newline//'  to continue: '//recorder%command
   end function way_on
 
-  !> Write a checkpoint. If that fails, the run goes on with the one before it.
+  !> Write a checkpoint. If that fails, the run continues and the previous one is kept.
   subroutine keep_state(recorder, system, finished)
     class(recorder_type), intent(inout) :: recorder
     type(system_type), intent(inout) :: system
@@ -232,7 +232,7 @@ contains
     if (len(text) > 0) call recorder%warn(subject, text)
   end subroutine tell
 
-  !> Note a warning; the first of a subject is told at once.
+  !> Note a warning; the first of a subject is printed at once.
   subroutine warn(recorder, subject, text)
     class(recorder_type), intent(inout) :: recorder
     character(*), intent(in) :: subject, text
@@ -273,7 +273,7 @@ contains
       & instant%time, error)
   end subroutine write_row
 
-  !> How far the energies of the last row are from what was there and has been supplied; a
+  !> Deviation of the energies of the last row from the initial plus the supplied energy; a
   !> relaxation has no balance.
   pure subroutine energy_balance(recorder, system, balance, share)
     class(recorder_type), intent(in) :: recorder

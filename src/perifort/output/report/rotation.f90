@@ -1,5 +1,5 @@
 !> How far a body has turned. The projected dilatation shrinks by the cosine of a rotation, so a run
-!> with it looks whether parts have turned.
+!> with it checks whether parts have rotated.
 module pd_output_report_rotation
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type

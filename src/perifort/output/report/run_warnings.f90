@@ -1,5 +1,5 @@
-!> What is told during a run of a state that the method is not meant for: pieces that touch, parts
-!> that have turned, large strains. Each is a text, '' if there is nothing to tell.
+!> Warnings during a run about states for which the method is not valid: contact, rotated parts,
+!> large strains. Each is a text, '' without a warning.
 module pd_output_report_run_warnings
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
@@ -12,8 +12,9 @@ module pd_output_report_run_warnings
   private
   public :: contact_warning, rotation_warning, strain_warning
 
-  !> Rotations that the projected dilatation is told for: beyond 10 degrees it is off by 1.5 % and
-  !> more. So large a share of the points must have turned: a few may turn at the tip of a crack.
+  !> Rotations that cause a warning with the projected dilatation: beyond 10 degrees its error is
+  !> 1.5 % and more. So large a share of the points must have turned: a few may turn at the tip of a
+  !> crack.
   real(wp), parameter :: small_rotation = pi/18
   real(wp), parameter :: least_turned = 0.02_wp
 

@@ -1,4 +1,4 @@
-!> What a run tells on standard output, unless it is to be quiet.
+!> Messages of a run on standard output, unless it is quiet.
 module pd_output_report_say
   use, intrinsic :: iso_fortran_env, only: output_unit
   use pd_base_text, only: printable

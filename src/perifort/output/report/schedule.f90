@@ -41,8 +41,8 @@ contains
     schedule%tolerance = plan%relaxation%tolerance
   end function schedule_of
 
-  !> An error if a run would write more outputs, or rows of its history, than anybody can look at:
-  !> the results have room for all of them from the beginning.
+  !> An error if a run would write more outputs, or rows of its history, than can be used: the
+  !> results have room for all of them from the beginning.
   subroutine check_schedule(scene, plan, bonds, error)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
@@ -156,8 +156,8 @@ contains
     end if
   end function output_due
 
-  !> Intervals complete at a step, where a hair short of one counts as one. For steps that are not
-  !> longer than the interval.
+  !> Intervals complete at a step, where slightly less than one, within the tolerance, counts as
+  !> one. For steps that are not longer than the interval.
   pure integer(i8) function intervals(schedule, step, dt)
     type(schedule_type), intent(in) :: schedule
     integer, intent(in) :: step

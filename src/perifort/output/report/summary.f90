@@ -1,4 +1,4 @@
-!> What the user reads on the terminal before a run: what will be computed and why so.
+!> The summary printed before a run: the chosen methods and their reasons.
 module pd_output_report_summary
   use pd_base_kinds, only: wp, i8
   use pd_base_clock, only: duration_text
@@ -19,7 +19,7 @@ module pd_output_report_summary
 contains
 
   !> The scene as it will be computed, a fact in each line: points, bonds, memory, forces, time
-  !> step, probes, and what is to be noted.
+  !> step, probes, and notes.
   function summary_before(scene, system, plan, probes, cut, warnings, notes, threads) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
@@ -27,7 +27,7 @@ contains
     type(probe_type), intent(in) :: probes(:)
     integer(i8), intent(in) :: cut        !! bonds removed by cracks
     type(warnings_type), intent(in) :: warnings  !! found so far
-    type(warnings_type), intent(in) :: notes     !! what is right and may surprise
+    type(warnings_type), intent(in) :: notes     !! correct, but possibly unexpected facts
     integer, intent(in) :: threads        !! that the run may use
     character(:), allocatable :: text
     integer :: p, k
@@ -149,7 +149,7 @@ contains
     end associate
   end function forces
 
-  !> A line for each term of the force that tells of itself.
+  !> A line for each term of the force with a description.
   function terms_of(system) result(text)
     type(system_type), intent(in) :: system
     character(:), allocatable :: text, lines
@@ -164,7 +164,7 @@ contains
     end do
   end function terms_of
 
-  !> The precision of the bonds, and why it is not the one that was asked for.
+  !> The precision of the bonds, and the reason if it is not the requested one.
   function precision_of(scene, system) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system

@@ -1,5 +1,5 @@
-!> What is told before a run of what is allowed, but hardly meant: of the scene's words, its points,
-!> its plan and its conditions. Notes tell what is right and may surprise.
+!> Warnings before a run about input that is allowed but probably not intended: keys of the scene,
+!> points, plan and conditions. Notes report correct, but possibly unexpected facts.
 module pd_output_report_warnings
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, to_text, with_unit

@@ -13,9 +13,9 @@ module pd_output_results_answer
     real(wp), allocatable :: values(:, :)            !! (point, component), in the field's unit
   end type values_type
 
-  !> What a run came to. After an error the history goes to where it happened, and the fields are
-  !> those of the last complete output. Points are numbered as in the files: body by body, then
-  !> layers.
+  !> The results of a run. After an error the history extends to the step of the error, and the
+  !> fields are those of the last complete output. Points are numbered as in the files: body by
+  !> body, then layers.
   type :: answer_type
     type(column_type), allocatable :: columns(:)     !! of the history: names and units
     real(wp), allocatable :: history(:, :)           !! (row, column)
@@ -94,7 +94,7 @@ contains
     number = 0
   end function field_number
 
-  !> An error that says what there is.
+  !> An error that lists the existing names.
   subroutine unknown(kind, name, names, error)
     character(*), intent(in) :: kind, name
     character(*), intent(in) :: names(:)

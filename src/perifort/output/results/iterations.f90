@@ -1,6 +1,6 @@
-!> The way of a relaxation to equilibrium, `iterations.csv`: a line for each iteration that is
-!> due. It is no part of a checkpoint: a run that goes on keeps the lines up to where it goes
-!> on, and adds to them. An error is set if the file cannot be read or written.
+!> The convergence of a relaxation, `iterations.csv`: a line for each iteration that is due. It is
+!> not part of a checkpoint: a restarted run keeps the lines up to where it goes on, and adds to
+!> them. An error is set if the file cannot be read or written.
 module pd_output_results_iterations
   use pd_base_error, only: error_type
   use pd_base_kinds, only: i8

@@ -1,4 +1,4 @@
-!> The results of a run, in the files that the user wants: what the solver talks to.
+!> The results of a run, in the files that the user selects: the interface for the solver.
 !>
 !>     call results%create(directory, stem, positions, fields, ...)
 !>     call results%put_points('volume', volume, error)       ! any number of these
@@ -161,7 +161,7 @@ contains
     self%open = .true.
   end subroutine create
 
-  !> Go on with the files beside the HDF5 file.
+  !> Continue the files beside the HDF5 file.
   subroutine resume_others(self, kept, error)
     class(results_type), intent(inout) :: self
     type(kept_type), intent(in) :: kept
@@ -491,7 +491,7 @@ contains
       & with_unit(self%time, 's'), bytes, error)
   end subroutine explain_output
 
-  !> Say what failed, how much it needed and what is safe. From here on nothing more is written.
+  !> Report what failed, its size and the complete outputs. No more data are written after that.
   subroutine explain_need(self, what, bytes, error)
     class(results_type), intent(inout) :: self
     character(*), intent(in) :: what

@@ -1,7 +1,7 @@
-!> Text files written piece by piece, with certainty that what was written is there.
+!> Text files written piece by piece, with a check that all data were written.
 !>
-!> The C library's streams are used because they tell whether buffered text reached the file;
-!> a Fortran runtime library may lose that news. An error names the file and, where it can be found,
+!> The C library's streams are used because they report whether buffered text reached the file; a
+!> Fortran runtime library may lose that news. An error names the file and, where it can be found,
 !> the system's reason.
 module pd_output_results_sink
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_loc, c_null_char, &
@@ -14,7 +14,7 @@ module pd_output_results_sink
   private
   public :: sink_type
 
-  !> A text file under way.
+  !> An open text file.
   type :: sink_type
     private
     type(c_ptr) :: stream = c_null_ptr

@@ -1,7 +1,7 @@
 !> The results file: one HDF5 file that VTK reads as a time series of points (VTKHDF, PolyData).
 !>
 !> It must be whole whenever its writer dies. HDF5 doesn't write its own records in one step, so
-!> they hardly ever change: the file is laid out under another name with room for all planned
+!> they change only rarely: the file is laid out under another name with room for all planned
 !> outputs (the system stores only what is written), closed, and opened again. From then on an
 !> output is plain data written into places that exist, and after it eight bytes that count: NSteps,
 !> the length of a history column. A file that needs more room is copied into a bigger one, which
@@ -28,7 +28,7 @@ module pd_output_results_vtkhdf
 
   integer(i8), parameter :: default_outputs = 16_i8, default_rows = 4096_i8
 
-  !> A results file under way.
+  !> An open results file.
   type :: vtkhdf_file
     private
     type(hdf5_file) :: file
@@ -120,9 +120,9 @@ contains
     if (planned_rows > 0) self%layout%row_capacity = planned_rows
   end subroutine plan_layout
 
-  !> Go on with a file that was left at or after the outputs and rows in `kept`: what is beyond them
-  !> is cut off. The other arguments are those of `create`; a changed `scene_text` is written. An
-  !> error if the file has fewer of them, other times, or the results of another scene.
+  !> Continue a file that was left at or after the outputs and rows in `kept`: data beyond them are
+  !> removed. The other arguments are those of `create`; a changed `scene_text` is written. An error
+  !> if the file has fewer of them, other times, or the results of another scene.
   subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
     & scene_text, command, version, kept, error)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
@@ -173,7 +173,7 @@ contains
     end if
   end subroutine resume
 
-  !> Whether the file has what the checkpoint counts on.
+  !> Whether the file has the outputs and rows that the checkpoint counts.
   subroutine check_kept(self, kept, error)
     class(vtkhdf_file), intent(in) :: self
     type(kept_type), intent(in) :: kept
@@ -463,7 +463,7 @@ contains
     if (.not. allocated(error)) call sync_path(self%current, error)
   end subroutine sync
 
-  !> Close the file with the room that it has, to go on with it another time.
+  !> Close the file with its unused space, to continue it later.
   subroutine leave(self, error)
     class(vtkhdf_file), intent(inout) :: self  !! not open on return
     type(error_type), allocatable, intent(out) :: error
@@ -483,7 +483,7 @@ contains
     if (text /= '') call put_text(self%file, '/scene/warnings', text, ignored)
   end subroutine put_warnings
 
-  !> Cut off room that wasn't needed and close the file.
+  !> Remove unused space and close the file.
   subroutine finish(self, error)
     class(vtkhdf_file), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error

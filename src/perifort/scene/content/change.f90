@@ -1,8 +1,8 @@
 !> Give a key of a scanned scene another value, as if the user had written it: a word of `&study`,
 !> or one of the option `--set` of the command line.
 !>
-!> The new words carry the place of the text they come from, so that what is wrong with them is
-!> reported there. The scene is read anew afterwards: a changed scene obeys the same rules as any.
+!> The new values keep the place of the text they come from, so that errors in them are reported
+!> there. The scene is read anew afterwards: a changed scene obeys the same rules as any.
 module pd_scene_content_change
   use pd_base_error, only: error_type
   use pd_base_text, only: join, lower_case, nearest_name, to_text
@@ -30,8 +30,8 @@ module pd_scene_content_change
 
 contains
 
-  !> The text of a scene that has been read before, scanned again, with what `--set` changes in it.
-  !> An error is set if the text cannot be scanned or a change is wrong.
+  !> The text of a scene that has been read before, scanned again, with the changes of `--set`. An
+  !> error is set if the text cannot be scanned or a change is wrong.
   subroutine scan_scene(scene, source, error)
     type(scene_type), intent(in) :: scene          !! with its text
     type(source_type), intent(out) :: source       !! the scanned text with the changes in it
@@ -501,7 +501,7 @@ contains
     end do
   end function keys_of
 
-  !> The shape that a key's kind tells.
+  !> The shape given by a key's kind.
   subroutine extents_of(target, extents)
     type(target_type), intent(in) :: target
     integer, allocatable, intent(out) :: extents(:)

@@ -1,5 +1,5 @@
-!> Everything that can be known of a scene before its points are built: what is needed is there,
-!> alternatives exclude each other, names refer to something. Fills in what goes without saying.
+!> Checks of a scene before its points are built: required keys are given, alternatives exclude each
+!> other, names exist. Fills in defaults.
 module pd_scene_content_check
   use pd_base_kinds, only: wp, i2
   use pd_base_error, only: error_type
@@ -17,10 +17,10 @@ module pd_scene_content_check
 
 contains
 
-  !> Check a scene and complete it: afterwards every list is allocated, every body has its
-  !> material, Poisson's ratios, ramps, the factor of relaxation and the lists of fields are the
-  !> ones to compute with. `source` gives the messages their places. A complete scene stays as it
-  !> is. An error is set at the first broken rule.
+  !> Check a scene and complete it: afterwards every list is allocated, every body has its material,
+  !> Poisson's ratios, ramps, the factor of relaxation and the lists of fields are the ones to
+  !> compute with. `source` gives the messages their places. A complete scene is not changed. An
+  !> error is set at the first broken rule.
   subroutine check_scene(scene, error, source)
     type(scene_type), intent(inout) :: scene           !! as read or built; complete on return
     type(error_type), allocatable, intent(out) :: error
@@ -80,7 +80,7 @@ contains
     call check_studies(scene, error, source)
   end subroutine check_scene
 
-  !> Lists that nobody has filled get size 0, so that loops need no question.
+  !> Lists that are not allocated get size 0, so that loops need no test.
   subroutine allocate_groups(scene)
     type(scene_type), intent(inout) :: scene
       !! every list of groups, the text and the name of the file are allocated on return
@@ -111,7 +111,7 @@ contains
     end do
   end subroutine check_numbers
 
-  !> The groups that stand once, and the two without which there is nothing to compute.
+  !> The groups that are given once, and the two that every scene needs.
   subroutine check_settings(scene, error, source)
     type(scene_type), intent(inout) :: scene
     type(error_type), allocatable, intent(out) :: error

@@ -1,4 +1,4 @@
-!> Rules of what acts on the bodies: initial state, boundaries, loads, and their course in time.
+!> Rules for actions on the bodies: initial state, boundaries, loads, and their course in time.
 module pd_scene_content_check_actions
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
@@ -13,8 +13,8 @@ module pd_scene_content_check_actions
 
 contains
 
-  !> One `&initial`; in relaxation its temperature change grows over the load steps unless it says
-  !> otherwise. An error is set if a rule is broken.
+  !> One `&initial`; in relaxation its temperature change grows over the load steps by default. An
+  !> error is set if a rule is broken.
   subroutine check_initial(scene, number, error, source)
     type(scene_type), intent(inout) :: scene           !! gets the default of `ramp_time`
     integer, intent(in) :: number                      !! which group of this name
@@ -77,8 +77,8 @@ contains
 
   end subroutine check_initial
 
-  !> One `&boundary`; in relaxation its ramp goes over the load steps unless it says otherwise. An
-  !> error is set if a rule is broken.
+  !> One `&boundary`; in relaxation its default ramp covers all load steps. An error is set if a
+  !> rule is broken.
   subroutine check_boundary(scene, number, error, source)
     type(scene_type), intent(inout) :: scene           !! gets the default of `ramp_time`
     integer, intent(in) :: number                      !! which group of this name
@@ -121,8 +121,8 @@ contains
     end associate
   end subroutine check_boundary
 
-  !> One `&load`; the only body and, in relaxation, the ramp over the load steps go without saying.
-  !> An error is set if a rule is broken.
+  !> One `&load`; the only body and, in relaxation, the ramp over the load steps are defaults. An
+  !> error is set if a rule is broken.
   subroutine check_load(scene, number, error, source)
     type(scene_type), intent(inout) :: scene  !! gets the defaults of `body` and `ramp_time`
     integer, intent(in) :: number                      !! which group of this name
@@ -208,8 +208,8 @@ contains
   end subroutine check_place
 
   !> At once, by a ramp, or by times and values. In relaxation, where time runs from 0 to 1 over the
-  !> load steps, a course that says nothing is a ramp over all of them, and none may go beyond 1,
-  !> for what stands there would never act.
+  !> load steps, the default course is a ramp over all of them, and times must not exceed 1, since
+  !> later values would never act.
   subroutine check_course(scene, ramp_time, times, values, group, number, error, source)
     type(scene_type), intent(in) :: scene                 !! for its method
     real(wp), intent(inout) :: ramp_time                  !! length of the ramp [s]

@@ -1,4 +1,4 @@
-!> Rules of what is there at the start: bodies, shapes, materials and cracks.
+!> Rules for the initial geometry: bodies, shapes, materials and cracks.
 module pd_scene_content_check_bodies
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
@@ -13,8 +13,7 @@ module pd_scene_content_check_bodies
   public :: check_body, check_shape, check_material, check_crack, check_file, needed_ratio
 
   real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
-  !> What a point of a lattice takes at the peak, while families are built, measured on cubes
-  !> [bytes].
+  !> Peak memory of a point of a lattice, while families are built, measured on cubes [bytes].
   real(wp), parameter :: memory_per_point = 400.0_wp
   real(wp), parameter :: most_points = 1.0e9_wp         !! points and slots have 32-bit numbers
   real(wp), parameter :: ratio_tolerance = 1.0e-3_wp    !! 0.333 is meant to be 1/3
@@ -243,8 +242,8 @@ contains
     if (dimension == 2 .and. plane == 'stress') ratio = 1.0_wp/3.0_wp
   end function needed_ratio
 
-  !> One `&material`; fills in the Poisson's ratio and the density that go without saying. An error
-  !> is set if a rule is broken.
+  !> One `&material`; fills in the default Poisson's ratio and density. An error is set if a rule is
+  !> broken.
   subroutine check_material(scene, number, error, source)
     type(scene_type), intent(inout) :: scene           !! gets the material's defaults
     integer, intent(in) :: number                      !! which group of this name
@@ -268,12 +267,12 @@ contains
         call check_ratio(material, scene%header%dimension, scene%header%plane, number, error, &
           & source)
       end if
-      ! Relaxation has a mass of its own; 1 keeps what is derived from the density finite.
+      ! Relaxation has its own mass; 1 keeps quantities derived from the density finite.
       if (.not. is_set(material%density)) material%density = 1.0_wp
     end associate
   end subroutine check_material
 
-  !> Poisson's ratio: in its range, and the one of the bond-based model where that is asked for.
+  !> Poisson's ratio: in its range, and that of the bond-based model if this model is selected.
   subroutine check_ratio(material, dimension, plane, number, error, source)
     type(material_group), intent(inout) :: material
     integer, intent(in) :: dimension
@@ -300,7 +299,7 @@ contains
           & 'ignore_poissons_ratio = .true.', source)
         return
       end if
-      ! What is computed with is what the resolved scene shows.
+      ! The resolved scene shows the value used in the computation.
       material%poissons_ratio = needed
     else if (.not. is_set(material%poissons_ratio)) then
       call rule_fault(error, 'material', number, '', &

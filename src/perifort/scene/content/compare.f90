@@ -22,9 +22,8 @@ module pd_scene_content_compare
 
 contains
 
-  !> The differences between two texts as `pd_scene_content_write` makes them, in the order of
-  !> the first,
-  !> then what only the second has.
+  !> The differences between two texts as `pd_scene_content_write` makes them, in the order of the
+  !> first, followed by keys of the second only.
   function scene_differences(before, now) result(differences)
     character(*), intent(in) :: before  !! text of the first scene
     character(*), intent(in) :: now     !! text of the second scene
@@ -74,7 +73,7 @@ contains
     end subroutine note
   end function scene_differences
 
-  !> Where a key stands in another scene; 0 if it doesn't.
+  !> Index of a key in another scene; 0 if it is missing.
   pure integer function place_of(entry, entries) result(place)
     type(entry_type), intent(in) :: entry
     type(entry_type), intent(in) :: entries(:)

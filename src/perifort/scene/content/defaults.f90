@@ -1,7 +1,7 @@
 !> The defaults that have changed from version to version.
 !>
-!> `&scene defaults` says for which version a scene was written; without it, for this one. What is
-!> not listed here has had the same default in all of them.
+!> `&scene defaults` names the version for which a scene was written; without it, this version. Keys
+!> that are not listed here have had the same default in all versions.
 !>
 !> | version | what has changed                                                                  |
 !> |---------|-----------------------------------------------------------------------------------|
@@ -60,8 +60,8 @@ contains
     end do
   end subroutine fill_defaults
 
-  !> Whether rows of the history, where the user says nothing, are so few that they take little
-  !> time. Their number follows from the steps, which only the plan of a run knows.
+  !> Whether the default interval of history rows is so large that rows take little time. Their
+  !> number follows from the steps, which only the plan of a run knows.
   pure logical function rows_by_cost(scene)
     type(scene_type), intent(in) :: scene  !! checked, with its version of the defaults
     rows_by_cost = .not. before_0_2(scene)

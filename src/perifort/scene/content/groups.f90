@@ -1,8 +1,8 @@
 !> The table of groups: one line for each group of a scene file, in the order of the reference.
 !>
 !> Another group needs a file with its type, which extends `group_type`, and a line here. Its place
-!> in the scene is `scene%added`; a component of `scene_type` needs a procedure below that tells
-!> where it is, too.
+!> in the scene is `scene%added`; a component of `scene_type` also needs a procedure below that
+!> returns it.
 module pd_scene_content_groups
   use pd_scene_content_types, only: scene_type, header_type, body_group, shape_group, &
     & region_group, no_fail_group, material_group, horizon_group, crack_group, initial_group, &

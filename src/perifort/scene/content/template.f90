@@ -1,7 +1,7 @@
 !> Scenes to start from, with every key explained.
 !>
-!> They are built from numbers and printed by the same declarations that read scenes, so they
-!> cannot fall behind what can be read.
+!> They are built from numbers and printed by the same declarations that read scenes, so they always
+!> agree with the reader.
 module pd_scene_content_template
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_usage
@@ -61,7 +61,7 @@ contains
         & join(template_names, ', '), status_usage)
       return
     end select
-    ! a scene that says so has the same defaults in every version to come
+    ! with this key a scene keeps its defaults in all later versions
     scene%header%defaults = own_defaults
     text = '! '//trim(scene%header%title)//newline// &
       & "! Values are in SI units. Keys behind a '!' are at the default that is shown, or not "// &
@@ -94,7 +94,7 @@ contains
     scene%probes(1)%point(1) = 0.5_wp
   end subroutine bar
 
-  !> 2D: a plate pulled at both ends until it is at rest.
+  !> 2D: a plate pulled at both ends, in static equilibrium.
   subroutine plate(scene)
     type(scene_type), intent(out) :: scene
 
@@ -118,7 +118,7 @@ contains
     scene%probes(1)%point(:2) = [0.25_wp, 0.0_wp]
   end subroutine plate
 
-  !> 3D: a block held at one end and pulled at the other until it is at rest.
+  !> 3D: a block held at one end and pulled at the other, in static equilibrium.
   subroutine block_in_tension(scene)
     type(scene_type), intent(out) :: scene
 

@@ -1,5 +1,5 @@
-!> What the user asked for: a scene, which holds the groups of a scene file, and the table of the
-!> groups that there are.
+!> The input of a user: a scene, which holds the groups of a scene file, and the table of the groups
+!> that there are.
 !>
 !> The groups themselves are the types in `scene/groups`, every component with its default and unit.
 !> Whoever builds a scene without a file fills these types directly.
@@ -48,8 +48,8 @@ module pd_scene_content_types
                                                                    !! none: in `scene%added`
   end type group_entry
 
-  !> The groups that a scene may have, in the order of the reference. It serves reading, writing,
-  !> the reference, templates, changes of keys and their meaning to a restart.
+  !> The groups that a scene may have, in the order of the reference. It is used for reading,
+  !> writing, the reference, templates, changes of keys and their effect on a restart.
   type :: group_table
     type(group_entry), allocatable :: entries(:) !! with room at the end
     integer :: count = 0
@@ -64,7 +64,7 @@ module pd_scene_content_types
     procedure :: visit
   end type group_table
 
-  !> Everything a scene file says.
+  !> The content of a scene file.
   type :: scene_type
     character(:), allocatable :: file            !! where it was read from ('' = built in memory)
     character(:), allocatable :: text            !! the file's text
@@ -98,8 +98,8 @@ module pd_scene_content_types
       class(group_type), pointer, intent(out) :: group  !! its group, not a copy
     end subroutine group_interface
 
-    !> Where a scene has all groups of a kind, of size 0 if nobody has filled them. With `room` they
-    !> are made anew, so many.
+    !> Where a scene has all groups of a kind, of size 0 if they are not allocated. With `room` they
+    !> are allocated again, with this size.
     subroutine groups_interface(scene, groups, room)
       import :: group_type, scene_type
       implicit none (type, external)
@@ -164,7 +164,7 @@ contains
     end do
   end function place_of
 
-  !> Let `keys` know all keys of a group with their defaults.
+  !> Register all keys of a group with their defaults in `keys`.
   subroutine describe(table, name, keys)
     class(group_table), intent(in) :: table
       !! with this group; another name is a fault of the program
@@ -174,7 +174,7 @@ contains
 
     if (table%place_of(name) == 0) call internal_fault('there is no group '//name)
     call keys%start(mode_describe)
-    ! the visitor may change what it visits
+    ! the visitor may change the group
     allocate (fresh, source=table%entries(table%place_of(name))%fresh)
     call fresh%visit(keys)
   end subroutine describe
@@ -234,7 +234,7 @@ contains
     end associate
   end subroutine make_room
 
-  !> Give a scene an empty list where it has none, so that loops need no question.
+  !> Allocate missing lists of a scene with size 0, so that loops need no test.
   subroutine complete(table, scene)
     class(group_table), intent(in) :: table           !! of the scene's groups
     type(scene_type), intent(inout), target :: scene  !! with all lists allocated on return

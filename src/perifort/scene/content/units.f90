@@ -1,5 +1,5 @@
 !> Numbers of a scene that look as if they were not in SI units. A scene in millimetres, newtons and
-!> megapascals is computed without complaint, and its answers are wrong by powers of ten.
+!> megapascals is computed without an error, and its results are wrong by powers of ten.
 module pd_scene_content_units
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text, with_unit
@@ -81,7 +81,7 @@ contains
       call warnings%add(subject, text//advice, tell=.false.)
     end subroutine warn
 
-    !> Warn if what a group imposes would strain the body by more than 1.
+    !> Warn if a load, displacement or velocity of a group predicts a strain above 1.
     subroutine check_strain(group, number, key, strain)
       character(*), intent(in) :: group, key  !! of the scene
       integer, intent(in) :: number           !! of the group

@@ -1,5 +1,5 @@
-!> What a scene may say, but hardly means: materials that no body has, keys that mean nothing where
-!> they stand, and numbers that look like those of other units (`pd_scene_content_units`).
+!> Warnings about input that is allowed but probably not intended: unused materials, keys without
+!> effect, and numbers that look like those of other units (`pd_scene_content_units`).
 module pd_scene_content_warnings
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
@@ -54,7 +54,7 @@ contains
 
   contains
 
-    !> A warning for each of these keys that is given where it means nothing.
+    !> A warning for each of these keys that is given but has no effect.
     subroutine warn_of_keys(group, keys, idle, where_it_stands)
       character(*), intent(in) :: group, keys(:), where_it_stands
       logical, intent(in) :: idle

@@ -1,4 +1,4 @@
-!> From the words of a scene file to the values of keys, checked against what is allowed.
+!> From the words of a scene file to the values of keys, checked against the allowed values.
 !>
 !> Every conversion gives back `message` and `note`: what was wrong and what was expected, both ''
 !> if the value is good. The value is assigned only then.

@@ -485,7 +485,7 @@ contains
     end do
   end subroutine words
 
-  !> Keep what is known of a key.
+  !> Store the description of a key.
   subroutine note_key(keys, name, kind, unit, meaning, shown, allowed, required, default)
     class(keys_type), intent(inout) :: keys
     character(*), intent(in) :: name, kind, unit, meaning, shown, allowed
@@ -529,7 +529,7 @@ contains
       & call check_gaps(keys, name, slots)
   end subroutine find
 
-  !> Keep the first fault of a value; a message '' is none.
+  !> Keep the first error of a value; a message '' means no error.
   subroutine complain(keys, token, message, note)
     class(keys_type), intent(inout) :: keys
     integer, intent(in) :: token

@@ -1,8 +1,8 @@
 !> A scene file as text with places: groups, keys and values, each with its line and column.
 !>
 !> The scan knows nothing of which groups and keys exist. It masks comments and quotes, so that a
-!> `/`, `=` or `&` inside them means nothing, and finds what a namelist read would pass over in
-!> silence or report without a place.
+!> `/`, `=` or `&` inside them means nothing, and finds errors that a namelist read would silently
+!> ignore or report without a place.
 module pd_scene_format_source
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: is_control, lower_case, to_text, newline
@@ -54,7 +54,7 @@ module pd_scene_format_source
   integer, parameter :: longest_shown = 110  !! columns of a source line shown in a message
   integer, parameter :: lead_shown = 36      !! columns shown before the fault in a cut line
 
-  !> What stood last in a group, to tell an empty value from a trailing comma.
+  !> The last token of a group, to distinguish an empty value from a trailing comma.
   enum, bind(c)
     enumerator :: after_name, after_equals, after_value, after_comma
   end enum
@@ -538,7 +538,7 @@ contains
     source%token_count = source%token_count + 1
   end subroutine grow_tokens
 
-  !> Cut the lists to what is in them.
+  !> Trim the lists to their used length.
   subroutine trim_lists(source)
     type(source_type), intent(inout) :: source
     source%sections = source%sections(:source%section_count)

@@ -141,7 +141,7 @@ contains
     integer :: n, status
     real(wp) :: back
 
-    ! what is no number is written as such, to be refused when it is read
+    ! NaN and infinity are written as such, and are refused when read
     if (ieee_is_nan(value)) then
       text = 'NaN'
       return

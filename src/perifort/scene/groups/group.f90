@@ -1,11 +1,11 @@
-!> What every namelist group of a scene is: something whose keys can be visited.
+!> Base type of every namelist group of a scene: its keys can be visited.
 module pd_scene_groups_group
   use pd_scene_format_keys, only: keys_type
   implicit none (type, external)
   private
   public :: group_type, change_refused, change_harmless, change_of_the_end, change_of_the_files
 
-  !> What the change of a key means to a run that goes on from a checkpoint.
+  !> Effect of a changed key on a run that is restarted from a checkpoint.
   enum, bind(c)
     enumerator :: change_refused       !! another problem: the run cannot go on
     enumerator :: change_harmless      !! the results that are there stay right

@@ -48,7 +48,7 @@ contains
       & 'keys that are not given', allowed=known_defaults, default="'"//own_defaults//"'")
   end subroutine visit
 
-  !> The title says nothing of the problem; what `defaults` sets is compared key by key.
+  !> The title does not change the problem; the keys that `defaults` sets are compared one by one.
   pure integer function change_of(key) result(change)
     character(*), intent(in) :: key  !! its name, '' for the group as a whole
 

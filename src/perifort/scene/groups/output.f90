@@ -1,4 +1,4 @@
-!> The group `&output`: what is written, and how often.
+!> The group `&output`: fields, files and intervals of the output.
 module pd_scene_groups_output
   use pd_base_kinds, only: wp
   use pd_scene_format_given, only: name_length, unset
@@ -56,7 +56,7 @@ contains
       & 'minutes of computing between checkpoints; 0: none by time', at_least=0.0_wp)
   end subroutine visit
 
-  !> When something is written may change at any time, what is written only with other files.
+  !> Intervals may be changed at any time; fields and formats only with other files.
   pure integer function change_of(key) result(change)
     character(*), intent(in) :: key  !! its name, '' for the group as a whole
 

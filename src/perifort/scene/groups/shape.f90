@@ -1,4 +1,4 @@
-!> Shapes: the group `&remove`, and what `&region` and `&no_fail` add to it.
+!> Shapes: the group `&remove`, and the keys that `&region` and `&no_fail` add.
 module pd_scene_groups_shape
   use pd_base_kinds, only: wp
   use pd_scene_format_given, only: name_length, unset

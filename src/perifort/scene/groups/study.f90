@@ -11,7 +11,7 @@ module pd_scene_groups_study
   character(15), parameter :: closed_forms(6) = [character(15) :: 'bar_vibration', 'bar_tension', &
     & 'uniaxial_stress', 'plate_hole', 'chain_wave', 'linear_field']
 
-  !> `&study`: one key that a study varies; what is measured stands in the first group that says so.
+  !> `&study`: one key that a study varies; `measure` is read from the first group that has it.
   type, extends(group_type) :: study_group
     character(name_length) :: vary = ''          !! `group%key`, `group(2)%key`, `key(1)`, ...
     character(path_length), allocatable :: values(:)  !! as written, texts with their quotes

@@ -1,4 +1,4 @@
-!> `perifort bench`: standard bodies measured on this machine, against what the machine can do.
+!> `perifort bench`: standard bodies measured on this machine, compared with its peak performance.
 module pd_study_bench_bench
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads
@@ -179,7 +179,7 @@ contains
     call fail(error, "cannot write the file '"//options%csv//"': "//trim(message))
   end subroutine open_csv
 
-  !> Put the file in its place; after an error what was measured stays beside it.
+  !> Put the file in its place; after an error the measured numbers stay in a file beside it.
   subroutine close_csv(options, csv, error)
     type(bench_options_type), intent(in) :: options
     integer, intent(in) :: csv

@@ -1,5 +1,5 @@
 !> One measurement of the benchmark: a standard body, built as any scene is, moved for a while and
-!> timed; and what its arithmetic and memory traffic are by the formulas.
+!> timed; and its arithmetic and memory traffic by the formulas.
 module pd_study_bench_kernels
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_clock, only: wall_time

@@ -46,7 +46,7 @@ contains
     integer :: r
 
     allocate (a(length), b(length), c(length))
-    ! each thread touches first what it will work on
+    ! each thread first touches its own part of the memory
     !$omp parallel do schedule(static) num_threads(threads) default(none) &
     !$omp shared(a, b, c, length) private(i)
     do i = 1, length

@@ -59,7 +59,7 @@ contains
       & to_text(options%seconds))
   end subroutine check_options
 
-  !> Fails where nothing of what is wanted has loops in mixed precision.
+  !> Fails if none of the selected kernels has loops in mixed precision.
   pure subroutine check_mixed(options, error)
     type(bench_options_type), intent(in) :: options
     type(error_type), allocatable, intent(out) :: error
@@ -103,7 +103,7 @@ contains
       & "'"//hint)
   end subroutine check_choice
 
-  !> Whether `name` belongs to what was chosen: the word itself, 'both', or nothing given.
+  !> Whether `name` is among the chosen ones: the word itself, 'both', or nothing given.
   pure logical function chosen(word, name)
     character(:), allocatable, intent(in) :: word  !! as the user gave it; '' or not allocated:
                                                    !! nothing given

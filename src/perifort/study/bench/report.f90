@@ -48,7 +48,7 @@ contains
       & to_text(efficiency)
   end function csv_row
 
-  !> What stands above the table: program, what the machine can do, and what the columns mean.
+  !> The head of the table: program, peak performance of the machine, and meaning of the columns.
   !> `surface`: with surface correction.
   subroutine table_head(unit, machines, surface)
     integer, intent(in) :: unit                    !! of an open file or the terminal

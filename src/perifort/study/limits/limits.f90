@@ -1,5 +1,5 @@
-!> How far a scene can be pushed: its largest stable step, measured, beside equation 7.25, and
-!> confirmed by short runs; then what rounding and the integrators do to it.
+!> Numerical limits of a scene: its largest stable step, measured, compared with equation 7.25 and
+!> confirmed by short runs; the rounding error; the energy drift of the integrators.
 module pd_study_limits_limits
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_set_num_threads
@@ -41,16 +41,16 @@ module pd_study_limits_limits
     integer :: slot = 0                !! where `equation` is least
     integer :: printed_slot = 0        !! where `printed` is
     real(wp) :: spectral = 0.0_wp      !! 2/omega of the body as it is
-    real(wp) :: lasting = 0.0_wp       !! a bound from below, whatever bonds break; 0: none can
+    real(wp) :: lasting = 0.0_wp       !! a lower bound for any broken bonds; 0: none can break
     type(spectrum_type) :: spectrum
   end type limits_type
 
 contains
 
-  !> Measure a scene and print what was found, each part as soon as it is known, to `unit`.
-  !> Everything but the building and the measurement of the largest frequency takes about `seconds`.
-  !> An error if the scene cannot be set up, if nothing in it can vibrate, or if the runs contradict
-  !> the measured limit.
+  !> Measure a scene and print the results, each part as soon as it is known, to `unit`. Everything
+  !> but the building and the measurement of the largest frequency takes about `seconds`. An error
+  !> if the scene cannot be set up, if nothing in it can vibrate, or if the runs contradict the
+  !> measured limit.
   subroutine run_limits(scene, options, seconds, error, unit)
     type(scene_type), intent(in) :: scene  !! to be measured; a static one as if it were explicit
     type(run_options_type), intent(in) :: options  !! of the command line: the number of threads
@@ -145,7 +145,7 @@ contains
       step = 0.0_wp
       if (sums(k) > 0.0_wp) step = sqrt(2/(inverse_density(system%model, k)*sums(k)))
       if (present(most)) most = max(most, step)
-      ! a hair's breadth less is no less: where it is must not depend on rounding
+      ! differences within the tolerance are ties: the position must not depend on rounding
       if (step >= least*(1 - 1.0e-9_wp)) cycle
       least = step
       slot = k
@@ -190,8 +190,8 @@ contains
     text = 'point '//to_text(int(system%body%point(slot)))//' at ('//place(system, slot)//') m'
   end function where_is
 
-  !> Run just below and just above the limit, print what becomes of the disturbance, and fail if
-  !> that contradicts the limit. The two runs share about `seconds`.
+  !> Run just below and just above the limit, print the growth of the disturbance, and fail if that
+  !> contradicts the limit. The two runs share about `seconds`.
   subroutine confirm(system, limit, seconds, unit, error)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: limit, seconds

@@ -44,7 +44,7 @@ contains
     call random_shape(body, shape)
     call smoothed(body, step, passes, shape)
     call in_points(body%body, shape, start)
-    ! a few steps to learn what a step takes
+    ! a few steps to measure the time of a step
     begin = wall_time()
     call vibrate(body, start, without_curvature, step, least_steps, linear, error)
     if (allocated(error)) return

@@ -1,6 +1,6 @@
 !> Which closed forms a scene has, with the numbers that the scene gives them.
 !>
-!> A form fits or is refused with the reason: what is compared with must be this scene's answer.
+!> A form fits or is refused with the reason: it must be the solution of this scene.
 module pd_study_trade_analytic
   use pd_base_kinds, only: wp
   use pd_base_error, only: internal_fault
@@ -18,7 +18,7 @@ module pd_study_trade_analytic
   private
   public :: find_form, complete_form
 
-  real(wp), parameter :: hair = 1.0e-9_wp      !! what counts as equal
+  real(wp), parameter :: tolerance = 1.0e-9_wp      !! of equality [-]
   real(wp), parameter :: pure_wave = 1.0e-6_wp !! part of a state that may be of other wave numbers
 
 contains
@@ -150,12 +150,12 @@ contains
     form%speed = sqrt(form%modulus/scene%materials(1)%density)
     if (abs(slope) <= 0.0_wp) then
       reason = 'the scene starts without strain; give &initial displacement_gradient(1,1)'
-    else if (abs(slope*form%origin(1) + shift) > hair*abs(slope)*form%length) then
+    else if (abs(slope*form%origin(1) + shift) > tolerance*abs(slope)*form%length) then
       reason = 'the initial displacement is not 0 at the held end'
     end if
   end subroutine fit_vibration
 
-  !> The initial displacement u = slope x + shift of a bar at rest.
+  !> The initial displacement u = slope x + shift of a bar without velocity.
   subroutine uniform_start(scene, slope, shift, reason)
     type(scene_type), intent(in) :: scene
     real(wp), intent(out) :: slope, shift
@@ -228,10 +228,10 @@ contains
     if (len(reason) > 0) return
     centre = (scene%bodies(1)%lower(:2) + scene%bodies(1)%upper(:2))/2
     size_of_plate = maxval(scene%bodies(1)%upper(:2) - scene%bodies(1)%lower(:2))
-    if (any(abs(form%origin(:2) - centre) > hair*size_of_plate) .or. &
-      & any(abs(form%shift(:2)) > hair*abs(strain)*size_of_plate)) then
+    if (any(abs(form%origin(:2) - centre) > tolerance*size_of_plate) .or. &
+      & any(abs(form%shift(:2)) > tolerance*abs(strain)*size_of_plate)) then
       reason = 'the plate must be pulled at both sides alike'
-    else if (any(abs(scene%removed(1)%centre(:2) - centre) > hair*size_of_plate)) then
+    else if (any(abs(scene%removed(1)%centre(:2) - centre) > tolerance*size_of_plate)) then
       reason = 'the hole must be in the middle of the plate'
     end if
     form%kind = form_hole
@@ -293,8 +293,8 @@ contains
     end do
   end subroutine fit_linear
 
-  !> What only the points and their state tell: the wave number of a chain, and how far from its
-  !> ends they are not felt until `time` [s]. `reason` is '' if the form holds.
+  !> Data that follow from the points and their state: the wave number of a chain, and how far from
+  !> its ends they are not felt until `time` [s]. `reason` is '' if the form holds.
   subroutine complete_form(scene, system, time, form, reason)
     type(scene_type), intent(in) :: scene             !! with its groups as they were read
     type(system_type), intent(in) :: system           !! at the start of the run

@@ -150,7 +150,7 @@ contains
 
     refines = plan%variables(free)%refines
     multiple = count_step(plan, plan%variables(free))
-    ! the runs themselves: what they gave is known
+    ! the runs themselves: their results are known
     do i = 1, law%n
       words = words_at(plan, free, t, law%h(i))
       call consider(choice, words, maxval(law%error(i:)), seconds_at(law, law%h(i)), target, limit)

@@ -1,4 +1,4 @@
-!> Answers in closed form (doc/theory.md, 12): what a field is at a point and a time.
+!> Solutions in closed form (doc/theory.md, 12): the value of a field at a point and a time.
 !>
 !> A form is plain numbers; `pd_study_trade_analytic` takes them from a scene.
 module pd_study_trade_closed_form
@@ -12,7 +12,7 @@ module pd_study_trade_closed_form
     & chain_frequency
 
   integer, parameter :: form_wave = 1    !! a bar released from uniform strain
-  integer, parameter :: form_linear = 2  !! displacements linear in x, at rest
+  integer, parameter :: form_linear = 2  !! displacements linear in x, static
   integer, parameter :: form_hole = 3    !! a hole in an infinite plate
   integer, parameter :: form_chain = 4   !! one wave number on a chain of points
 
@@ -109,7 +109,7 @@ contains
     end function slope
   end subroutine wave
 
-  !> u = H (x - origin) + shift, at rest, whole and in balance.
+  !> u = H (x - origin) + shift, static, without damage and in equilibrium.
   pure subroutine linear(form, x, state)
     type(closed_form_type), intent(in) :: form
     real(wp), intent(in) :: x(:)

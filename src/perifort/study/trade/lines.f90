@@ -183,7 +183,8 @@ contains
     end do
   end subroutine mark_true_errors
 
-  !> For each line what the fit found, and why runs are not used as they are, one fact a line.
+  !> For each line the result of the fit, and the reasons why runs are not used with their own
+  !> error, one per line.
   function line_notes(plan, outcomes) result(text)
     type(plan_type), intent(in) :: plan            !! of the study
     type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan

@@ -1,4 +1,4 @@
-!> What a study measures, and what one run shows of it.
+!> The measured quantity of a study, and its values in one run.
 !>
 !> A measure is a quantity at one place or many, at one instant or many: a probe is one place over
 !> the rows of the history, a field many places in the final state, and a column of the history has
@@ -197,7 +197,7 @@ contains
     if (measure%norm /= 'relative') unit = quantity_unit(measure)
   end function measure_unit
 
-  !> The unit of what is measured, '' if it has none.
+  !> The unit of the measured quantity, '' if it has none.
   pure function quantity_unit(measure) result(unit)
     type(measure_type), intent(in) :: measure  !! with its kind and field
     character(:), allocatable :: unit

@@ -1,5 +1,5 @@
-!> What a study will do: which keys take which values, the runs that come of them, what is measured
-!> and against what.
+!> The plan of a study: the varied keys and their values, the resulting runs, the measured quantity
+!> and its reference.
 !>
 !> A run's scene is made by giving keys other words in the scanned file and reading it anew, so a
 !> value that is refused is reported at its place in the group `&study`.

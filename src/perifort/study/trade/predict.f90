@@ -1,5 +1,5 @@
-!> From the runs of a study to what has not been run (doc/theory.md, 14): error and time along one
-!> line, the runs that differ in one step h alone.
+!> Predictions from the runs of a study (doc/theory.md, 14): error and time along one line, the runs
+!> that differ in one step h alone.
 !>
 !> The error is fitted by C (h^p - r^p), where r is the step of the run that all are compared with,
 !> 0 if they are compared with something exact; the time by c h^-q. A run counts half as much again
@@ -52,7 +52,7 @@ contains
     if (law%n < 2) return
     law%extrapolates = all(law%error > 0.0_wp) .and. all(law%h > reference)
     call line(log(law%h), log(law%seconds), law%log_cost, law%slope)
-    ! never faster when finer, whatever the noise of the clock
+    ! never faster when finer, in spite of the scatter of the clock
     law%slope = max(0.0_wp, -law%slope)
     law%log_cost = log(law%seconds(law%n)) + law%slope*log(law%h(law%n))
     if (.not. law%extrapolates) return

@@ -1,4 +1,4 @@
-!> Whether a scene is a uniaxial pull, and which: what closed forms of tension and of a hole need.
+!> Whether a scene is a uniaxial pull, and its data, for the closed forms of tension and of a hole.
 module pd_study_trade_pull
   use pd_base_kinds, only: wp
   use pd_scene_content_groups, only: sides
@@ -8,7 +8,7 @@ module pd_study_trade_pull
   private
   public :: pull
 
-  real(wp), parameter :: hair = 1.0e-9_wp      !! what counts as equal
+  real(wp), parameter :: tolerance = 1.0e-9_wp      !! of equality [-]
 
   !> What acts along one direction: at each end (1 lower, 2 upper) a traction, or a displacement.
   type :: ends_type
@@ -51,7 +51,7 @@ contains
         form%shift(axis) = sum(end%displacement)/2
       else if (all(end%loaded)) then
         strain = end%traction(1)/form%modulus
-        if (abs(end%traction(1) - end%traction(2)) > hair*abs(end%traction(1))) &
+        if (abs(end%traction(1) - end%traction(2)) > tolerance*abs(end%traction(1))) &
           & reason = 'the two ends are pulled differently'
       else if (any(end%held)) then
         e = merge(1, 2, end%held(1))
@@ -71,7 +71,7 @@ contains
     if (len(reason) == 0 .and. abs(strain) <= 0.0_wp) reason = 'nothing is pulled'
   end subroutine pull
 
-  !> What acts on each side; whatever is no pull along a side's normal is refused.
+  !> The action on each side; actions other than a pull along a side's normal are refused.
   subroutine collect_ends(scene, ends, reason)
     type(scene_type), intent(in) :: scene
     type(ends_type), intent(out) :: ends(3)

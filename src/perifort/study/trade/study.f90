@@ -47,8 +47,8 @@ module pd_study_trade_study
 
 contains
 
-  !> The whole command. An interrupt keeps what is done. An error is set if the study is wrong, a
-  !> run cannot be made, or none has an answer.
+  !> The whole command. After an interrupt the finished runs are kept. An error is set if the study
+  !> is wrong, a run cannot be made, or none has an answer.
   subroutine run_study(path, options, error, changes)
     character(*), intent(in) :: path                     !! of the scene file
     type(run_options_type), intent(in) :: options        !! of the command line
@@ -290,7 +290,7 @@ contains
         allocate (form)
         call find_form(plan%analytic, plan%trials(t)%scene, form, reason)
       end if
-      ! what lies around the probe of the finest run is kept, so that the places of coarser ones
+      ! the surroundings of the probe of the finest run are kept, so that the places of coarser ones
       ! can be found in it: their points are at most half a cell's diagonal away
       around = 0.0_wp
       if (truth) around = session%around + 3*plan%trials(t)%spacing

@@ -92,7 +92,7 @@ contains
     if (outcome%extrapolated) text = to_text(outcome%true_error, digits)
   end function true_text
 
-  !> The whole table with what follows from it.
+  !> The complete table with its evaluation.
   function table_text(plan, outcomes, measure) result(text)
     type(plan_type), intent(in) :: plan            !! of the study
     type(outcome_type), intent(in) :: outcomes(:)  !! (runs) in the order of the plan
@@ -268,7 +268,7 @@ contains
     text = trim(adjustl(buffer))
   end function fixed
 
-  !> Put a text into a file of a folder, in one step: what was there stays until then. An error if
+  !> Put a text into a file of a folder, in one step: an older file is kept until then. An error if
   !> it cannot be written.
   subroutine put_file(directory, name, text, error)
     character(*), intent(in) :: directory  !! folder of the file, which is there

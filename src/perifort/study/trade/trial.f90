@@ -49,7 +49,7 @@ module pd_study_trade_trial
     logical :: pareto = .false.
   end type outcome_type
 
-  !> Keeps what is measured, and the balance of energy.
+  !> Records the measured quantity and the energy balance.
   type, extends(observer_type) :: watcher_type
     type(measure_type) :: measure
     type(record_type) :: record
@@ -75,10 +75,10 @@ module pd_study_trade_trial
 
 contains
 
-  !> Run a scene and keep what is measured. Runs are repeated until there are five or they have
-  !> taken a second. `around`: of a probe all points so near are kept [m], 0 for the nearest alone.
-  !> `form` gets what only the points tell of it. An error that ends a run without an answer is kept
-  !> in `outcome`; others, and interrupts, in `error`.
+  !> Run a scene and record the measured quantity. Runs are repeated until there are five or they
+  !> have taken a second. `around`: of a probe all points so near are kept [m], 0 for the nearest
+  !> alone. `form` gets what only the points tell of it. An error that ends a run without an answer
+  !> is kept in `outcome`; others, and interrupts, in `error`.
   subroutine run_trial(scene, table, measure, around, terminal, form, outcome, record, error)
     type(scene_type), intent(in) :: scene       !! a checked scene
     type(field_table_type), intent(in) :: table  !! of the fields that the scene may name
@@ -326,7 +326,7 @@ contains
     observer%spent = observer%spent + (wall_time() - begin)
   end subroutine observe
 
-  !> The gap between the energy there is and what went in.
+  !> The difference between the energy and the supplied energy.
   subroutine balance(watcher, system, energies)
     class(watcher_type), intent(inout) :: watcher
     type(system_type), intent(in) :: system
@@ -340,7 +340,7 @@ contains
     watcher%largest = max(watcher%largest, abs(stored), abs(system%external_work))
   end subroutine balance
 
-  !> One row of what is measured.
+  !> One row of the measured quantity.
   subroutine keep(watcher, system, instant, v, energies)
     class(watcher_type), intent(inout) :: watcher
     type(system_type), target, intent(inout) :: system
