@@ -196,8 +196,8 @@ contains
     call expect_warning(still//"&boundary side = 'x_max' velocity_x = 1e-3 /", &
       & 'displaces its points by 500 um', .true.)
     call expect_warning(still//"&boundary side = 'x_max' velocity_x = 0 /", 'displaces', .false.)
-    call expect_warning(still//'&initial velocity_x = 1 /', 'mean nothing', .true.)
-    call expect_warning(still//'&initial displacement_x = 1e-3 /', 'mean nothing', .false.)
+    call expect_warning(still//'&initial velocity_x = 1 /', 'have no effect', .true.)
+    call expect_warning(still//'&initial displacement_x = 1e-3 /', 'have no effect', .false.)
     call expect_warning(cold//hot//'&time steps = 1 /', 'does not expand', .true.)
     call expect_warning(bar//'&material youngs_modulus = 1e9 density = 1 thermal_expansion = 0 /' &
       & //hot//'&time steps = 1 /', 'does not expand', .false.)
