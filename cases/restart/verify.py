@@ -162,7 +162,7 @@ def stop_and_go_on(subject, what, tally, words=(), number=None):
         time.sleep(0.5 * subject.duration)
         run.send_signal(number)
     message = run.communicate()[1]
-    printed = re.search(r"to continue: (.*)", message)
+    printed = re.search(r"to go on: (.*)", message)
     fault = ""
     if run.returncode != 4 or not printed:
         fault = f"status {run.returncode}: {message}"

@@ -193,7 +193,7 @@ contains
     character(:), allocatable :: text
 
     text = ''
-    if (recorder%command /= '') text = newline//'  to continue: '//recorder%command
+    if (recorder%command /= '') text = newline//'  to go on: '//recorder%command
   end function way_on
 
   !> Write a checkpoint. If that fails, the run continues and the previous one is kept.
