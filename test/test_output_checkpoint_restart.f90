@@ -34,7 +34,7 @@ contains
       & new_unittest('a block in 3D', test_block), &
       & new_unittest('a list, bonds that break late', test_list), &
       & new_unittest('temperatures that vary in time', test_heated), &
-      & new_unittest('a relaxation with a growing crack', test_relaxation), &
+      & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
       & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
       & new_unittest('results beyond the checkpoint are removed', test_beyond), &
