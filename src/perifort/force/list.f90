@@ -8,8 +8,8 @@ module pd_force_list
   use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
     & no_tables, pass_loop, task_type, weights_alone
-  use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy, take_given, take_up
+  use pd_force_list_general, only: work_type, fill_tables, cluster_theta, cluster_force, &
+    & cluster_energy, take_given, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
   use pd_force_list_tables, only: drop_tables, make_tables
   use pd_force_model, only: early, force_options_type, model_type, options_of
@@ -88,7 +88,7 @@ contains
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
-        call general_theta(family, model, options, work, sums(:, 1))
+        call cluster_theta(family, model, options, work, sums(:, 1))
         if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do l = 1, lanes
@@ -139,7 +139,7 @@ contains
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
         end associate
-        call general_force(family, model, options, work, sums)
+        call cluster_force(family, model, options, work, sums)
         if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do d = 1, model%dim
@@ -174,7 +174,7 @@ contains
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
         end associate
-        call general_energy(family, model, options, work, sums(:, 1), sums(:, 2))
+        call cluster_energy(family, model, options, work, sums(:, 1), sums(:, 2))
       else
         call run_loop(family, work, loops%stored, loops%task, sums, missed)
       end if

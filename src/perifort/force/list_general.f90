@@ -12,7 +12,7 @@ module pd_force_list_general
   use pd_force_model, only: force_options_type, model_type
   implicit none (type, external)
   private
-  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up, &
+  public :: work_type, fill_tables, cluster_theta, cluster_force, cluster_energy, take_up, &
     & take_given
 
   !> What one cluster is worked with: one for each thread.
@@ -138,7 +138,7 @@ contains
   end subroutine fill_tables
 
   !> theta of the lanes.
-  pure subroutine general_theta(family, model, options, work, theta)
+  pure subroutine cluster_theta(family, model, options, work, theta)
     type(list_family_type), intent(in) :: family     !! with displacements gathered
     type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the dilatation takes in
@@ -152,13 +152,13 @@ contains
     call begin(model, options, work)
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, options, work, i, s, lambda, r, y, p)
+      call deform_cluster(family, model, options, work, i, s, lambda, r, y, p)
       theta = theta + work%dilatation(:, i)*s*lambda
     end do
-  end subroutine general_theta
+  end subroutine cluster_theta
 
   !> Force density of the lanes (lanes, 3) [N/m3].
-  pure subroutine general_force(family, model, options, work, force)
+  pure subroutine cluster_force(family, model, options, work, force)
     type(list_family_type), intent(in) :: family
       !! with displacements, and p if there is one, gathered
     type(model_type), intent(in) :: model            !! parameters of the slots
@@ -174,7 +174,7 @@ contains
     call begin(model, options, work)
     force = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, options, work, i, s, lambda, r, y, p)
+      call deform_cluster(family, model, options, work, i, s, lambda, r, y, p)
       s = work%stretch(:, i)*s
       if (options%dilatation) &
         & s = s + (work%own(:, at_p) + p)*work%dilatation(:, i)*work%geometry(:, i)*lambda
@@ -182,11 +182,11 @@ contains
         force(:, c) = force(:, c) + s*r*y(:, c)
       end do
     end do
-  end subroutine general_force
+  end subroutine cluster_force
 
   !> Strain energy density of the lanes' stretches [J/m3], from tables with each lane's own q twice,
   !> and theta.
-  pure subroutine general_energy(family, model, options, work, energy, theta)
+  pure subroutine cluster_energy(family, model, options, work, energy, theta)
     type(list_family_type), intent(in) :: family     !! with displacements gathered
     type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the energy takes in
@@ -203,11 +203,11 @@ contains
     energy = 0.0_wp
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, options, work, i, s, lambda, r, y, p)
+      call deform_cluster(family, model, options, work, i, s, lambda, r, y, p)
       energy = energy + 0.25_wp*work%stretch(:, i)*s**2/work%geometry(:, i)
       if (options%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
     end do
-  end subroutine general_energy
+  end subroutine cluster_energy
 
   pure subroutine begin(model, options, work)
     type(model_type), intent(in) :: model
@@ -221,7 +221,7 @@ contains
 
   !> State of a cluster's bonds in its `i`-th pack: mechanical stretch, Lambda, r = |xi|/|y|, the
   !> deformed bond y [m] and p of the other end.
-  pure subroutine deform(family, model, options, work, i, s, lambda, r, y, p)
+  pure subroutine deform_cluster(family, model, options, work, i, s, lambda, r, y, p)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
@@ -264,6 +264,6 @@ contains
       work%tension(l) = max(work%tension(l), x)
       work%compression(l) = max(work%compression(l), -x)
     end do
-  end subroutine deform
+  end subroutine deform_cluster
 
 end module pd_force_list_general

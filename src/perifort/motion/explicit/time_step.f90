@@ -53,7 +53,8 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          inverse(k) = inverse(k) + factor(model, model%D, n, k, j)*bonds%weight(i)/bonds%length(i)
+          inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
+            & /bonds%length(i)
         end do
         associate (m => model%materials(model%material(k)))
           inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*m%t**2
@@ -69,8 +70,8 @@ contains
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
         bound(k) = bound(k) + ((model%materials(model%material(k))%q &
-          & + model%materials(model%material(j))%q)*factor(model, model%S, n, k, j) &
-          & + (inverse(k) + inverse(j))*factor(model, model%D, n, k, j)) &
+          & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
+          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j)) &
           & *bonds%weight(i)/bonds%length(i)
       end do
     end do
@@ -78,14 +79,14 @@ contains
   end subroutine stiffness_bound
 
   !> The size of Gd or Gb of the bond k-j along the unit vector n.
-  pure real(wp) function factor(model, g, n, k, j)
+  pure real(wp) function surface_factor(model, g, n, k, j)
     type(model_type), intent(in) :: model
     real(wp), allocatable, intent(in) :: g(:, :)
     real(wp), intent(in) :: n(:)
     integer, intent(in) :: k, j
-    factor = 1.0_wp
-    if (model%surface) factor = abs(bond_factor(n, g(k, :), g(j, :)))
-  end function factor
+    surface_factor = 1.0_wp
+    if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :)))
+  end function surface_factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
   real(wp) function stable_step(body, model, bound) result(step)
