@@ -3,8 +3,8 @@
 module pd_force_general
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
-  use pd_family_lattice, only: weights_type
   use pd_force_model, only: early, force_options_type, model_type
+  use pd_force_workspace, only: weights_type
   implicit none (type, external)
   private
   public :: general_dilatation, general_force, general_energy, crushed, mark_slot

@@ -51,7 +51,7 @@ contains
     real(wp) :: stiffness, damping  ! of the terms of the force, over the density
 
     allocate (bound(system%body%n_slots))
-    call stiffness_bound(system%body, system%family, system%model, bound)
+    call stiffness_bound(system%body, system%family, system%model, system%workspace, bound)
     plan%relaxes = scene%time%method == 'relaxation'
     plan%integrator = trim(scene%time%integrator)
     if (.not. any(bound > 0.0_wp)) then
