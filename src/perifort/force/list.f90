@@ -2,6 +2,7 @@
 !> does: for points that are alike or with stored weights, for small strain or larger one; what no
 !> loop serves (strains beyond 5 % or near breaking, temperature) is done by general formulas.
 module pd_force_list
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
   use pd_family_list, only: list_family_type
@@ -43,7 +44,11 @@ contains
       !! ready for passes, without a state; unchanged if it is
     integer :: k
 
-    if (allocated(workspace%given)) return
+    if (allocated(workspace%given)) then
+      if (size(workspace%at, 2) /= family%n_slots) &
+        & call internal_fault('a workspace of another family')
+      return
+    end if
     allocate (workspace%at(at_p, family%n_slots), source=0.0_wp)
     do k = 1, family%n_slots
       workspace%at(:family%dim, k) = family%x(:, k)

@@ -2,6 +2,7 @@
 !> neighbouring slots. Blocks whose surroundings are alike share them, so that surface
 !> correction costs nothing in a step and next to no memory.
 module pd_force_weights
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_lanes, only: lanes, word_bits
   use pd_base_lookup, only: lookup_type, mix
@@ -73,7 +74,11 @@ contains
     type(model_type), intent(in) :: model            !! whether there is a dilatation
     type(lattice_workspace_type), intent(inout) :: workspace  !! unchanged if it has room
 
-    if (allocated(workspace%weights)) return
+    if (allocated(workspace%weights)) then
+      if (size(workspace%weights) /= size(family%block)) &
+        & call internal_fault('a workspace of another family')
+      return
+    end if
     allocate (workspace%weights(size(family%block)), source=0_i4)
     allocate (workspace%served(size(family%block)), source=0_i1)
     if (family%mixed) call allocate_singles(family, model, workspace%singles)
