@@ -17,6 +17,7 @@ module force_subjects
   use pd_force_forces, only: internal_force
   use pd_force_model, only: model_type, new_model, options_of
   use pd_force_weights, only: build_weights
+  use pd_force_workspace, only: workspace_type
   use pd_scene_content_types, only: crack_group
   use bodies, only: noise, youngs_modulus
   implicit none (type, external)
@@ -54,12 +55,13 @@ module force_subjects
     type(body_type) :: body
     class(family_type), allocatable :: family
     type(model_type) :: model
+    type(workspace_type) :: workspace
   end type subject_type
 
 contains
 
   !> The one place that knows the kinds of families.
-  subroutine build_family(kind, body, rule, breakable, key_bits, least_shared, family)
+  subroutine build_family(kind, body, rule, breakable, key_bits, least_shared, family, workspace)
     character(*), intent(in) :: kind
     type(body_type), intent(inout) :: body
     type(volume_rule_type), intent(in) :: rule
@@ -67,6 +69,7 @@ contains
     integer(i8), intent(in) :: key_bits
     integer, intent(in) :: least_shared
     class(family_type), allocatable, intent(out) :: family
+    type(workspace_type), intent(inout) :: workspace
     type(list_family_type), allocatable :: list
     type(lattice_family_type), allocatable :: lattice
     type(fault_type), allocatable :: fault
@@ -75,8 +78,8 @@ contains
     case ('list', 'tables')
       allocate (list)
       call new_list_family(body, rule, list)
-      list%key_bits = key_bits
-      list%least_shared = merge(1, least_shared, kind == 'tables')
+      workspace%list%key_bits = key_bits
+      workspace%list%least_shared = merge(1, least_shared, kind == 'tables')
       call move_alloc(list, family)
     case default
       allocate (lattice)
@@ -85,12 +88,12 @@ contains
     end select
   end subroutine build_family
 
-  !> What a family keeps of the model once that is complete.
+  !> What is kept of the model once that is complete.
   subroutine finish_family(subject)
     type(subject_type), intent(inout) :: subject
     select type (family => subject%family)
     type is (lattice_family_type)
-      call build_weights(family, subject%model)
+      call build_weights(family, subject%model, subject%workspace%lattice)
     end select
   end subroutine finish_family
 
@@ -165,7 +168,7 @@ contains
       end if
       call build_family(subject%kind, body, volume_rule_type(subject%rule, delta), &
         & subject%crack .or. subject%breaking, subject%key_bits, subject%least_shared, &
-        & subject%family)
+        & subject%family, subject%workspace)
       allocate (temperature_change(body%n_slots), source=0.0_wp)
       if (subject%thermal) then
         do i = 1, body%n_slots
@@ -328,8 +331,8 @@ contains
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
     allocate (strained(size(u, 1)), source=0_i1)
-    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), u, &
-      & p, force, strained)
+    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), &
+      & subject%workspace, u, p, force, strained)
   end subroutine fast_force
 
   !> A gradient with all components, also where the dimension has no use for them.
@@ -354,7 +357,7 @@ contains
     subject%body%grid = 1_i2
     subject%body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
     call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
-      & .false., subject%key_bits, subject%least_shared, subject%family)
+      & .false., subject%key_bits, subject%least_shared, subject%family, subject%workspace)
     call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
       & depth(2), &
       & depth(1), 2*spacing, subject%bond_based)], subject%projected, &

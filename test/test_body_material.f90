@@ -2,7 +2,8 @@
 module test_body_material
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
-  use pd_body_material, only: material_type, new_material, special_poissons_ratio, &
+  use pd_base_elasticity, only: bond_based_ratio
+  use pd_body_material, only: material_type, new_material, &
     & critical_stretch_from_energy
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: expect, expect_true, youngs_modulus
@@ -147,7 +148,7 @@ contains
     do case = 1, 3
       dim = merge(3, 2, case == 1)
       nu = merge(1.0_wp/3, 0.25_wp, case == 2)
-      call expect(error, special_poissons_ratio(dim, case == 3), nu, 0.0_wp, 'special ratio')
+      call expect(error, bond_based_ratio(dim, case == 3), nu, 0.0_wp, 'special ratio')
       m = new_material(youngs_modulus, nu, 1.0_wp, dim, case == 3, h, A, delta, .false.)
       ! exactly zero: the dilatation pass drops out then
       call expect(error, m%a, 0.0_wp, 0.0_wp, 'a at the special ratio')

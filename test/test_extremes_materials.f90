@@ -217,7 +217,8 @@ contains
       if (allocated(error)) return
       associate (system => set_up%system)
         allocate (bound(system%body%n_slots), source=0.0_wp)
-        call stiffness_bound(system%body, system%family, system%model, bound)
+        call stiffness_bound(system%body, system%family, system%model, &
+        & system%workspace, bound)
         call expect(error, maxval(bound), expected, 1.0e-12_wp*expected, 'bound at nu = -0.9')
         call expect_true(error, all(bound(system%body%slot) > 0.0_wp), 'a bound is not positive')
         deallocate (bound)

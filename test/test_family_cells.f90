@@ -5,8 +5,8 @@ module test_family_cells
   use pd_family_cells, only: cells_type, sort_into_cells, brute_force_neighbours
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_list, only: list_family_type, new_list_family
-  use pd_family_volume, only: volume_rule_type, reach, volume_none, volume_linear, &
-    & volume_linear_extended, volume_exact
+  use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_none, &
+    & volume_linear, volume_linear_extended, volume_exact
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: expect, expect_true, noise
   implicit none (type, external)
@@ -50,7 +50,9 @@ contains
     body%material = 1_i2
   end subroutine lattice
 
-  !> Families of `body` against all pairs, by the points' numbers.
+  !> Families of `body` against all pairs, by the points' numbers, and their weights against the
+  !> volume correction. Lists have its formula in a loop of their own, and so have their force
+  !> loops, which test_force_contract holds to these weights for every rule.
   subroutine compare(body, rule, what, error)
     type(body_type), intent(in) :: body
     type(volume_rule_type), intent(in) :: rule
@@ -83,6 +85,11 @@ contains
         call expect_true(error, .not. mine(sorted%point(bonds%j(b))), what &
           & //': a member stands twice')
         mine(sorted%point(bonds%j(b))) = .true.
+        associate (j => bonds%j(b), xi => bonds%xi(b, :))
+          call expect(error, bonds%weight(b)/sorted%volume(j), volume_correction(rule, xi, &
+            & norm2(xi), (body%spacing(i) + sorted%spacing(j))/2), 1.0e-13_wp, &
+            & what//': the volume correction')
+        end associate
       end do
       theirs(truth) = .true.
       call expect_true(error, all(mine .eqv. theirs), what//': another family than by brute force')

@@ -367,7 +367,7 @@ contains
         else
           allocate (lattice)
           call new_lattice_family(body, rule, breakable, .false., lattice, fault)
-          if (present(room)) lattice%room = room
+          if (present(room)) subject%workspace%lattice%room = room
           call move_alloc(lattice, subject%family)
         end if
       end associate
@@ -380,7 +380,7 @@ contains
     end associate
     select type (family => subject%family)
     type is (lattice_family_type)
-      call build_weights(family, subject%model)
+      call build_weights(family, subject%model, subject%workspace%lattice)
     end select
   end subroutine porous
 
@@ -503,11 +503,10 @@ contains
     do i = 1, 2
       breakable = i == 2
       call porous([70, 50], ratio, 0.3_wp, 'lattice', breakable, subject)
-      select type (family => subject%family)
-      type is (lattice_family_type)
-        call expect_true(error, size(family%table) > 300, 'too few kinds of blocks')
-        call expect_true(error, all(family%weights > 0), 'blocks without a table')
-      end select
+      associate (kept => subject%workspace%lattice)
+        call expect_true(error, size(kept%table) > 300, 'too few kinds of blocks')
+        call expect_true(error, all(kept%weights > 0), 'blocks without a table')
+      end associate
       call expect_theory(error, subject, 'a plate full of holes')
       ! farther offsets than one word of bits holds: 80 of them
       call porous([40, 30], 5.015_wp, 0.3_wp, 'lattice', breakable, subject)
@@ -525,30 +524,26 @@ contains
     type(subject_type) :: subject
 
     call porous([24, 24, 24], ratio, 0.0_wp, 'lattice', .false., subject, surface=.false.)
-    select type (family => subject%family)
-    type is (lattice_family_type)
-      call check(error, size(family%table), 3*7*7, 'kinds without surface factors')
+    associate (kept => subject%workspace%lattice)
+      call check(error, size(kept%table), 3*7*7, 'kinds without surface factors')
       if (allocated(error)) return
-      call expect_true(error, all(family%weights > 0), 'blocks without a table')
-    end select
+      call expect_true(error, all(kept%weights > 0), 'blocks without a table')
+    end associate
     call expect_theory(error, subject, 'a cube without surface factors')
     if (allocated(error)) return
     call porous([24, 24, 24], ratio, 0.0_wp, 'lattice', .false., subject, room=0_i8)
-    select type (family => subject%family)
-    type is (lattice_family_type)
-      call expect_true(error, size(family%table) < 3*13*13, 'no kind without a table')
-      call expect_true(error, 4*count(family%weights > 0) >= 3*size(family%weights), &
+    associate (kept => subject%workspace%lattice)
+      call expect_true(error, size(kept%table) < 3*13*13, 'no kind without a table')
+      call expect_true(error, 4*count(kept%weights > 0) >= 3*size(kept%weights), &
         & 'blocks of common kinds without a table')
-    end select
+    end associate
     call expect_theory(error, subject, 'a cube with few tables')
     if (allocated(error)) return
     ! five spacings have 514 offsets: all kinds have tables
     call porous([20, 20, 20], 5.015_wp, 0.0_wp, 'lattice', .false., subject)
-    select type (family => subject%family)
-    type is (lattice_family_type)
-      call check(error, family%most_bonds, 514, 'offsets')
-      call expect_true(error, all(family%weights > 0), 'five spacings: blocks without a table')
-    end select
+    call check(error, subject%family%most_bonds, 514, 'offsets')
+    call expect_true(error, all(subject%workspace%lattice%weights > 0), &
+      & 'five spacings: blocks without a table')
   end subroutine test_most_used
 
   !> Beyond the room of the tables, blocks make their weights in every pass: here 32 MiB, of 1200
@@ -563,11 +558,10 @@ contains
     integer :: k
 
     call porous([20, 20, 20], 5.015_wp, 0.4_wp, 'lattice', .true., subject, room=32_i8*1024_i8**2)
-    select type (family => subject%family)
-    type is (lattice_family_type)
-      call expect_true(error, count(family%weights > 0) > 300, 'too few blocks with tables')
-      call expect_true(error, count(family%weights == 0) > 300, 'too few without')
-    end select
+    associate (kept => subject%workspace%lattice)
+      call expect_true(error, count(kept%weights > 0) > 300, 'too few blocks with tables')
+      call expect_true(error, count(kept%weights == 0) > 300, 'too few without')
+    end associate
     call expect_theory(error, subject, 'a block full of holes')
     if (allocated(error)) return
     associate (body => subject%body)

@@ -209,7 +209,7 @@ contains
     type(system_type), intent(inout) :: system
     associate (state => system%state)
       call internal_force(system%body, system%family, system%model, options_of(system%model), &
-        & state%u, state%p, state%force, system%strained)
+        & system%workspace, state%u, state%p, state%force, system%strained)
     end associate
   end subroutine both_passes
 

@@ -85,7 +85,7 @@ contains
               & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*max_abs(theta), 'dilatation, &
               & '//name_of(subject, number))
           end if
-          call energy_pass(subject%family, subject%model, u, w)
+          call energy_pass(subject%family, subject%model, subject%workspace, u, w)
           call reference_energy(subject%family, subject%model, u, w_ref)
           call expect_close(error, w, w_ref, &
             & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-7_wp)*max_abs(w_ref), 'energy, &
@@ -131,8 +131,8 @@ contains
         call reference_force(subject%family, cold, u, f_ref)
         options = options_of(subject%model)
         options%thermal = .false.
-        call internal_force(subject%body, subject%family, subject%model, options, u, p, force, &
-          & strained)
+        call internal_force(subject%body, subject%family, subject%model, options, &
+          & subject%workspace, u, p, force, strained)
         call expect_close(error, force, f_ref, tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp) &
           & *max_abs(f_ref), 'force, '//name_of(subject, number))
         if (allocated(error)) return
@@ -353,7 +353,7 @@ contains
     real(wp), allocatable :: density(:)
 
     allocate (density(size(u, 1)), source=0.0_wp)
-    call energy_pass(subject%family, subject%model, u, density)
+    call energy_pass(subject%family, subject%model, subject%workspace, u, density)
     energy = sum(density*subject%body%volume)
   end function total_energy
 
@@ -479,7 +479,7 @@ contains
           end do
           call fast_force(subject, u, force, p)
           call reference_force(subject%family, subject%model, u, f_ref)
-          call energy_pass(subject%family, subject%model, u, w)
+          call energy_pass(subject%family, subject%model, subject%workspace, u, w)
           call expect_true(error, all(abs(force) < 1.0e30_wp) .and. all(abs(p) < 1.0e30_wp), &
             & 'force of crushed bonds, '//name_of(subject, way))
           call expect_true(error, all(abs(f_ref) < 1.0e30_wp), 'reference of crushed bonds, ' &
@@ -550,8 +550,8 @@ contains
     real(wp), allocatable :: force(:, :), p(:)
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
-    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), u, &
-      & p, force, strained, up_to_marks)
+    call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), &
+      & subject%workspace, u, p, force, strained, up_to_marks)
   end subroutine mark
 
   !> Pairs within the horizon whose stretch |y|/|xi| - 1 is beyond the smaller of the ends' limits,
@@ -683,12 +683,14 @@ contains
           call fast_force(subject, u, other, p_other)
           select type (family => subject%family)
           type is (list_family_type)
-            weights = size(family%weight_S, 2, kind=i8)
-            packs = size(family%bits, kind=i8)
-            if (i == 1) call expect_true(error, 2*weights < packs, 'few weights are shared, ' &
-              & //name_of(subject, 0))
-            if (i == 1) call expect_true(error, count(family%shape > 0_i8) &
-              & > size(family%shape)/2, 'few shapes are shared')
+            associate (kept => subject%workspace%list)
+              weights = size(kept%weight_S, 2, kind=i8)
+              packs = size(family%bits, kind=i8)
+              if (i == 1) call expect_true(error, 2*weights < packs, 'few weights are shared, ' &
+                & //name_of(subject, 0))
+              if (i == 1) call expect_true(error, count(kept%shape > 0_i8) &
+                & > size(kept%shape)/2, 'few shapes are shared')
+            end associate
           end select
           call expect_close(error, other, force, 1.0e-13_wp*max_abs(force), 'force, ' &
             & //name_of(subject, i))
@@ -718,10 +720,7 @@ contains
     type(subject_type), intent(in) :: subject
 
     tables = 0
-    select type (family => subject%family)
-    type is (lattice_family_type)
-      tables = size(family%table)
-    end select
+    if (allocated(subject%workspace%lattice%table)) tables = size(subject%workspace%lattice%table)
   end function tables_of
 
   !> Up to s_c, no bond that could break is served by the fast formulas: e is at most

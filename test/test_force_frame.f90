@@ -90,12 +90,12 @@ contains
           call shake(subject%body, identity(), 0.0_wp, 1, u)
           call fast_force(subject, u, force, p)
           unit_force = max_abs(force)
-          call energy_pass(subject%family, subject%model, u, w)
+          call energy_pass(subject%family, subject%model, subject%workspace, u, w)
           unit_energy = maxval(w)
           do i = 1, size(strains)
             call shake(subject%body, some_gradient(strains(i)), 0.3_wp*strains(i)*spacing, 71, u)
             call fast_force(subject, u, force, p)
-            call energy_pass(subject%family, subject%model, u, w)
+            call energy_pass(subject%family, subject%model, subject%workspace, u, w)
             do a = 1, size(degrees)
               R = rotation_matrix(axis_of(dim), degrees(a)*pi/180)
               call turn(subject, R, u, turned)
@@ -106,7 +106,7 @@ contains
               call expect_true(error, all(abs(f_turned) <= tolerance(kinds(kind), &
                 & 300*epsilon(1.0_wp), 30*real(epsilon(1.0_sp), wp))*unit_force), 'force, ' &
                 & //name_of(subject, i)//', degrees '//text_of(degrees(a)))
-              call energy_pass(subject%family, subject%model, turned, w_turned)
+              call energy_pass(subject%family, subject%model, subject%workspace, turned, w_turned)
               call expect_true(error, all(abs(w_turned - w) <= 300*epsilon(1.0_wp)*strains(i) &
                 & *unit_energy), 'energy, '//name_of(subject, i)//', degrees ' &
                 & //text_of(degrees(a)))

@@ -3,7 +3,6 @@ module test_motion_explicit_time_step
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
   use pd_set_up_prepare, only: set_up_type
-  use pd_family_lattice, only: lattice_family_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_system, only: system_type, evaluate
   use pd_motion_explicit_time_step, only: stiffness_bound
@@ -95,8 +94,10 @@ contains
       call ready(scene, list, error)
       if (allocated(error)) return
       allocate (fast(lattice%system%body%n_slots), plain(list%system%body%n_slots), source=0.0_wp)
-      call stiffness_bound(lattice%system%body, lattice%system%family, lattice%system%model, fast)
-      call stiffness_bound(list%system%body, list%system%family, list%system%model, plain)
+      call stiffness_bound(lattice%system%body, lattice%system%family, lattice%system%model, &
+        & lattice%system%workspace, fast)
+      call stiffness_bound(list%system%body, list%system%family, list%system%model, &
+        & list%system%workspace, plain)
       fast = fast(lattice%system%body%slot)
       plain = plain(list%system%body%slot)
       call expect_close(error, fast/plain - 1, 0.0_wp, 1.0e-12_wp, 'bound, '//name)
@@ -171,17 +172,18 @@ contains
     if (allocated(error)) return
     associate (system => set_up%system)
       allocate (positive(system%body%n_slots), negative(system%body%n_slots), source=0.0_wp)
-      call stiffness_bound(system%body, system%family, system%model, positive)
-      select type (family => system%family)
-      type is (lattice_family_type)
-        do i = 1, size(family%table)
-          family%table(i)%stretch = -family%table(i)%stretch
-          family%table(i)%dilatation = -family%table(i)%dilatation
+      call stiffness_bound(system%body, system%family, system%model, &
+        & system%workspace, positive)
+      associate (kept => system%workspace%lattice)
+        call expect_true(error, allocated(kept%table), 'a plate has no tables of weights')
+        if (allocated(error)) return
+        do i = 1, size(kept%table)
+          kept%table(i)%stretch = -kept%table(i)%stretch
+          kept%table(i)%dilatation = -kept%table(i)%dilatation
         end do
-      class default
-        call expect_true(error, .false., 'a plate has no lattice family')
-      end select
-      call stiffness_bound(system%body, system%family, system%model, negative)
+      end associate
+      call stiffness_bound(system%body, system%family, system%model, &
+        & system%workspace, negative)
     end associate
     call expect_true(error, any(positive > 0.0_wp) .and. &
       & all(abs(positive - negative) <= 0.0_wp), 'bound with the signs turned')

@@ -173,7 +173,7 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp) :: density(size(u, 1))
 
-    call energy_pass(system%family, system%model, u, density)
+    call energy_pass(system%family, system%model, system%workspace, u, density)
     energy = dot_product(density, system%body%volume)
   end function energy
 

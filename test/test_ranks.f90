@@ -579,7 +579,7 @@ contains
         & system%model)
       select type (of_part => system%family)
       type is (lattice_family_type)
-        call build_weights(of_part, system%model)
+        call build_weights(of_part, system%model, system%workspace%lattice)
       class default
         call test_failed(error, 'the part has no lattice family')
       end select

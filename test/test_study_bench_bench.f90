@@ -126,12 +126,12 @@ contains
     call build(error, kernel, set_up)
     if (allocated(error)) return
     associate (system => set_up%system)
-      call expect(error, flops_of_bond(system%family, unprojected), 43.0_wp, 0.0_wp, &
-        & '3D state-based')
-      call expect(error, flops_of_bond(system%family, projected), 45.5_wp, 0.0_wp, &
-        & '3D state-based, projected')
-      call expect(error, flops_of_bond(system%family, no_dilatation), 23.5_wp, 0.0_wp, &
-        & '3D bond-based')
+      call expect(error, flops_of_bond(system%family, system%workspace, unprojected), 43.0_wp, &
+        & 0.0_wp, '3D state-based')
+      call expect(error, flops_of_bond(system%family, system%workspace, projected), 45.5_wp, &
+        & 0.0_wp, '3D state-based, projected')
+      call expect(error, flops_of_bond(system%family, system%workspace, no_dilatation), 23.5_wp, &
+        & 0.0_wp, '3D bond-based')
       ! u 3, p 1; u 3, p 1, force 3; force 3, u 3, v 3 read, u 3, v 3 written; sums for both ends of
       ! a bond: force 3 and p 1 set to zero, force 3 read, p read and written to scale it
       call expect(error, bytes_of_step(system), 512*8*35.0_wp, 0.0_wp, 'bytes, 3D state-based')
@@ -141,8 +141,8 @@ contains
     call build(error, kernel, set_up)
     if (allocated(error)) return
     associate (system => set_up%system)
-      call expect(error, flops_of_bond(system%family, no_dilatation), 18.5_wp, 0.0_wp, &
-        & '2D bond-based')
+      call expect(error, flops_of_bond(system%family, system%workspace, no_dilatation), 18.5_wp, &
+        & 0.0_wp, '2D bond-based')
       ! u 2, force 2; force 2, u 2, v 2 read, u 2, v 2 written; force 2 set to zero and read for
       ! both ends of a bond
       call expect(error, bytes_of_step(system), 64*8*18.0_wp, 0.0_wp, 'bytes, 2D bond-based')
@@ -152,8 +152,8 @@ contains
     if (allocated(error)) return
     associate (system => set_up%system)
       ! no eight clusters share tables
-      call expect(error, flops_of_bond(system%family, no_dilatation), 43.0_wp, 0.0_wp, &
-        & '2D bond-based list')
+      call expect(error, flops_of_bond(system%family, system%workspace, no_dilatation), 43.0_wp, &
+        & 0.0_wp, '2D bond-based list')
       ! a member of a cluster, six bytes, has at most eight bonds
       call expect_true(error, bytes_of_step(system) > 64*8*14.0_wp &
         & + 6*system%family%n_bonds/8.0_wp, 'a list moves its members, too')

@@ -1,10 +1,11 @@
 !> Material parameters of the peridynamic force from the classical ones (doc/theory.md, 1).
 module pd_body_material
   use pd_base_kinds, only: wp
+  use pd_base_elasticity, only: bond_based_ratio
   use pd_base_numbers, only: pi
   implicit none (type, external)
   private
-  public :: material_type, new_material, special_poissons_ratio, critical_stretch_from_energy, &
+  public :: material_type, new_material, critical_stretch_from_energy, &
     & energy_from_critical_stretch, never
 
   real(wp), parameter :: never = huge(1.0_wp)  !! critical stretch of a material that cannot fail
@@ -48,7 +49,7 @@ contains
     real(wp) :: nu
 
     nu = poissons_ratio
-    if (bond_based .or. dim == 1) nu = special_poissons_ratio(dim, plane_strain)
+    if (bond_based .or. dim == 1) nu = bond_based_ratio(dim, plane_strain)
     m%youngs_modulus = youngs_modulus
     m%poissons_ratio = nu
     m%density = density
@@ -84,14 +85,6 @@ contains
     m%t = m%d*delta
     m%p = 2*m%a*m%d*delta
   end function new_material
-
-  !> The Poisson's ratio at which a = 0 and the force is bond-based: 1/3 in plane stress, else 1/4.
-  pure real(wp) function special_poissons_ratio(dim, plane_strain) result(nu)
-    integer, intent(in) :: dim           !! of the scene: 1, 2 or 3
-    logical, intent(in) :: plane_strain  !! 2D: plane strain, else plane stress; not used otherwise
-    nu = 0.25_wp
-    if (dim == 2 .and. .not. plane_strain) nu = 1.0_wp/3.0_wp
-  end function special_poissons_ratio
 
   !> Critical stretch from the critical energy release rate Gc [J/m2] (doc/theory.md, 8).
   pure real(wp) function critical_stretch_from_energy(m, Gc, dim, delta) result(s_c)

@@ -7,11 +7,11 @@
 !> Bodies on grids of their own, which no bond joins, lie in boxes of their own, one after another.
 !>
 !> The force loops work on blocks of slots of one row: `lanes` of them in double precision, twice as
-!> many where bonds are computed in single precision. Blocks whose surroundings look the
-!> same (and most do) share one table of weights with the surface factors in it.
+!> many where bonds are computed in single precision. The weights of their bonds are made of the
+!> model and belong to the loops (`pd_force_workspace`).
 module pd_family_lattice
   use pd_base_archive, only: archive_type
-  use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_lanes, only: lanes, word_bits
   use pd_base_error, only: error_type, fail
   use pd_base_system, only: available_memory
@@ -26,35 +26,11 @@ module pd_family_lattice
   use pd_family_volume, only: volume_rule_type, reach
   implicit none (type, external)
   private
-  public :: lattice_family_type, weights_type, offsets_type, new_lattice_family, lattice_suits, &
-    & use_double, grid_at, both_ends
+  public :: lattice_family_type, offsets_type, new_lattice_family, lattice_suits, use_double, &
+    & grid_at, both_ends
 
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers
-
-  !> Weights of the bonds of one block, or of many that are alike, in the order of `offsets_type`.
-  !> Families in mixed precision keep the single ones; lengths are those of their blocks.
-  type :: weights_type
-    integer :: n = 0                           !! offsets that any lane has
-    integer :: n_forward = 0                   !! forward ones among them, which come first
-    integer(i4), allocatable :: offset(:)      !! their numbers (n)
-    integer(i8), allocatable :: shift(:)       !! their shifts (n)
-    real(wp), allocatable :: geometry(:, :)    !! their geometry (4, n)
-    real(wp), allocatable :: dilatation(:, :)  !! Gd v_c V_j (block_length, n)
-    real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (block_length, n)
-    real(sp), allocatable :: single_geometry(:, :)
-    real(sp), allocatable :: single_dilatation(:, :) !! over the unit of volume of `singles_type`
-    real(sp), allocatable :: single_stretch(:, :)
-  end type weights_type
-
-  !> What the loops in mixed precision work on.
-  type :: singles_type
-    real(wp) :: volume = 1.0_wp                !! unit of volume, a power of 2 [m3]
-    real(sp), allocatable :: high(:, :)        !! leading digits of u (n_slots, dim), scaled
-    real(sp), allocatable :: low(:, :)         !! the digits that follow
-    real(sp), allocatable :: p(:)              !! p times the unit of volume (n_slots)
-    real(sp), allocatable :: sums(:, :)        !! what is added to both ends (n_slots, dim), 3D
-  end type singles_type
 
   type, extends(family_type) :: lattice_family_type
     type(offsets_type), allocatable :: grids(:)
@@ -63,17 +39,11 @@ module pd_family_lattice
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
-    integer(i8) :: room = 256_i8*1024_i8**2    !! that tables may always take [bytes]
     integer(i4), allocatable :: class_of(:)    !! slots of one class have alike families; 0 dead
     integer(i4), allocatable :: first_of(:)    !! the first slot of each class
     integer(i8), allocatable :: broken(:, :)   !! 1-bits: broken bonds (n_slots, words), if any can
     integer(i8), allocatable :: block(:)       !! first slot of each block
     type(slabs_type) :: slabs                  !! which blocks can be worked on at once
-    integer(i4), allocatable :: weights(:)     !! which weights each block has; 0: made on the fly
-    integer(i1), allocatable :: served(:)      !! range of the fast formulas that served each block
-                                               !! in the last dilatation pass, 0: none
-    type(weights_type), allocatable :: table(:)
-    type(singles_type) :: singles              !! if mixed
   contains
     procedure :: bonds_of
     procedure :: break_bond
@@ -175,7 +145,7 @@ contains
     logical, intent(in) :: breakable                  !! bonds may break or be cut
     logical, intent(in) :: mixed  !! bonds in single precision, where there are loops for it
     type(lattice_family_type), intent(out) :: family
-      !! whole, all bonds intact, without weights (`build_weights`)
+      !! whole, all bonds intact
     type(error_type), allocatable, intent(out) :: error
     integer(i8), intent(in), optional :: key_bits     !! all count if absent; for tests
     integer :: g
@@ -202,7 +172,7 @@ contains
   !> Leave mixed precision: what a model needs has no loops for it.
   subroutine use_double(family)
     type(lattice_family_type), intent(inout) :: family
-      !! with blocks of `lanes` slots and without weights on return; unchanged if not mixed
+      !! with blocks of `lanes` slots on return; unchanged if not mixed
 
     if (.not. family%mixed) return
     family%mixed = .false.
@@ -323,7 +293,7 @@ contains
     integer(i8) :: k, n
     integer :: pass
 
-    if (allocated(family%block)) deallocate (family%block, family%weights, family%served)
+    if (allocated(family%block)) deallocate (family%block)
     do pass = 1, 2
       n = 0_i8
       do k = 1, family%n_slots - family%block_length + 1, family%block_length
@@ -331,10 +301,8 @@ contains
         n = n + 1
         if (pass == 2) family%block(n) = k
       end do
-      if (pass == 1) allocate (family%block(n), family%weights(n), family%served(n))
+      if (pass == 1) allocate (family%block(n))
     end do
-    family%weights = 0_i4
-    family%served = 0_i1
     call find_slabs(family%grids, family%dim, both_ends(family%dim, family%mixed), &
       & family%block_length, family%block, family%slabs)
   end subroutine find_blocks
@@ -414,26 +382,17 @@ contains
     call archive%keep('broken bonds of slots', family%broken)
   end subroutine keep_bonds
 
-  !> Memory of the slots, blocks, bits and tables of weights [bytes].
+  !> Memory of the slots, blocks and bits [bytes].
   pure integer(i8) function bytes(family)
     class(lattice_family_type), intent(in) :: family  !! the family
-    integer :: t
 
     bytes = family%n_slots
     if (allocated(family%class_of)) bytes = bytes + 4_i8*family%n_slots
     if (allocated(family%broken)) bytes = bytes + 8_i8*family%n_slots*family%words
     if (allocated(family%block)) bytes = bytes + 8_i8*size(family%block)
-    if (allocated(family%weights)) bytes = bytes + 4_i8*size(family%weights)
-    associate (s => family%singles)
-      if (allocated(s%high)) bytes = bytes + 4_i8*(2*size(s%high) + size(s%p) + size(s%sums))
-    end associate
-    if (.not. allocated(family%table)) return
-    do t = 1, size(family%table)
-      bytes = bytes + family%table(t)%n*(16_i8*lanes + merge(60, 44, family%mixed))
-    end do
   end function bytes
 
-  !> Spacings of the grids and, once weights are made, the number of their tables, in a line.
+  !> Spacings of the grids, in a line.
   function describe(family) result(text)
     class(lattice_family_type), intent(in) :: family  !! the family
     character(:), allocatable :: text
@@ -445,9 +404,6 @@ contains
       if (g > 1) text = text//', '
       text = text//with_unit(family%grids(g)%spacing, 'm')
     end do
-    if (allocated(family%table)) then
-      text = text//'; points have '//to_text(size(family%table))//' different surroundings'
-    end if
   end function describe
 
 end module pd_family_lattice

@@ -4,7 +4,7 @@
 !> for every lane that has a bond. The loops take the eight lanes of one pack at a time.
 !>
 !> Nothing else of the family is stored: xi, |xi| and v_c come from the points, but for exact
-!> volumes. Tables of what they and the model give are kept for the loops, where it helps them
+!> volumes. Tables of what they and the model give, where they help the loops, belong to these
 !> (`pd_force_list_tables`).
 module pd_family_list
   use pd_base_archive, only: archive_type
@@ -19,10 +19,6 @@ module pd_family_list
   implicit none (type, external)
   private
   public :: list_family_type, new_list_family
-  public :: at_volume, at_moved, at_p
-
-  !> Where things stand in `at`: behind the position come volume, displacement and p.
-  integer, parameter :: at_volume = 4, at_moved = 4, at_p = 8
 
   type, extends(family_type) :: list_family_type
     integer(i8), allocatable :: start(:)       !! first pack of each cluster (clusters + 1)
@@ -31,25 +27,12 @@ module pd_family_list
     integer(i1), allocatable :: bits(:)        !! the lanes that have a bond (packs)
     integer(i1), allocatable :: intact(:)      !! those of them whose bond is intact
     integer :: most_packs = 0                  !! largest number of packs of a cluster
-    real(wp), allocatable :: spacing(:)        !! [m]
+    real(wp), allocatable :: x(:, :)           !! position of each slot (dim, n_slots) [m]
+    real(wp), allocatable :: volume(:)         !! (n_slots) [m3]
+    real(wp), allocatable :: spacing(:)        !! (n_slots) [m]
     logical :: one_spacing = .false.           !! all points have the same
     real(wp), allocatable :: fraction(:, :)    !! v_c of every lane (lanes, packs), only where it is
                                                !! no simple formula, else of size 0
-    real(wp), allocatable :: at(:, :)          !! of each slot, in one place: position, volume,
-                                               !! displacement and p of the pass (8, n_slots)
-    real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
-    integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike: set by
-                                               !! the first pass (`pd_force_list_points`), as are
-    integer(i8), allocatable :: stored(:)      !! the place of each cluster's first pack in
-    real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
-    real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
-                                               !! of all bonds, intact or not; 0: has none; and
-    integer(i8), allocatable :: shape(:)       !! that of its first column in
-    real(wp), allocatable :: geometry(:, :)    !! xi and 2/|xi|^2 (lanes, columns of each pack)
-    integer :: least_shared = 8                !! clusters that tables are made for, if they share
-                                               !! them; tests take fewer or more
-    integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
-    integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
@@ -93,12 +76,11 @@ contains
     call count_bonds(family)
     family%spacing = body%spacing
     family%one_spacing = maxval(body%spacing(:n)) <= minval(body%spacing(:n))
-    allocate (family%at(at_p, family%n_slots), source=0.0_wp)
+    allocate (family%x(family%dim, family%n_slots), family%volume(family%n_slots), source=0.0_wp)
     do k = 1, n
-      family%at(:family%dim, k) = body%x(k, :)
-      family%at(at_volume, k) = body%volume(k)
+      family%x(:, k) = body%x(k, :)
+      family%volume(k) = body%volume(k)
     end do
-    allocate (family%large(size(family%start) - 1), source=0_i1)
     if (rule%kind == volume_exact) then
       call store_fractions(family)
     else
@@ -148,7 +130,7 @@ contains
           if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
           k = lanes*(c - 1) + l
           j = other_end(family, e, l)
-          xi = family%at(:family%dim, j) - family%at(:family%dim, k)
+          xi = family%x(:, j) - family%x(:, k)
           family%fraction(l, e) = volume_correction(family%rule, xi, norm2(xi), &
             & (family%spacing(k) + family%spacing(j))/2)
         end do
@@ -182,14 +164,14 @@ contains
       n = n + 1
       bonds%j(n) = other_end(family, e, l)
       bonds%intact(n) = iand(family%intact(e), lane_bit(l)) /= 0_i1
-      bonds%weight(n) = family%at(at_volume, bonds%j(n))
+      bonds%weight(n) = family%volume(bonds%j(n))
       if (size(family%fraction) > 0) bonds%weight(n) = bonds%weight(n)*family%fraction(l, e)
     end do
     bonds%n = n
     bonds%length(:n) = 0.0_wp
     do d = 1, family%dim
       do i = 1, n
-        bonds%xi(i, d) = family%at(d, bonds%j(i)) - family%at(d, k)
+        bonds%xi(i, d) = family%x(d, bonds%j(i)) - family%x(d, k)
         bonds%length(i) = bonds%length(i) + bonds%xi(i, d)**2
       end do
     end do
@@ -232,16 +214,13 @@ contains
     call archive%keep('intact bonds of clusters', family%intact)
   end subroutine keep_bonds
 
-  !> Memory of the packs, slots, fractions and stored weights [bytes].
+  !> Memory of the packs, slots and fractions [bytes].
   pure integer(i8) function bytes(family)
     class(list_family_type), intent(in) :: family  !! the family
-    ! 8 B of members and 3 of bits a pack; `at`, `given` and the spacing a slot
-    bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(8 + 8 + 1) &
-      & + 26_i8*size(family%large)
+    ! 8 B of members and 3 of bits a pack; position, volume and spacing a slot
+    bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(family%dim + 2) &
+      & + 8_i8*size(family%start)
     if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
-    if (allocated(family%weight_D)) bytes = bytes + 8*size(family%weight_D, kind=i8)
-    if (allocated(family%weight_S)) bytes = bytes + 8*size(family%weight_S, kind=i8)
-    if (allocated(family%geometry)) bytes = bytes + 8*size(family%geometry, kind=i8)
   end function bytes
 
   !> How many bonds a pack has on average and why it is no lattice, in a line.

@@ -3,9 +3,10 @@
 module pd_force_bound
   use pd_base_kinds, only: wp, i8
   use pd_base_lanes, only: lanes
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at
+  use pd_family_lattice, only: lattice_family_type, grid_at
   use pd_force_model, only: model_type
   use pd_force_weights, only: allocate_weights, block_weights, half_of
+  use pd_force_workspace, only: lattice_workspace_type, weights_type
   implicit none (type, external)
   private
   public :: lattice_bound, lattice_printed_bound
@@ -14,9 +15,10 @@ contains
 
   !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken. Weights of
   !> either sign count with their size.
-  subroutine lattice_bound(family, model, bound)
-    type(lattice_family_type), intent(in) :: family  !! with its weights
+  subroutine lattice_bound(family, model, workspace, bound)
+    type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
+    type(lattice_workspace_type), intent(in) :: workspace  !! with its weights
     real(wp), intent(inout), contiguous :: bound(:)  !! (n_slots) M_k, 0 for dead slots [N/m4]
     type(weights_type) :: scratch, half
     real(wp), allocatable :: inverse(:)
@@ -24,14 +26,14 @@ contains
 
     allocate (inverse(family%n_slots), source=0.0_wp)
     bound = 0.0_wp
-    !$omp parallel default(none) shared(family, model, bound, inverse) &
+    !$omp parallel default(none) shared(family, model, workspace, bound, inverse) &
     !$omp private(scratch, half, b, pass)
     call allocate_weights(family, model, scratch)
     do pass = merge(1, 2, model%dilatation), 2
       !$omp do schedule(static)
       do b = 1, size(family%block)
-        if (family%weights(b) > 0) then
-          call add_block(family, model, pass, b, family%table(family%weights(b)), half, &
+        if (workspace%weights(b) > 0) then
+          call add_block(family, model, pass, b, workspace%table(workspace%weights(b)), half, &
             & inverse, bound)
         else
           call block_weights(family, model, family%block(b), scratch)

@@ -10,6 +10,7 @@ module pd_force_forces
   use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
   use pd_force_model, only: force_options_type, model_type
+  use pd_force_workspace, only: workspace_type
   implicit none (type, external)
   private
   public :: internal_force, energy_pass
@@ -26,11 +27,12 @@ contains
   !> if the forces have one, then the forces. Whoever needs internal forces calls this. Values at
   !> points that other processes own come from there: dilatation and forces here, displacements from
   !> whoever calls.
-  subroutine internal_force(body, family, model, options, u, p, force, strained, part)
+  subroutine internal_force(body, family, model, options, workspace, u, p, force, strained, part)
     type(body_type), intent(in) :: body                 !! what the process owns of it
-    class(family_type), intent(inout) :: family         !! its loops keep their room there
+    class(family_type), intent(in) :: family            !! who interacts with whom
     type(model_type), intent(in) :: model               !! parameters of the slots
     type(force_options_type), intent(in) :: options     !! what the forces take in
+    type(workspace_type), intent(inout) :: workspace    !! of this family and model
     real(wp), intent(in), contiguous :: u(:, :)         !! displacements (n_slots, dim) [m]
     real(wp), intent(inout), contiguous :: p(:)         !! 2 a d delta theta (n_slots), of size 0
                                                         !! if there is no dilatation
@@ -44,40 +46,44 @@ contains
     now = whole
     if (present(part)) now = part
     if (options%dilatation) then
-      if (now /= after_marks) call dilatation_pass(family, model, options, u, p, strained)
+      if (now /= after_marks) &
+        & call dilatation_pass(family, model, options, workspace, u, p, strained)
       if (now /= up_to_marks) call share_halo(body, p)
-      if (now /= up_to_marks) call force_pass(family, model, options, u, p, force, strained)
+      if (now /= up_to_marks) &
+        & call force_pass(family, model, options, workspace, u, p, force, strained)
     else if (now /= after_marks) then
-      call force_pass(family, model, options, u, p, force, strained)
+      call force_pass(family, model, options, workspace, u, p, force, strained)
     end if
     if (now /= up_to_marks) call share_halo(body, force)
   end subroutine internal_force
 
   !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds
   !> can break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.
-  subroutine dilatation_pass(family, model, options, u, p, strained)
-    class(family_type), intent(inout) :: family
+  subroutine dilatation_pass(family, model, options, workspace, u, p, strained)
+    class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
+    type(workspace_type), intent(inout) :: workspace
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
 
     select type (family)
     type is (list_family_type)
-      call list_dilatation(family, model, options, u, p, strained)
+      call list_dilatation(family, model, options, workspace%list, u, p, strained)
     type is (lattice_family_type)
-      call lattice_dilatation(family, model, options, u, p, strained)
+      call lattice_dilatation(family, model, options, workspace%lattice, u, p, strained)
     class default
       call internal_fault('the dilatation of a family that has no loops')
     end select
   end subroutine dilatation_pass
 
   !> Internal force density of all slots (n_slots, dim) [N/m3]; `strained` as above.
-  subroutine force_pass(family, model, options, u, p, force, strained)
-    class(family_type), intent(inout) :: family
+  subroutine force_pass(family, model, options, workspace, u, p, force, strained)
+    class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
+    type(workspace_type), intent(inout) :: workspace
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(inout), contiguous :: force(:, :)
@@ -85,26 +91,27 @@ contains
 
     select type (family)
     type is (list_family_type)
-      call list_force(family, model, options, u, p, force, strained)
+      call list_force(family, model, options, workspace%list, u, p, force, strained)
     type is (lattice_family_type)
-      call lattice_force(family, model, options, u, p, force, strained)
+      call lattice_force(family, model, options, workspace%lattice, u, p, force, strained)
     class default
       call internal_fault('the forces of a family that has no loops')
     end select
   end subroutine force_pass
 
   !> Strain energy density of all slots [J/m3].
-  subroutine energy_pass(family, model, u, energy)
-    class(family_type), intent(inout) :: family       !! its loops keep their room there
+  subroutine energy_pass(family, model, workspace, u, energy)
+    class(family_type), intent(in) :: family          !! who interacts with whom
     type(model_type), intent(in) :: model             !! parameters of the slots
+    type(workspace_type), intent(inout) :: workspace  !! of this family and model
     real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
 
     select type (family)
     type is (list_family_type)
-      call list_energy(family, model, u, energy)
+      call list_energy(family, model, workspace%list, u, energy)
     type is (lattice_family_type)
-      call lattice_energy(family, model, u, energy)
+      call lattice_energy(family, model, workspace%lattice, u, energy)
     class default
       call internal_fault('the energy of a family that has no loops')
     end select

@@ -3,8 +3,8 @@
 module pd_force_general
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
-  use pd_family_lattice, only: weights_type
   use pd_force_model, only: early, force_options_type, model_type
+  use pd_force_workspace, only: weights_type
   implicit none (type, external)
   private
   public :: general_dilatation, general_force, general_energy, crushed, mark_slot
@@ -36,8 +36,8 @@ contains
     integer :: m
 
     do m = 1, n
-      call deform(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, &
-        & r, along)
+      call deform_block(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, &
+        & lambda, r, along)
       share = weight(:, m)*s*lambda
       theta(first:first + lanes - 1) = theta(first:first + lanes - 1) + share
       j = first + weights%shift(m)
@@ -70,8 +70,8 @@ contains
     integer :: m, c
 
     do m = 1, n
-      call deform(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, &
-        & r, along)
+      call deform_block(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, &
+        & lambda, r, along)
       magnitude = stretch(:, m)*s
       j = first + weights%shift(m)
       if (options%dilatation) magnitude = magnitude + (p(first:first + lanes - 1) &
@@ -106,8 +106,8 @@ contains
     theta = 0.0_wp
     stretches = 0.0_wp
     do m = 1, weights%n
-      call deform(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, lambda, &
-        & r, along)
+      call deform_block(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, &
+        & lambda, r, along)
       if (options%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
       if (size(model%materials) > 1) then
         ! the weights hold q_k + q_j, the energy takes q_k/2 of the slot's own material
@@ -124,7 +124,7 @@ contains
 
   !> State of the bonds at one offset by the general formulas: mechanical stretch, Lambda,
   !> r = |xi|/|y| and the bond's direction over |xi|.
-  pure subroutine deform(model, options, first, shift, g, u, s, lambda, r, along)
+  pure subroutine deform_block(model, options, first, shift, g, u, s, lambda, r, along)
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
     integer(i8), intent(in) :: first, shift
@@ -154,7 +154,7 @@ contains
     if (options%thermal) then
       s = s - (model%expansion(first:first + lanes - 1) + model%expansion(j:j + lanes - 1))/2
     end if
-  end subroutine deform
+  end subroutine deform_block
 
   !> Mark the slots of the bonds between the lanes at `first` and those at `j` that are near their
   !> critical stretch (`early`). Slots in no-fail zones lose no bond.

@@ -15,14 +15,15 @@
 module pd_force_lattice
   use pd_base_kinds, only: wp, sp, i1, i8
   use pd_base_lanes, only: lanes, word_bits
-  use pd_family_lattice, only: lattice_family_type, weights_type, grid_at, both_ends
+  use pd_family_lattice, only: lattice_family_type, grid_at, both_ends
   use pd_force_fast, only: fast_dilatation, fast_force, fast_energy
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_mixed, only: mixed_dilatation, mixed_force
   use pd_force_model, only: dilatation_of, force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, fast_terms, narrow, wide, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
-  use pd_force_weights, only: weights_now, half_of
+  use pd_force_weights, only: prepare_blocks, weights_now, half_of
+  use pd_force_workspace, only: lattice_workspace_type, singles_type, weights_type
   implicit none (type, external)
   private
   public :: lattice_dilatation, lattice_force, lattice_energy
@@ -38,12 +39,13 @@ module pd_force_lattice
 contains
 
   !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps
-  !> in `family%served` which fast formulas serve each block.
-  subroutine lattice_dilatation(family, model, options, u, p, strained)
-    type(lattice_family_type), intent(inout) :: family
-      !! with its weights; `served` and what it keeps in single precision are set
+  !> in `served` of the workspace which fast formulas serve each block.
+  subroutine lattice_dilatation(family, model, options, workspace, u, p, strained)
+    type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
     type(force_options_type), intent(in) :: options  !! what the forces take in
+    type(lattice_workspace_type), intent(inout) :: workspace
+      !! with weights of this model; `served` and what is in single precision are set
     real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
       !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
@@ -55,13 +57,15 @@ contains
     logical :: both
     integer :: b, s, k, colour
 
+    call prepare_blocks(family, model, workspace)
     both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model, options)
-    !$omp parallel default(none) shared(family, model, options, u, p, strained, both, limit) &
+    !$omp parallel default(none) &
+    !$omp shared(family, model, options, workspace, u, p, strained, both, limit) &
     !$omp private(scratch, own, b, s, k, colour)
     call allocate_scratch(family, scratch)
-    if (family%mixed) call split_displacements(family, u)
-    if (family%mixed .and. both) call clear_sums(family, 1)
+    if (family%mixed) call split_displacements(workspace%singles, u)
+    if (family%mixed .and. both) call clear_sums(workspace%singles, 1)
     if (both) then
       !$omp do simd schedule(static)
       do k = 1, size(p)
@@ -73,18 +77,19 @@ contains
       !$omp do schedule(static)
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
-          if (shared_weights(family, b, both)) then
-            call dilatation_of_block(family, model, options, both, limit, b, &
-              & family%table(family%weights(b)), scratch, u, p, strained)
+          if (shared_weights(family, workspace, b, both)) then
+            call dilatation_of_block(family, model, options, workspace%singles, both, limit, b, &
+              & workspace%table(workspace%weights(b)), scratch, u, p, workspace%served(b), strained)
           else
-            call weights_now(family, model, b, own)
-            call dilatation_of_block(family, model, options, both, limit, b, own, scratch, u, p, &
-              & strained)
+            call weights_now(family, model, workspace, b, own)
+            call dilatation_of_block(family, model, options, workspace%singles, both, limit, b, &
+              & own, scratch, u, p, workspace%served(b), strained)
           end if
         end do
       end do
     end do
-    if (family%mixed .and. both) call add_sums(family, 1, family%singles%volume, p)
+    if (family%mixed .and. both) &
+      & call add_sums(workspace%singles, 1, workspace%singles%volume, p)
     if (both) then
       !$omp do schedule(static)
       do k = 1, size(p), lanes
@@ -96,12 +101,13 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `lattice_dilatation` at the same displacements.
-  subroutine lattice_force(family, model, options, u, p, force, strained)
-    type(lattice_family_type), intent(inout) :: family
-      !! with its weights; what it keeps in single precision is set
+  subroutine lattice_force(family, model, options, workspace, u, p, force, strained)
+    type(lattice_family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model               !! that the weights were made for
     type(force_options_type), intent(in) :: options
       !! what the forces take in, as for `lattice_dilatation`
+    type(lattice_workspace_type), intent(inout) :: workspace
+      !! with weights of this model; what is in single precision is set
     real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)
       !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
@@ -114,15 +120,16 @@ contains
     logical :: both
     integer :: b, c, s, k, colour
 
+    call prepare_blocks(family, model, workspace)
     both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model, options)
     !$omp parallel default(none) &
-    !$omp shared(family, model, options, u, p, force, strained, both, limit) &
+    !$omp shared(family, model, options, workspace, u, p, force, strained, both, limit) &
     !$omp private(scratch, own, b, c, s, k, colour)
     call allocate_scratch(family, scratch)
-    if (family%mixed .and. .not. options%dilatation) call split_displacements(family, u)
-    if (family%mixed .and. options%dilatation) call round_dilatation(family, p)
-    if (family%mixed .and. both) call clear_sums(family, size(force, 2))
+    if (family%mixed .and. .not. options%dilatation) call split_displacements(workspace%singles, u)
+    if (family%mixed .and. options%dilatation) call round_dilatation(workspace%singles, p)
+    if (family%mixed .and. both) call clear_sums(workspace%singles, size(force, 2))
     if (both) then
       do c = 1, size(force, 2)
         !$omp do simd schedule(static)
@@ -137,43 +144,48 @@ contains
       !$omp do schedule(static)
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
-          if (shared_weights(family, b, both)) then
-            call force_of_block(family, model, options, both, limit, b, &
-              & family%table(family%weights(b)), scratch, u, p, force, strained)
-          else
-            call weights_now(family, model, b, own)
-            call force_of_block(family, model, options, both, limit, b, own, scratch, u, p, force, &
+          if (shared_weights(family, workspace, b, both)) then
+            call force_of_block(family, model, options, workspace%singles, both, limit, b, &
+              & workspace%table(workspace%weights(b)), scratch, u, p, workspace%served(b), force, &
               & strained)
+          else
+            call weights_now(family, model, workspace, b, own)
+            call force_of_block(family, model, options, workspace%singles, both, limit, b, own, &
+              & scratch, u, p, workspace%served(b), force, strained)
           end if
         end do
       end do
     end do
     if (family%mixed .and. both) then
       do c = 1, size(force, 2)
-        call add_sums(family, c, 1.0_wp, force(:, c))
+        call add_sums(workspace%singles, c, 1.0_wp, force(:, c))
       end do
     end if
     !$omp end parallel
   end subroutine lattice_force
 
   !> Strain energy density of all slots [J/m3].
-  subroutine lattice_energy(family, model, u, energy)
-    type(lattice_family_type), intent(in) :: family  !! with its weights
+  subroutine lattice_energy(family, model, workspace, u, energy)
+    type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
+    type(lattice_workspace_type), intent(inout) :: workspace  !! with weights of this model
     real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(out), contiguous :: energy(:)
       !! (n_slots) of each slot, 0 for dead ones [J/m3]
     type(weights_type) :: own, half
     integer :: b
 
+    call prepare_blocks(family, model, workspace)
     energy = 0.0_wp
-    !$omp parallel default(none) shared(family, model, u, energy) private(own, half, b)
+    !$omp parallel default(none) shared(family, model, workspace, u, energy) &
+    !$omp private(own, half, b)
     !$omp do schedule(static)
     do b = 1, size(family%block)
-      if (shared_weights(family, b, .false.)) then
-        call energy_of_block(family, model, b, family%table(family%weights(b)), half, u, energy)
+      if (shared_weights(family, workspace, b, .false.)) then
+        call energy_of_block(family, model, b, workspace%table(workspace%weights(b)), half, u, &
+          & energy)
       else
-        call weights_now(family, model, b, own)
+        call weights_now(family, model, workspace, b, own)
         call energy_of_block(family, model, b, own, half, u, energy)
       end if
     end do
@@ -241,14 +253,15 @@ contains
 
   !> Whether the block can take the weights it shares with others: it has some, and no broken bond
   !> (with `forward` among those alone that lie forward).
-  pure logical function shared_weights(family, b, forward)
+  pure logical function shared_weights(family, workspace, b, forward)
     type(lattice_family_type), intent(in) :: family
+    type(lattice_workspace_type), intent(in) :: workspace
     integer, intent(in) :: b
     logical, intent(in) :: forward
     integer :: w
     integer(i8) :: first, any_broken, bits
 
-    shared_weights = family%weights(b) > 0
+    shared_weights = workspace%weights(b) > 0
     if (.not. (shared_weights .and. allocated(family%broken))) return
     first = family%block(b)
     any_broken = 0_i8
@@ -263,11 +276,13 @@ contains
   end function shared_weights
 
   !> p of one block; where loops add to both ends of a bond, theta of its bonds added to `p`.
-  subroutine dilatation_of_block(family, model, options, both, limit, b, weights, scratch, u, p, &
-    & strained)
-    type(lattice_family_type), intent(inout) :: family
+  !> `range` gets the range of the fast formulas that served it, or 0.
+  subroutine dilatation_of_block(family, model, options, singles, both, limit, b, weights, &
+    & scratch, u, p, range, strained)
+    type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
+    type(singles_type), intent(inout) :: singles
     logical, intent(in) :: both
     real(wp), intent(in) :: limit(:)
     integer, intent(in) :: b
@@ -275,6 +290,7 @@ contains
     type(scratch_type), intent(inout) :: scratch
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: p(:)
+    integer(i1), intent(out) :: range
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first, last
     integer :: n, l, served, kind
@@ -288,8 +304,8 @@ contains
     served = narrow
     missed = limit(1) <= 0.0_wp
     if (family%mixed) then
-      call mixed_dilatation(family, kind, n, limit(1), weights, first, p, scratch%single_left, &
-        & missed)
+      call mixed_dilatation(family, singles, kind, n, limit(1), weights, first, p, &
+        & scratch%single_left, missed)
     else if (.not. missed) then
       associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
         call fast_dilatation(dim, narrow, kind, n, m, w%dilatation, w%shift, w%geometry, first, &
@@ -306,13 +322,13 @@ contains
         end if
       end associate
     end if
-    family%served(b) = int(merge(0, served, missed), i1)
+    range = int(merge(0, served, missed), i1)
     if (missed) then
       if (.not. both) p(first:last) = 0.0_wp
       if (family%mixed) then
         do l = 0, family%block_length - lanes, lanes
           call half_of(family, weights, l, scratch%half)
-          if (both) scratch%half%dilatation(:, :n) = family%singles%volume &
+          if (both) scratch%half%dilatation(:, :n) = singles%volume &
             & *scratch%single_left(l + 1:l + lanes, :n)
           call general_dilatation(model, options, both, n, scratch%half, scratch%half%dilatation, &
             & first + l, u, p, strained)
@@ -331,12 +347,14 @@ contains
     end do
   end subroutine dilatation_of_block
 
-  !> Forces of one block's bonds, added to `force`.
-  subroutine force_of_block(family, model, options, both, limit, b, weights, scratch, u, p, force, &
-    & strained)
-    type(lattice_family_type), intent(inout) :: family
+  !> Forces of one block's bonds, added to `force`. With a dilatation, `range` of the fast formulas
+  !> serves it, if that is not 0.
+  subroutine force_of_block(family, model, options, singles, both, limit, b, weights, scratch, u, &
+    & p, range, force, strained)
+    type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
+    type(singles_type), intent(inout) :: singles
     logical, intent(in) :: both
     real(wp), intent(in) :: limit(:)
     integer, intent(in) :: b
@@ -344,6 +362,7 @@ contains
     type(scratch_type), intent(inout) :: scratch
     real(wp), intent(inout), contiguous :: force(:, :)
     real(wp), intent(in), contiguous :: u(:, :), p(:)
+    integer(i1), intent(in) :: range
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first
     integer :: n, l, served, kind
@@ -356,13 +375,13 @@ contains
     fast = limit(1) > 0.0_wp
     served = narrow
     if (options%dilatation) then
-      fast = family%served(b) > 0_i1
-      served = int(family%served(b))
+      fast = range > 0_i1
+      served = int(range)
     end if
     missed = .not. fast
     if (fast .and. family%mixed) then
-      call mixed_force(family, kind, n, limit(1), weights, first, force, scratch%single_left, &
-        & missed)
+      call mixed_force(family, singles, kind, n, limit(1), weights, first, force, &
+        & scratch%single_left, missed)
     else if (fast) then
       associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
         call fast_force(dim, served, kind, n, m, w%dilatation, w%stretch, w%shift, w%geometry, &

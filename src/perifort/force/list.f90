@@ -2,24 +2,26 @@
 !> does: for points that are alike or with stored weights, for small strain or larger one; what no
 !> loop serves (strains beyond 5 % or near breaking, temperature) is done by general formulas.
 module pd_force_list
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
-  use pd_family_list, only: list_family_type, at_moved, at_p
+  use pd_family_list, only: list_family_type
   use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
     & no_tables, pass_loop, task_type, weights_alone
-  use pd_force_list_general, only: work_type, fill_tables, general_theta, general_force, &
-    & general_energy, take_given, take_up
+  use pd_force_list_general, only: work_type, fill_tables, cluster_theta, cluster_force, &
+    & cluster_energy, take_given, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
-  use pd_force_list_tables, only: drop_tables, make_tables
+  use pd_force_list_tables, only: make_tables
   use pd_force_model, only: early, force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
+  use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p
   implicit none (type, external)
   private
-  public :: prepare_list, forget_model, list_dilatation, list_force, list_energy
+  public :: prepare_list, list_dilatation, list_force, list_energy
 
-  !> How far a cluster is strained (`large` of the family): within the narrow polynomial, within the
-  !> wide one, beyond.
+  !> How far a cluster is strained (`large` of the workspace): within the narrow polynomial, within
+  !> the wide one, beyond.
   integer(i1), parameter :: little = 0_i1, more = 1_i1, beyond = 2_i1
 
   !> The loops of a pass, and the strains that they serve.
@@ -33,35 +35,38 @@ module pd_force_list
 
 contains
 
-  !> Make what the family keeps of the model: which clusters have points alike, and tables. The
-  !> first pass does it if nobody has; afterwards the model must not change.
-  subroutine prepare_list(family, model)
-    type(list_family_type), intent(inout) :: family
-      !! gets `given`, `plain` and the stored weights; unchanged if it has them
-    type(model_type), intent(in) :: model  !! parameters of the slots
+  !> Make what the loops keep of the model: which clusters have points alike, and tables. The first
+  !> pass does it if nobody has; afterwards the model must not change.
+  subroutine prepare_list(family, model, workspace)
+    type(list_family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model         !! parameters of the slots
+    type(list_workspace_type), intent(inout) :: workspace
+      !! ready for passes, without a state; unchanged if it is
+    integer :: k
 
-    if (allocated(family%given)) return
-    call survey(family, model)
-    call make_tables(family, model)
+    if (allocated(workspace%given)) then
+      if (size(workspace%at, 2) /= family%n_slots) &
+        & call internal_fault('a workspace of another family')
+      return
+    end if
+    allocate (workspace%at(at_p, family%n_slots), source=0.0_wp)
+    do k = 1, family%n_slots
+      workspace%at(:family%dim, k) = family%x(:, k)
+      workspace%at(at_volume, k) = family%volume(k)
+    end do
+    allocate (workspace%large(size(family%start) - 1), source=little)
+    call survey(family, model, workspace)
+    call make_tables(family, model, workspace)
   end subroutine prepare_list
-
-  !> Drop what the family keeps of the model, which is about to change or has changed: the next pass
-  !> makes it anew.
-  pure subroutine forget_model(family)
-    type(list_family_type), intent(inout) :: family  !! of any model, or of none yet
-
-    if (.not. allocated(family%given)) return
-    deallocate (family%given, family%plain)
-    call drop_tables(family)
-  end subroutine forget_model
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
   !> intact bond beyond its limit.
-  subroutine list_dilatation(family, model, options, u, p, strained)
-    type(list_family_type), intent(inout) :: family
-      !! gets the displacements and how far its clusters are strained
-    type(model_type), intent(in) :: model            !! that the family has been prepared for
+  subroutine list_dilatation(family, model, options, workspace, u, p, strained)
+    type(list_family_type), intent(in) :: family     !! the family
+    type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the forces take in
+    type(list_workspace_type), intent(inout) :: workspace
+      !! of this model; gets the displacements and how far clusters are strained
     real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
       !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
@@ -73,22 +78,24 @@ contains
     integer(i1) :: strain
     integer :: c, k, l
 
-    call prepare_list(family, model)
+    call prepare_list(family, model, workspace)
     call new_loops(family, model, options, for_theta, loops)
-    call gather_state(family, u)
+    call gather_state(u, workspace)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, p, strained, loops) private(work, sums, strain, c, k, l)
-    do c = 1, size(family%large)
-      call take_up(family, c, work)
+    !$omp shared(family, model, options, workspace, p, strained, loops) &
+    !$omp private(work, sums, strain, c, k, l)
+    do c = 1, size(workspace%large)
+      call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       strain = little
-      call sum_up(family, model, options, loops, work, strain, sums)
-      family%large(c) = strain
+      call sum_up(family, model, options, workspace, loops, work, strain, sums)
+      workspace%large(c) = strain
       if (strain == beyond) then
         associate (e => family%start(c), n => work%n)
-          call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
+          call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
+            & .false., work)
         end associate
-        call general_theta(family, model, options, work, sums(:, 1))
+        call cluster_theta(family, model, options, workspace, work, sums(:, 1))
         if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do l = 1, lanes
@@ -102,11 +109,13 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `list_dilatation` at the same displacements.
-  subroutine list_force(family, model, options, u, p, force, strained)
-    type(list_family_type), intent(inout) :: family     !! gets the displacements and `p`
-    type(model_type), intent(in) :: model               !! that the family has been prepared for
+  subroutine list_force(family, model, options, workspace, u, p, force, strained)
+    type(list_family_type), intent(in) :: family        !! the family
+    type(model_type), intent(in) :: model               !! parameters of the slots
     type(force_options_type), intent(in) :: options
       !! what the forces take in, as for `list_dilatation`
+    type(list_workspace_type), intent(inout) :: workspace
+      !! of this model; gets the displacements or `p`
     real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)
       !! (n_slots) 2 a d delta theta, of size 0 without a dilatation [N/m5]
@@ -119,27 +128,29 @@ contains
     integer(i1) :: strain
     integer :: c, d
 
-    call prepare_list(family, model)
+    call prepare_list(family, model, workspace)
     call new_loops(family, model, options, for_force, loops)
     ! with a dilatation, the pass before has gathered the displacements
     if (options%dilatation) then
-      call gather_p(family, p)
+      call gather_p(p, workspace)
     else
-      call gather_state(family, u)
+      call gather_state(u, workspace)
     end if
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, force, strained, loops) private(work, sums, strain, c, d)
-    do c = 1, size(family%large)
-      call take_up(family, c, work)
+    !$omp shared(family, model, options, workspace, force, strained, loops) &
+    !$omp private(work, sums, strain, c, d)
+    do c = 1, size(workspace%large)
+      call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       ! the pass before has looked at the strain
-      strain = merge(family%large(c), little, options%dilatation)
-      call sum_up(family, model, options, loops, work, strain, sums)
+      strain = merge(workspace%large(c), little, options%dilatation)
+      call sum_up(family, model, options, workspace, loops, work, strain, sums)
       if (strain == beyond) then
         associate (e => family%start(c), n => work%n)
-          call fill_tables(family, model, family%intact(e:e + n - 1), .false., work)
+          call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
+            & .false., work)
         end associate
-        call general_force(family, model, options, work, sums)
+        call cluster_force(family, model, options, workspace, work, sums)
         if (model%breaking) call mark_cluster(model, work, strained)
       end if
       do d = 1, model%dim
@@ -149,9 +160,10 @@ contains
   end subroutine list_force
 
   !> Strain energy density of all slots [J/m3].
-  subroutine list_energy(family, model, u, energy)
-    type(list_family_type), intent(inout) :: family   !! gets the displacements
-    type(model_type), intent(in) :: model             !! that the family has been prepared for
+  subroutine list_energy(family, model, workspace, u, energy)
+    type(list_family_type), intent(in) :: family      !! the family
+    type(model_type), intent(in) :: model             !! parameters of the slots
+    type(list_workspace_type), intent(inout) :: workspace  !! of this model; gets the displacements
     real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
     type(force_options_type) :: options
@@ -161,22 +173,24 @@ contains
     logical :: missed
     integer :: c, k, l
 
-    call prepare_list(family, model)
+    call prepare_list(family, model, workspace)
     options = options_of(model)
     call new_loops(family, model, options, for_energy, loops)
-    call gather_state(family, u)
+    call gather_state(u, workspace)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, energy, loops) private(work, sums, missed, c, k, l)
-    do c = 1, size(family%large)
-      call take_up(family, c, work)
-      call take_given(family, work)
+    !$omp shared(family, model, options, workspace, energy, loops) &
+    !$omp private(work, sums, missed, c, k, l)
+    do c = 1, size(workspace%large)
+      call take_up(family, workspace, c, work)
+      call take_given(workspace, work)
       if (options%thermal) then
         associate (e => family%start(c), n => work%n)
-          call fill_tables(family, model, family%intact(e:e + n - 1), .true., work)
+          call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
+            & .true., work)
         end associate
-        call general_energy(family, model, options, work, sums(:, 1), sums(:, 2))
+        call cluster_energy(family, model, options, workspace, work, sums(:, 1), sums(:, 2))
       else
-        call run_loop(family, work, loops%stored, loops%task, sums, missed)
+        call run_loop(family, workspace, work, loops%stored, loops%task, sums, missed)
       end if
       do l = 1, lanes
         k = work%first + l - 1
@@ -213,10 +227,11 @@ contains
 
   !> Sums of a cluster by the loops that serve its strain, which is at least `strain`; on return
   !> `strain` says which did, or that none does.
-  subroutine sum_up(family, model, options, loops, work, strain, sums)
+  subroutine sum_up(family, model, options, workspace, loops, work, strain, sums)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
+    type(list_workspace_type), intent(in) :: workspace
     type(loops_type), intent(in) :: loops
     type(work_type), intent(in) :: work
     integer(i1), intent(inout) :: strain
@@ -225,17 +240,17 @@ contains
     logical :: missed
 
     task = loops%task
-    if (family%stored(work%cluster) == 0_i8) &
-      & call plain_task(family, model, options, work%cluster, task)
+    if (workspace%stored(work%cluster) == 0_i8) &
+      & call plain_task(family, model, options, workspace, work%cluster, task)
     if (strain == little .and. loops%narrow > 0.0_wp) then
       task%limit = loops%narrow
-      call run_either(family, work, loops, task, sums, missed)
+      call run_either(family, workspace, work, loops, task, sums, missed)
       if (.not. missed) return
     end if
     if (strain < beyond .and. loops%wide > 0.0_wp) then
       task%limit = loops%wide
       task%wide = .true.
-      call run_either(family, work, loops, task, sums, missed)
+      call run_either(family, workspace, work, loops, task, sums, missed)
       strain = more
       if (.not. missed) return
     end if
@@ -243,26 +258,28 @@ contains
   end subroutine sum_up
 
   !> The loop for the tables that the cluster has.
-  subroutine run_either(family, work, loops, task, sums, missed)
+  subroutine run_either(family, workspace, work, loops, task, sums, missed)
     type(list_family_type), intent(in) :: family
+    type(list_workspace_type), intent(in) :: workspace
     type(work_type), intent(in) :: work
     type(loops_type), intent(in) :: loops
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
 
-    if (family%stored(work%cluster) == 0_i8) then
-      call run_loop(family, work, loops%plain, task, sums, missed)
-    else if (family%shape(work%cluster) == 0_i8) then
-      call run_loop(family, work, loops%stored, task, sums, missed)
+    if (workspace%stored(work%cluster) == 0_i8) then
+      call run_loop(family, workspace, work, loops%plain, task, sums, missed)
+    else if (workspace%shape(work%cluster) == 0_i8) then
+      call run_loop(family, workspace, work, loops%stored, task, sums, missed)
     else
-      call run_loop(family, work, loops%shaped, task, sums, missed)
+      call run_loop(family, workspace, work, loops%shaped, task, sums, missed)
     end if
   end subroutine run_either
 
   !> One loop over the packs of a cluster.
-  subroutine run_loop(family, work, loop, task, sums, missed)
+  subroutine run_loop(family, workspace, work, loop, task, sums, missed)
     type(list_family_type), intent(in) :: family
+    type(list_workspace_type), intent(in) :: workspace
     type(work_type), intent(in) :: work
     procedure(pass_loop), pointer, intent(in) :: loop
     type(task_type), intent(in) :: task
@@ -273,47 +290,47 @@ contains
     ! tables that are not there have no second element; loops that need them are not called then
     e = family%start(work%cluster)
     last = e + work%n - 1
-    b = max(1_i8, family%stored(work%cluster))
-    s = max(1_i8, family%shape(work%cluster))
+    b = max(1_i8, workspace%stored(work%cluster))
+    s = max(1_i8, workspace%shape(work%cluster))
     f = merge(e, 1_i8, size(family%fraction) > 0)
-    d = merge(b, 1_i8, size(family%weight_D) > 0)
+    d = merge(b, 1_i8, size(workspace%weight_D) > 0)
     call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
-      & family%at, family%given, family%fraction(:, f:), family%geometry(:, s:), &
-      & family%weight_D(:, d:), family%weight_S(:, b:), work%own, task, sums, missed)
+      & workspace%at, workspace%given, family%fraction(:, f:), workspace%geometry(:, s:), &
+      & workspace%weight_D(:, d:), workspace%weight_S(:, b:), work%own, task, sums, missed)
   end subroutine run_loop
 
   !> Copy displacements, point by point: what a bond needs of its other end then stands in one
   !> place.
-  subroutine gather_state(family, u)
-    type(list_family_type), intent(inout) :: family
+  subroutine gather_state(u, workspace)
     real(wp), intent(in), contiguous :: u(:, :)
+    type(list_workspace_type), intent(inout) :: workspace
     integer :: k
 
     select case (size(u, 2))
     case (3)
-      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
-      do k = 1, family%n_slots
-        family%at(at_moved + 1:at_moved + 3, k) = u(k, :3)
+      !$omp parallel do schedule(static) default(none) shared(u, workspace) private(k)
+      do k = 1, size(u, 1)
+        workspace%at(at_moved + 1:at_moved + 3, k) = u(k, :3)
       end do
     case (2)
-      !$omp parallel do schedule(static) default(none) shared(family, u) private(k)
-      do k = 1, family%n_slots
-        family%at(at_moved + 1:at_moved + 2, k) = u(k, :2)
+      !$omp parallel do schedule(static) default(none) shared(u, workspace) private(k)
+      do k = 1, size(u, 1)
+        workspace%at(at_moved + 1:at_moved + 2, k) = u(k, :2)
       end do
     case default
-      family%at(at_moved + 1, :) = u(:, 1)
+      workspace%at(at_moved + 1, :) = u(:, 1)
     end select
   end subroutine gather_state
 
   !> Copy the dilatation coefficients beside them.
-  subroutine gather_p(family, p)
-    type(list_family_type), intent(inout) :: family
+  subroutine gather_p(p, workspace)
     real(wp), intent(in), contiguous :: p(:)
+    type(list_workspace_type), intent(inout) :: workspace
     integer :: k
 
-    !$omp parallel do schedule(static) default(none) shared(family, p) private(k)
-    do k = 1, family%n_slots
-      family%at(at_p, k) = p(k)
+    !$omp parallel do schedule(static) default(none) shared(p, workspace) private(k)
+    do k = 1, size(p)
+      workspace%at(at_p, k) = p(k)
     end do
   end subroutine gather_p
 

@@ -5,14 +5,15 @@ module pd_force_list_general
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
-  use pd_family_list, only: list_family_type, at_volume, at_moved, at_p
+  use pd_family_list, only: list_family_type
   use pd_family_volume, only: volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
   use pd_force_model, only: force_options_type, model_type
+  use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p
   implicit none (type, external)
   private
-  public :: work_type, fill_tables, general_theta, general_force, general_energy, take_up, &
+  public :: work_type, fill_tables, cluster_theta, cluster_force, cluster_energy, take_up, &
     & take_given
 
   !> What one cluster is worked with: one for each thread.
@@ -33,8 +34,9 @@ module pd_force_list_general
 contains
 
   !> Turn to cluster `c`.
-  pure subroutine take_up(family, c, work)
-    type(list_family_type), intent(in) :: family  !! prepared for a model, with its state gathered
+  pure subroutine take_up(family, workspace, c, work)
+    type(list_family_type), intent(in) :: family  !! the family
+    type(list_workspace_type), intent(in) :: workspace  !! prepared, with the state gathered
     integer, intent(in) :: c                      !! cluster
     type(work_type), intent(inout) :: work
       !! gets what its slots have; its tables stay those of another cluster
@@ -45,20 +47,20 @@ contains
     work%n = int(family%start(c + 1) - family%start(c))
     do d = 1, at_p
       do l = 1, lanes
-        work%own(l, d) = family%at(d, work%first + l - 1)
+        work%own(l, d) = workspace%at(d, work%first + l - 1)
       end do
     end do
   end subroutine take_up
 
   !> Take what the model gives its slots, too.
-  pure subroutine take_given(family, work)
-    type(list_family_type), intent(in) :: family
+  pure subroutine take_given(workspace, work)
+    type(list_workspace_type), intent(in) :: workspace
     type(work_type), intent(inout) :: work
     integer :: d, l
 
     do d = 1, at_p
       do l = 1, lanes
-        work%own(l, at_p + d) = family%given(d, work%first + l - 1)
+        work%own(l, at_p + d) = workspace%given(d, work%first + l - 1)
       end do
     end do
   end subroutine take_given
@@ -76,9 +78,10 @@ contains
 
   !> Weights of a cluster's bonds, for any rule, material and surface factor: of those that `bits`
   !> (packs of the cluster) has. `own`: with 2 q_k in place of q_k + q_j, as the energy needs them.
-  subroutine fill_tables(family, model, bits, own, work)
-    type(list_family_type), intent(in) :: family  !! prepared for the model
+  subroutine fill_tables(family, model, workspace, bits, own, work)
+    type(list_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model  !! parameters of the slots
+    type(list_workspace_type), intent(in) :: workspace  !! prepared for the model
     integer(i1), intent(in) :: bits(:)  !! (packs) lanes whose bonds count, such as the intact ones
     logical, intent(in) :: own          !! 2 q_k in place of q_k + q_j
     type(work_type), intent(inout) :: work
@@ -89,20 +92,21 @@ contains
     integer :: i, j, m, f
 
     call allocate_tables(family, work)
-    call take_given(family, work)
+    call take_given(workspace, work)
     do i = 1, work%n
       e = family%start(work%cluster) + i - 1
       j = family%member(1, e)
       m = family%member(2, e)
       from = iand(family%first(e), lane_bit) /= 0_i1
       there = iand(bits(i), lane_bit) /= 0_i1
-      x = merge(family%at(1, j), family%at(1, m), from) - work%own(:, 1)
-      y = merge(family%at(2, j), family%at(2, m), from) - work%own(:, 2)
-      z = merge(family%at(3, j), family%at(3, m), from) - work%own(:, 3)
-      weight = merge(merge(family%at(at_volume, j), family%at(at_volume, m), from), 0.0_wp, there)
+      x = merge(workspace%at(1, j), workspace%at(1, m), from) - work%own(:, 1)
+      y = merge(workspace%at(2, j), workspace%at(2, m), from) - work%own(:, 2)
+      z = merge(workspace%at(3, j), workspace%at(3, m), from) - work%own(:, 3)
+      weight = merge(merge(workspace%at(at_volume, j), workspace%at(at_volume, m), from), &
+        & 0.0_wp, there)
       q = work%own(:, at_p + given_q)
       if (.not. own) then
-        q = q + merge(family%given(given_q, j), family%given(given_q, m), from)
+        q = q + merge(workspace%given(given_q, j), workspace%given(given_q, m), from)
       else
         q = 2*q
       end if
@@ -115,7 +119,7 @@ contains
         weight = weight*family%fraction(:, e)
       case default
         spacing = work%own(:, at_p + given_half) &
-          & + merge(family%given(given_half, j), family%given(given_half, m), from)
+          & + merge(workspace%given(given_half, j), workspace%given(given_half, m), from)
         weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
       end select
       work%geometry(:, i) = 1/length**2
@@ -126,9 +130,11 @@ contains
       y = y/length
       z = z/length
       do f = given_D, given_S, given_S - given_D
-        a = work%own(:, at_p + f) + merge(family%given(f, j), family%given(f, m), from)
-        b = work%own(:, at_p + f + 1) + merge(family%given(f + 1, j), family%given(f + 1, m), from)
-        c = work%own(:, at_p + f + 2) + merge(family%given(f + 2, j), family%given(f + 2, m), from)
+        a = work%own(:, at_p + f) + merge(workspace%given(f, j), workspace%given(f, m), from)
+        b = work%own(:, at_p + f + 1) &
+          & + merge(workspace%given(f + 1, j), workspace%given(f + 1, m), from)
+        c = work%own(:, at_p + f + 2) &
+          & + merge(workspace%given(f + 2, j), workspace%given(f + 2, m), from)
         ! with a common denominator there is one division
         a = 0.5_wp*a*b*c/sqrt(merge((x*b*c)**2 + (y*a*c)**2 + (z*a*b)**2, 1.0_wp, there))
         if (f == given_D) work%dilatation(:, i) = weight*a
@@ -138,10 +144,12 @@ contains
   end subroutine fill_tables
 
   !> theta of the lanes.
-  pure subroutine general_theta(family, model, options, work, theta)
-    type(list_family_type), intent(in) :: family     !! with displacements gathered
+  pure subroutine cluster_theta(family, model, options, workspace, work, theta)
+    type(list_family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the dilatation takes in
+    type(list_workspace_type), intent(in) :: workspace
+      !! with displacements gathered
     type(work_type), intent(inout) :: work
       !! with tables; gets the greatest tension and compression of each lane
     real(wp), intent(out) :: theta(lanes)            !! sum of Gd s Lambda vc V of each lane [m3]
@@ -152,17 +160,18 @@ contains
     call begin(model, options, work)
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, options, work, i, s, lambda, r, y, p)
+      call deform_cluster(family, model, options, workspace, work, i, s, lambda, r, y, p)
       theta = theta + work%dilatation(:, i)*s*lambda
     end do
-  end subroutine general_theta
+  end subroutine cluster_theta
 
   !> Force density of the lanes (lanes, 3) [N/m3].
-  pure subroutine general_force(family, model, options, work, force)
-    type(list_family_type), intent(in) :: family
-      !! with displacements, and p if there is one, gathered
+  pure subroutine cluster_force(family, model, options, workspace, work, force)
+    type(list_family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the forces take in
+    type(list_workspace_type), intent(in) :: workspace
+      !! with displacements, and p if there is one, gathered
     type(work_type), intent(inout) :: work
       !! with tables; gets the greatest tension and compression of each lane
     real(wp), intent(out) :: force(lanes, 3)
@@ -174,7 +183,7 @@ contains
     call begin(model, options, work)
     force = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, options, work, i, s, lambda, r, y, p)
+      call deform_cluster(family, model, options, workspace, work, i, s, lambda, r, y, p)
       s = work%stretch(:, i)*s
       if (options%dilatation) &
         & s = s + (work%own(:, at_p) + p)*work%dilatation(:, i)*work%geometry(:, i)*lambda
@@ -182,14 +191,16 @@ contains
         force(:, c) = force(:, c) + s*r*y(:, c)
       end do
     end do
-  end subroutine general_force
+  end subroutine cluster_force
 
   !> Strain energy density of the lanes' stretches [J/m3], from tables with each lane's own q twice,
   !> and theta.
-  pure subroutine general_energy(family, model, options, work, energy, theta)
-    type(list_family_type), intent(in) :: family     !! with displacements gathered
+  pure subroutine cluster_energy(family, model, options, workspace, work, energy, theta)
+    type(list_family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the energy takes in
+    type(list_workspace_type), intent(in) :: workspace
+      !! with displacements gathered
     type(work_type), intent(inout) :: work
       !! with tables of each lane's own q; gets the greatest tension and compression
     real(wp), intent(out) :: energy(lanes)           !! of the stretches alone [J/m3]
@@ -203,11 +214,11 @@ contains
     energy = 0.0_wp
     theta = 0.0_wp
     do i = 1, work%n
-      call deform(family, model, options, work, i, s, lambda, r, y, p)
+      call deform_cluster(family, model, options, workspace, work, i, s, lambda, r, y, p)
       energy = energy + 0.25_wp*work%stretch(:, i)*s**2/work%geometry(:, i)
       if (options%dilatation) theta = theta + work%dilatation(:, i)*s*lambda
     end do
-  end subroutine general_energy
+  end subroutine cluster_energy
 
   pure subroutine begin(model, options, work)
     type(model_type), intent(in) :: model
@@ -221,10 +232,11 @@ contains
 
   !> State of a cluster's bonds in its `i`-th pack: mechanical stretch, Lambda, r = |xi|/|y|, the
   !> deformed bond y [m] and p of the other end.
-  pure subroutine deform(family, model, options, work, i, s, lambda, r, y, p)
+  pure subroutine deform_cluster(family, model, options, workspace, work, i, s, lambda, r, y, p)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
+    type(list_workspace_type), intent(in) :: workspace
     type(work_type), intent(inout) :: work
     integer, intent(in) :: i
     real(wp), intent(out) :: s(lanes), lambda(lanes), r(lanes), y(lanes, 3), p(lanes)
@@ -239,11 +251,11 @@ contains
     m = family%member(2, pack)
     from = iand(family%first(pack), lane_bit) /= 0_i1
     do c = 1, 3
-      xi(:, c) = merge(family%at(c, j), family%at(c, m), from) - work%own(:, c)
-      eta(:, c) = merge(family%at(at_moved + c, j), family%at(at_moved + c, m), from) &
+      xi(:, c) = merge(workspace%at(c, j), workspace%at(c, m), from) - work%own(:, c)
+      eta(:, c) = merge(workspace%at(at_moved + c, j), workspace%at(at_moved + c, m), from) &
         & - work%own(:, at_moved + c)
     end do
-    p = merge(family%at(at_p, j), family%at(at_p, m), from)
+    p = merge(workspace%at(at_p, j), workspace%at(at_p, m), from)
     heat = 0.0_wp
     if (options%thermal) heat = work%heat &
       & + merge(model%expansion(j), model%expansion(m), from)/2
@@ -264,6 +276,6 @@ contains
       work%tension(l) = max(work%tension(l), x)
       work%compression(l) = max(work%compression(l), -x)
     end do
-  end subroutine deform
+  end subroutine deform_cluster
 
 end module pd_force_list_general

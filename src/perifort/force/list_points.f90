@@ -1,5 +1,6 @@
-!> What list families keep of the model: q, spacing and surface factors of each slot beside each
-!> other, and for which clusters all of that is alike, so that their loops need none of it.
+!> What the loops of list families keep of the model: q, spacing and surface factors of each slot
+!> beside each other, and for which clusters all of that is alike, so that their loops need none of
+!> it.
 module pd_force_list_points
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_base_kinds, only: wp, i1, i8
@@ -10,6 +11,7 @@ module pd_force_list_points
   use pd_force_list_fast, only: task_type, no_correction, one_spacing, own_spacing, &
     & stored_fraction
   use pd_force_model, only: force_options_type, model_type
+  use pd_force_workspace, only: list_workspace_type
   implicit none (type, external)
   private
   public :: survey, new_task, plain_task
@@ -24,37 +26,39 @@ module pd_force_list_points
 
 contains
 
-  !> Put what the model gives into the family, and find the clusters whose points are alike.
-  subroutine survey(family, model)
-    type(list_family_type), intent(inout) :: family  !! gets `given` and `plain`
-    type(model_type), intent(in) :: model            !! parameters of the slots
+  !> Put what the model gives into the workspace, and find the clusters whose points are alike.
+  subroutine survey(family, model, workspace)
+    type(list_family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model         !! parameters of the slots
+    type(list_workspace_type), intent(inout) :: workspace  !! gets `given` and `plain`
     integer :: k, c, d
 
     ! without a factor the sum of both ends is 1, in directions that the body does not have, too
-    allocate (family%given(8, family%n_slots), source=0.5_wp)
-    allocate (family%plain(size(family%large)), source=0_i1)
-    !$omp parallel default(none) shared(family, model) private(k, c, d)
+    allocate (workspace%given(8, family%n_slots), source=0.5_wp)
+    allocate (workspace%plain(size(family%start) - 1), source=0_i1)
+    !$omp parallel default(none) shared(family, model, workspace) private(k, c, d)
     !$omp do schedule(static)
     do k = 1, family%n_slots
-      family%given(given_q, k) = model%materials(model%material(k))%q
-      family%given(given_half, k) = family%spacing(k)/2
+      workspace%given(given_q, k) = model%materials(model%material(k))%q
+      workspace%given(given_half, k) = family%spacing(k)/2
       if (.not. model%surface) cycle
       do d = 1, family%dim
-        family%given(given_D + d - 1, k) = model%D(k, d)
-        family%given(given_S + d - 1, k) = model%S(k, d)
+        workspace%given(given_D + d - 1, k) = model%D(k, d)
+        workspace%given(given_S + d - 1, k) = model%S(k, d)
       end do
     end do
     !$omp do schedule(dynamic, 32)
-    do c = 1, size(family%plain)
-      if (is_plain(family, model%surface, c)) family%plain(c) = 1_i1
+    do c = 1, size(workspace%plain)
+      if (is_plain(family, workspace%given, model%surface, c)) workspace%plain(c) = 1_i1
     end do
     !$omp end parallel
   end subroutine survey
 
   !> Whether all points of cluster `c` and its members have one q, one spacing and one surface
   !> factor, the same along every direction.
-  pure logical function is_plain(family, surface, c)
+  pure logical function is_plain(family, given, surface, c)
     type(list_family_type), intent(in) :: family
+    real(wp), intent(in) :: given(:, :)
     logical, intent(in) :: surface
     integer, intent(in) :: c
     real(wp) :: low(8), high(8)
@@ -68,14 +72,14 @@ contains
     do e = family%start(c), family%start(c + 1) - 1
       do m = 1, 2
         j = family%member(m, e)
-        low = min(low, family%given(:, j))
-        high = max(high, family%given(:, j))
+        low = min(low, given(:, j))
+        high = max(high, given(:, j))
       end do
       do l = 1, lanes
         if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
         j = lanes*(c - 1) + l
-        low = min(low, family%given(:, j))
-        high = max(high, family%given(:, j))
+        low = min(low, given(:, j))
+        high = max(high, given(:, j))
       end do
     end do
     is_plain = all(high(:given_half) <= low(:given_half))
@@ -123,16 +127,17 @@ contains
   end subroutine set_spacing
 
   !> What the loops of plain cluster `c` multiply with.
-  pure subroutine plain_task(family, model, options, c, task)
-    type(list_family_type), intent(in) :: family     !! surveyed
+  pure subroutine plain_task(family, model, options, workspace, c, task)
+    type(list_family_type), intent(in) :: family     !! with its volume rule
     type(model_type), intent(in) :: model            !! whether there are surface factors
     type(force_options_type), intent(in) :: options  !! whether the forces have a dilatation
+    type(list_workspace_type), intent(in) :: workspace  !! surveyed
     integer, intent(in) :: c                         !! cluster whose points are alike
     type(task_type), intent(inout) :: task
       !! gets the volume correction and the factors of this cluster
     real(wp) :: Gb
 
-    associate (given => family%given(:, lanes*(c - 1) + 1))
+    associate (given => workspace%given(:, lanes*(c - 1) + 1))
       call set_spacing(family, 2*given(given_half), task)
       Gb = 1.0_wp
       task%factor = 1.0_wp

@@ -4,16 +4,17 @@
 !> in any case, if nobody shares them of their own.
 module pd_force_list_tables
   use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_base_lookup, only: lookup_type, mix
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
-  use pd_base_lanes, only: lanes
   use pd_force_list_general, only: work_type, fill_tables, take_up
   use pd_force_model, only: force_options_type, model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow
+  use pd_force_workspace, only: list_workspace_type
   implicit none (type, external)
   private
-  public :: make_tables, drop_tables
+  public :: make_tables
 
   !> What all shapes may take [bytes], and what they may take for each slot beside.
   integer(i8), parameter :: room = 16777216_i8, bytes_per_slot = 100_i8
@@ -35,56 +36,53 @@ module pd_force_list_tables
 contains
 
   !> Make the tables of all clusters: `stored`, `weight_D`, `weight_S`, `shape` and `geometry`.
-  subroutine make_tables(family, model)
-    type(list_family_type), intent(inout) :: family  !! surveyed (`pd_force_list_points`)
-    type(model_type), intent(in) :: model            !! parameters of the slots
+  subroutine make_tables(family, model, workspace)
+    type(list_family_type), intent(in) :: family  !! the family
+    type(model_type), intent(in) :: model         !! parameters of the slots
+    type(list_workspace_type), intent(inout) :: workspace  !! surveyed (`pd_force_list_points`)
     type(kinds_type) :: shapes, weights
     type(force_options_type) :: options
     real(wp) :: near
 
-    allocate (family%stored(size(family%plain)), source=0_i8)
-    allocate (family%shape(size(family%plain)), source=0_i8)
-    allocate (family%weight_S(lanes, 0), family%weight_D(lanes, 0), family%geometry(lanes, 0))
+    allocate (workspace%stored(size(workspace%plain)), source=0_i8)
+    allocate (workspace%shape(size(workspace%plain)), source=0_i8)
+    allocate (workspace%weight_S(lanes, 0), workspace%weight_D(lanes, 0))
+    allocate (workspace%geometry(lanes, 0))
     ! general formulas fill tables of their own; a heated body has tangents without thermal strain
     options = options_of(model)
     options%thermal = .false.
     if (fast_limit(model, options, narrow) <= 0.0_wp) return
 
     ! positions are off by their last bits
-    near = min(8*epsilon(1.0_wp)*maxval(abs(family%at(:family%dim, :))), &
+    near = min(8*epsilon(1.0_wp)*maxval(abs(family%x)), &
       & 2.0e-13_wp*family%rule%delta)
-    call find_shapes(family, near, shapes)
-    call find_weights(family, model, shapes, weights)
-    call share_weights(family, model, near, shapes, weights)
-    call store_own_weights(family, model, shapes, weights)
-    call store_shapes(family, shapes)
+    call find_shapes(family, workspace, near, shapes)
+    call find_weights(family, model, workspace, shapes, weights)
+    call share_weights(family, model, near, workspace, shapes, weights)
+    call store_own_weights(family, model, shapes, weights, workspace)
+    call store_shapes(family, shapes, workspace)
   end subroutine make_tables
-
-  !> Drop the tables.
-  pure subroutine drop_tables(family)
-    type(list_family_type), intent(inout) :: family  !! with tables
-    deallocate (family%stored, family%shape, family%weight_S, family%weight_D, family%geometry)
-  end subroutine drop_tables
 
   ! ---------------------------------------------------------------- kinds of clusters
 
   !> The shapes that enough clusters share. A key finds them, the positions decide.
-  subroutine find_shapes(family, near, shapes)
+  subroutine find_shapes(family, workspace, near, shapes)
     type(list_family_type), intent(in) :: family
+    type(list_workspace_type), intent(in) :: workspace
     real(wp), intent(in) :: near           !! positions that differ less are the same [m]
     type(kinds_type), intent(out) :: shapes
     integer(i8), allocatable :: key(:)
     integer(i8) :: bytes
     integer :: c, least
 
-    allocate (key(size(family%plain)))
+    allocate (key(size(workspace%plain)))
     !$omp parallel do schedule(dynamic, 32) default(none) shared(family, key) private(c)
     do c = 1, size(key)
       key(c) = shape_key(family, c)
     end do
-    call number_kinds(key, family%key_bits, shapes)
+    call number_kinds(key, workspace%key_bits, shapes)
     ! if there is no room for all, those that most clusters share
-    least = family%least_shared
+    least = workspace%least_shared
     do
       bytes = 0_i8
       do c = 1, size(shapes%first)
@@ -107,31 +105,33 @@ contains
 
   !> The weights that clusters of one shape share. A cluster whose points are alike needs no tables:
   !> it gives up its shape if too few share its weights.
-  subroutine find_weights(family, model, shapes, weights)
+  subroutine find_weights(family, model, workspace, shapes, weights)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(list_workspace_type), intent(in) :: workspace
     type(kinds_type), intent(inout) :: shapes
     type(kinds_type), intent(out) :: weights
     type(work_type) :: work
     integer(i8), allocatable :: key(:)
     integer :: c
 
-    allocate (key(size(family%plain)), source=0_i8)
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model, shapes, key) &
-    !$omp private(work, c)
+    allocate (key(size(workspace%plain)), source=0_i8)
+    !$omp parallel do schedule(dynamic, 32) default(none) &
+    !$omp shared(family, model, workspace, shapes, key) private(work, c)
     do c = 1, size(key)
       if (shapes%of(c) == 0_i4) cycle
-      call weights_of(family, model, c, work)
+      call weights_of(family, model, workspace, c, work)
       key(c) = weight_key(model, work, int(shapes%of(c), i8))
     end do
-    call number_kinds(key, family%key_bits, weights)
+    call number_kinds(key, workspace%key_bits, weights)
     do c = 1, size(key)
       if (shapes%of(c) == 0_i4) then
         weights%of(c) = 0_i4
-      else if (family%plain(c) == 1_i1 .and. weights%uses(weights%of(c)) < family%least_shared) then
+      else if (workspace%plain(c) == 1_i1 &
+        & .and. weights%uses(weights%of(c)) < workspace%least_shared) then
         weights%of(c) = 0_i4
         shapes%of(c) = 0_i4
-      else if (weights%uses(weights%of(c)) < min(2, family%least_shared)) then
+      else if (weights%uses(weights%of(c)) < min(2, workspace%least_shared)) then
         weights%of(c) = 0_i4
       end if
     end do
@@ -232,10 +232,11 @@ contains
   ! ---------------------------------------------------------------- tables
 
   !> Store the weights of each kind; clusters that have others after all lose their kind.
-  subroutine share_weights(family, model, near, shapes, weights)
-    type(list_family_type), intent(inout) :: family
+  subroutine share_weights(family, model, near, workspace, shapes, weights)
+    type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     real(wp), intent(in) :: near
+    type(list_workspace_type), intent(inout) :: workspace
     type(kinds_type), intent(inout) :: shapes, weights
     type(work_type) :: work
     integer(i8), allocatable :: place(:)
@@ -251,150 +252,153 @@ contains
       place(i) = n + 1
       n = n + packs_of(family, c)
     end do
-    call resize(family, model, n)
-    !$omp parallel do schedule(dynamic, 4) default(none) shared(family, model, weights, place) &
-    !$omp private(work, c, i)
+    call resize(model, n, workspace)
+    !$omp parallel do schedule(dynamic, 4) default(none) &
+    !$omp shared(family, model, workspace, weights, place) private(work, c, i)
     do i = 1, size(place)
       if (place(i) == 0_i8) cycle
       c = int(weights%first(i))
-      call weights_of(family, model, c, work)
-      call put_weights(model, work, place(i), family)
+      call weights_of(family, model, workspace, c, work)
+      call put_weights(model, work, place(i), workspace)
     end do
     ! the volume correction changes by what |xi| does, over the spacing
     off = 64*epsilon(1.0_wp) + 2*near/minval(family%spacing, mask=family%spacing > 0.0_wp)
     !$omp parallel do schedule(dynamic, 32) default(none) private(work, c) &
-    !$omp shared(family, model, off, shapes, weights, place)
+    !$omp shared(family, model, workspace, off, shapes, weights, place)
     do c = 1, size(weights%of)
       if (weights%of(c) == 0_i4) cycle
       if (shapes%of(weights%first(weights%of(c))) == shapes%of(c) &
         & .and. place(weights%of(c)) > 0_i8) then
-        call weights_of(family, model, c, work)
-        if (same_weights(family, model, work, place(weights%of(c)), off)) then
-          family%stored(c) = place(weights%of(c))
+        call weights_of(family, model, workspace, c, work)
+        if (same_weights(model, workspace, work, place(weights%of(c)), off)) then
+          workspace%stored(c) = place(weights%of(c))
           cycle
         end if
       end if
       weights%of(c) = 0_i4
-      if (family%plain(c) == 1_i1) shapes%of(c) = 0_i4
+      if (workspace%plain(c) == 1_i1) shapes%of(c) = 0_i4
     end do
   end subroutine share_weights
 
   !> Store weights of their own for clusters that need some and share none.
-  subroutine store_own_weights(family, model, shapes, weights)
-    type(list_family_type), intent(inout) :: family
+  subroutine store_own_weights(family, model, shapes, weights, workspace)
+    type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(kinds_type), intent(in) :: shapes, weights
+    type(list_workspace_type), intent(inout) :: workspace
     type(work_type) :: work
     integer(i8) :: n
     integer :: c
 
-    n = size(family%weight_S, 2, kind=i8)
-    do c = 1, size(family%plain)
+    n = size(workspace%weight_S, 2, kind=i8)
+    do c = 1, size(workspace%plain)
       if (weights%of(c) > 0_i4) cycle
-      if (family%plain(c) == 1_i1 .and. shapes%of(c) == 0_i4) cycle
-      family%stored(c) = n + 1
+      if (workspace%plain(c) == 1_i1 .and. shapes%of(c) == 0_i4) cycle
+      workspace%stored(c) = n + 1
       n = n + packs_of(family, c)
     end do
-    call resize(family, model, n)
-    !$omp parallel do schedule(dynamic, 32) default(none) shared(family, model, weights) &
-    !$omp private(work, c)
-    do c = 1, size(family%plain)
-      if (weights%of(c) > 0_i4 .or. family%stored(c) == 0_i8) cycle
-      call weights_of(family, model, c, work)
-      call put_weights(model, work, family%stored(c), family)
+    call resize(model, n, workspace)
+    !$omp parallel do schedule(dynamic, 32) default(none) &
+    !$omp shared(family, model, weights, workspace) private(work, c)
+    do c = 1, size(workspace%plain)
+      if (weights%of(c) > 0_i4 .or. workspace%stored(c) == 0_i8) cycle
+      call weights_of(family, model, workspace, c, work)
+      call put_weights(model, work, workspace%stored(c), workspace)
     end do
   end subroutine store_own_weights
 
   !> Store the shapes that clusters have.
-  subroutine store_shapes(family, shapes)
-    type(list_family_type), intent(inout) :: family
+  subroutine store_shapes(family, shapes, workspace)
+    type(list_family_type), intent(in) :: family
     type(kinds_type), intent(in) :: shapes
+    type(list_workspace_type), intent(inout) :: workspace
     integer(i8), allocatable :: place(:)
     integer(i8) :: n, e, s
     integer :: c, i
 
     allocate (place(size(shapes%first)), source=0_i8)
     n = 0_i8
-    do c = 1, size(family%plain)
+    do c = 1, size(workspace%plain)
       i = int(shapes%of(c))
       if (i == 0) cycle
       if (place(i) == 0_i8) then
         place(i) = n + 1
         n = n + columns(family)*packs_of(family, c)
       end if
-      family%shape(c) = place(i)
+      workspace%shape(c) = place(i)
     end do
-    deallocate (family%geometry)
-    allocate (family%geometry(lanes, n))
+    deallocate (workspace%geometry)
+    allocate (workspace%geometry(lanes, n))
     do i = 1, size(place)
       if (place(i) == 0_i8) cycle
       c = int(shapes%first(i))
       do e = family%start(c), family%start(c + 1) - 1
         s = place(i) + columns(family)*(e - family%start(c))
-        call geometry_of(family, c, e, family%geometry(:, s:s + columns(family) - 1))
+        call geometry_of(family, c, e, workspace%geometry(:, s:s + columns(family) - 1))
       end do
     end do
   end subroutine store_shapes
 
   !> Room for `n` packs of weights; those that are there stay.
-  subroutine resize(family, model, n)
-    type(list_family_type), intent(inout) :: family
+  subroutine resize(model, n, workspace)
     type(model_type), intent(in) :: model
     integer(i8), intent(in) :: n
+    type(list_workspace_type), intent(inout) :: workspace
     real(wp), allocatable :: longer(:, :)
     integer(i8) :: m
 
-    m = size(family%weight_S, 2, kind=i8)
+    m = size(workspace%weight_S, 2, kind=i8)
     if (n == m) return
     allocate (longer(lanes, n))
-    longer(:, :m) = family%weight_S
-    call move_alloc(longer, family%weight_S)
+    longer(:, :m) = workspace%weight_S
+    call move_alloc(longer, workspace%weight_S)
     if (.not. model%dilatation) return
     allocate (longer(lanes, n))
-    longer(:, :m) = family%weight_D
-    call move_alloc(longer, family%weight_D)
+    longer(:, :m) = workspace%weight_D
+    call move_alloc(longer, workspace%weight_D)
   end subroutine resize
 
   !> Turn to cluster `c` and fill the tables of `work`.
-  subroutine weights_of(family, model, c, work)
+  subroutine weights_of(family, model, workspace, c, work)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(list_workspace_type), intent(in) :: workspace
     integer, intent(in) :: c
     type(work_type), intent(inout) :: work
 
-    call take_up(family, c, work)
-    call fill_tables(family, model, family%bits(family%start(c):family%start(c + 1) - 1), &
-      & .false., work)
+    call take_up(family, workspace, c, work)
+    call fill_tables(family, model, workspace, &
+      & family%bits(family%start(c):family%start(c + 1) - 1), .false., work)
     ! (q_k + q_j) Gb vc V |xi|
     work%stretch(:, :work%n) = work%stretch(:, :work%n)/work%geometry(:, :work%n)
   end subroutine weights_of
 
   !> Put the weights that `work` has at `place`.
-  subroutine put_weights(model, work, place, family)
+  subroutine put_weights(model, work, place, workspace)
     type(model_type), intent(in) :: model
     type(work_type), intent(in) :: work
     integer(i8), intent(in) :: place
-    type(list_family_type), intent(inout) :: family
+    type(list_workspace_type), intent(inout) :: workspace
 
     associate (last => place + work%n - 1)
-      family%weight_S(:, place:last) = work%stretch(:, :work%n)
-      if (model%dilatation) family%weight_D(:, place:last) = work%dilatation(:, :work%n)
+      workspace%weight_S(:, place:last) = work%stretch(:, :work%n)
+      if (model%dilatation) workspace%weight_D(:, place:last) = work%dilatation(:, :work%n)
     end associate
   end subroutine put_weights
 
   !> Whether the weights at `place` are those that `work` has, but for a part `off` of the greatest.
-  pure logical function same_weights(family, model, work, place, off)
-    type(list_family_type), intent(in) :: family
+  pure logical function same_weights(model, workspace, work, place, off)
     type(model_type), intent(in) :: model
+    type(list_workspace_type), intent(in) :: workspace
     type(work_type), intent(in) :: work
     integer(i8), intent(in) :: place
     real(wp), intent(in) :: off
 
     associate (n => work%n, last => place + work%n - 1)
-      same_weights = maxval(abs(work%stretch(:, :n) - family%weight_S(:, place:last))) &
+      same_weights = maxval(abs(work%stretch(:, :n) - workspace%weight_S(:, place:last))) &
         & <= off*maxval(abs(work%stretch(:, :n)))
       if (.not. (model%dilatation .and. same_weights)) return
-      same_weights = maxval(abs(work%dilatation(:, :n) - family%weight_D(:, place:last))) &
+      same_weights = maxval(abs(work%dilatation(:, :n) - workspace%weight_D(:, place:last))) &
         & <= off*maxval(work%dilatation(:, :n))
     end associate
   end function same_weights
@@ -417,8 +421,8 @@ contains
     geometry = 0.0_wp
     square = 0.0_wp
     do d = 1, family%dim
-      geometry(:, d) = merge(merge(family%at(d, j), family%at(d, m), from) &
-        & - family%at(d, k + 1:k + lanes), 0.0_wp, there)
+      geometry(:, d) = merge(merge(family%x(d, j), family%x(d, m), from) &
+        & - family%x(d, k + 1:k + lanes), 0.0_wp, there)
       square = square + geometry(:, d)**2
     end do
     geometry(:, columns(family)) = 2/merge(square, 2.0_wp, there)

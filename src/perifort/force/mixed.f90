@@ -9,13 +9,14 @@ module pd_force_mixed
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, sp, i8
   use pd_base_lanes, only: lanes
-  use pd_family_lattice, only: lattice_family_type, weights_type
+  use pd_family_lattice, only: lattice_family_type
   use pd_force_model, only: no_dilatation, projected, unprojected
   use pd_force_polynomial, only: narrow, wide, single, h0, h1, h2, h3, h4, h5, h6, h7, &
     & w0, w1, w2, w3, w4, w5, w6, w7, w8, w9, w10, w11, k0, k1, k2, k3, k4, k5, &
     & g0, g1, g2, g3, g4, g5, g6, g7, v0, v1, v2, v3, v4, v5, v6, v7, v8, v9, v10, v11, &
     & s0, s1, s2, s3, s4, s5
   use pd_force_singles, only: unit
+  use pd_force_workspace, only: singles_type, weights_type
   implicit none (type, external)
   private
   public :: mixed_dilatation, mixed_force
@@ -25,9 +26,10 @@ contains
   !> theta of the `n` first offsets' bonds of the block at slot `first`: in 3D added to the sums in
   !> single precision, in 2D into `theta` (n_slots). `limit`, `left` and `missed` as in
   !> `fast_dilatation`; in 2D, what was set is wrong if some bonds were `missed`.
-  subroutine mixed_dilatation(family, kind, n, limit, weights, first, theta, left, missed)
-    type(lattice_family_type), intent(inout) :: family
-      !! in mixed precision, displacements split; its sums are added to in 3D
+  subroutine mixed_dilatation(family, singles, kind, n, limit, weights, first, theta, left, missed)
+    type(lattice_family_type), intent(in) :: family  !! in mixed precision
+    type(singles_type), intent(inout) :: singles
+      !! displacements split; the sums are added to in 3D
     integer, intent(in) :: kind  !! of the dilatation: `projected` or `unprojected`
     integer, intent(in) :: n                   !! offsets whose bonds are taken
     real(wp), intent(in) :: limit              !! of |e|, beyond which bonds are left out [-]
@@ -41,7 +43,7 @@ contains
     integer(i8) :: last
 
     missed = .true.
-    associate (w => weights, s => family%singles, slots => family%n_slots)
+    associate (w => weights, s => singles, slots => family%n_slots)
       select case (family%dim + 10*kind)
       case (3 + 10*projected)
         call single_theta_projected_3(n, w%single_dilatation, w%shift, w%single_geometry, first, &
@@ -65,9 +67,10 @@ contains
   end subroutine mixed_dilatation
 
   !> The same for forces: in 3D added to the sums, in 2D into `force` (n_slots, dim).
-  subroutine mixed_force(family, kind, n, limit, weights, first, force, left, missed)
-    type(lattice_family_type), intent(inout) :: family
-      !! in mixed precision, displacements split; its sums are added to in 3D
+  subroutine mixed_force(family, singles, kind, n, limit, weights, first, force, left, missed)
+    type(lattice_family_type), intent(in) :: family  !! in mixed precision
+    type(singles_type), intent(inout) :: singles
+      !! displacements split, p rounded; the sums are added to in 3D
     integer, intent(in) :: kind  !! of the dilatation, `no_dilatation` included
     integer, intent(in) :: n                   !! offsets whose bonds are taken
     real(wp), intent(in) :: limit
@@ -81,7 +84,7 @@ contains
     logical, intent(out) :: missed             !! some bonds are strained beyond `limit`
 
     missed = .true.
-    associate (w => weights, s => family%singles, slots => family%n_slots)
+    associate (w => weights, s => singles, slots => family%n_slots)
       select case (family%dim + 10*kind)
       case (3 + 10*no_dilatation)
         call single_force_bonds_3(n, w%single_dilatation, w%single_stretch, w%shift, &

@@ -2,7 +2,7 @@
 !> threads of a parallel region, which wait for each other at the end.
 module pd_force_singles
   use pd_base_kinds, only: wp, sp, i8
-  use pd_family_lattice, only: lattice_family_type
+  use pd_force_workspace, only: singles_type
   implicit none (type, external)
   private
   public :: split_displacements, round_dilatation, clear_sums, add_sums, unit
@@ -18,8 +18,8 @@ contains
 
   !> u = unit*high + low, each in single precision, to 47 bits. The leading digits are cut out as
   !> bits: a compiler that may simplify takes a difference from a rounded value for zero.
-  subroutine split_displacements(family, u)
-    type(lattice_family_type), intent(inout) :: family  !! in mixed precision; gets `high` and `low`
+  subroutine split_displacements(singles, u)
+    type(singles_type), intent(inout) :: singles        !! gets `high` and `low`
     real(wp), intent(in), contiguous :: u(:, :)         !! (n_slots, dim) displacements [m]
     real(wp) :: high
     integer :: k, c
@@ -28,42 +28,41 @@ contains
       !$omp do simd schedule(static) private(high)
       do k = 1, size(u, 1)
         high = transfer(iand(transfer(u(k, c), 0_i8), leading), 0.0_wp)
-        family%singles%high(k, c) = real(high/unit, sp)
-        family%singles%low(k, c) = real(u(k, c) - high, sp)
+        singles%high(k, c) = real(high/unit, sp)
+        singles%low(k, c) = real(u(k, c) - high, sp)
       end do
     end do
   end subroutine split_displacements
 
   !> The dilatation's coefficients `p` (n_slots) in single precision.
-  subroutine round_dilatation(family, p)
-    type(lattice_family_type), intent(inout) :: family
-      !! in mixed precision; gets `p`, times its unit of volume
+  subroutine round_dilatation(singles, p)
+    type(singles_type), intent(inout) :: singles  !! gets `p`, times its unit of volume
     real(wp), intent(in), contiguous :: p(:)  !! (n_slots) 2 a d delta theta [N/m5]
     integer :: k
 
     !$omp do simd schedule(static)
     do k = 1, size(p)
-      family%singles%p(k) = real(family%singles%volume*p(k), sp)
+      singles%p(k) = real(singles%volume*p(k), sp)
     end do
   end subroutine round_dilatation
 
   !> Set the first `n` sums to zero.
-  subroutine clear_sums(family, n)
-    type(lattice_family_type), intent(inout) :: family  !! in mixed precision
+  subroutine clear_sums(singles, n)
+    type(singles_type), intent(inout) :: singles  !! its sums are set
     integer, intent(in) :: n  !! number of sums: 1 for theta, dim for forces
     integer :: k, c
 
     do c = 1, n
       !$omp do simd schedule(static)
-      do k = 1, family%n_slots
-        family%singles%sums(k, c) = 0.0_sp
+      do k = 1, size(singles%sums, 1)
+        singles%sums(k, c) = 0.0_sp
       end do
     end do
   end subroutine clear_sums
 
   !> Add the `c`-th sum, times `unit`, to `values` (n_slots).
-  subroutine add_sums(family, c, unit, values)
-    type(lattice_family_type), intent(in) :: family   !! in mixed precision, with complete sums
+  subroutine add_sums(singles, c, unit, values)
+    type(singles_type), intent(in) :: singles         !! with complete sums
     integer, intent(in) :: c                          !! number of the sum
     real(wp), intent(in) :: unit                      !! of the sum
     real(wp), intent(inout), contiguous :: values(:)  !! (n_slots) added to
@@ -71,7 +70,7 @@ contains
 
     !$omp do simd schedule(static)
     do k = 1, size(values)
-      values(k) = values(k) + unit*real(family%singles%sums(k, c), wp)
+      values(k) = values(k) + unit*real(singles%sums(k, c), wp)
     end do
   end subroutine add_sums
 

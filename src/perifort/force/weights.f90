@@ -2,16 +2,18 @@
 !> neighbouring slots. Blocks whose surroundings are alike share them, so that surface
 !> correction costs nothing in a step and next to no memory.
 module pd_force_weights
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_lanes, only: lanes, word_bits
   use pd_base_lookup, only: lookup_type, mix
-  use pd_family_lattice, only: lattice_family_type, weights_type, use_double, grid_at, both_ends
+  use pd_family_lattice, only: lattice_family_type, use_double, grid_at, both_ends
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: model_type, options_of
   use pd_force_polynomial, only: fast_limit, narrow, single
+  use pd_force_workspace, only: lattice_workspace_type, singles_type, weights_type
   implicit none (type, external)
   private
-  public :: build_weights, block_weights, allocate_weights, weights_now, half_of
+  public :: build_weights, prepare_blocks, block_weights, allocate_weights, weights_now, half_of
 
   integer(i8), parameter :: bytes_per_slot = 100_i8  !! that tables may take beside their room
 
@@ -20,10 +22,11 @@ contains
   !> Find the blocks that are alike and make the weights of each kind, those that most blocks share
   !> first. When the kinds become too many (a lattice full of random holes), blocks of the others
   !> make theirs in every pass.
-  subroutine build_weights(family, model)
+  subroutine build_weights(family, model, workspace)
     type(lattice_family_type), intent(inout) :: family
-      !! whole; gets its tables, and loses mixed precision where the model has no such loops
+      !! whole; loses its classes, and mixed precision where the model has no such loops
     type(model_type), intent(in) :: model  !! complete, with surface factors
+    type(lattice_workspace_type), intent(inout) :: workspace  !! gets the tables
     integer(i8), allocatable :: first(:), first_of_table(:)
     integer(i4), allocatable :: table_of(:)
     integer, allocatable :: uses(:), order(:)
@@ -33,16 +36,16 @@ contains
 
     if (fast_limit(model, options_of(model), merge(single, narrow, family%mixed)) <= 0.0_wp) &
       & call use_double(family)
-    if (family%mixed) call allocate_singles(family, model)
+    call prepare_blocks(family, model, workspace)
     ! without surface factors, members farther away than a block's own do not count
     if (.not. model%surface) family%class_of = merge(int(model%material, i4), 0_i4, &
       & family%alive == 1_i1)
-    call find_kinds(family, first, uses)
+    call find_kinds(family, workspace, first, uses)
     order = most_used_first(uses)
     allocate (table(size(uses)), first_of_table(size(uses)), table_of(0:size(uses)))
     table_of = 0_i4
     bytes = 0_i8
-    most = family%room + bytes_per_slot*family%n_slots
+    most = workspace%room + bytes_per_slot*family%n_slots
     made = 0
     do i = 1, size(order)
       associate (from => first(order(i)))
@@ -57,16 +60,34 @@ contains
       table_of(order(i)) = int(made, i4)
     end do
     do b = 1, size(family%block)
-      family%weights(b) = table_of(family%weights(b))
+      workspace%weights(b) = table_of(workspace%weights(b))
     end do
-    family%table = table(:made)
-    call compare_surroundings(family, first_of_table)
+    workspace%table = table(:made)
+    call compare_surroundings(family, first_of_table, workspace)
     deallocate (family%class_of)  ! it has done its work
   end subroutine build_weights
 
-  !> Number the kinds of blocks by their surroundings, into `family%weights`.
-  subroutine find_kinds(family, first, uses)
-    type(lattice_family_type), intent(inout) :: family
+  !> Room for what is kept of each block, if there is none: blocks make their weights in every pass
+  !> as long as nobody has built tables of them.
+  subroutine prepare_blocks(family, model, workspace)
+    type(lattice_family_type), intent(in) :: family  !! in the precision that it keeps
+    type(model_type), intent(in) :: model            !! whether there is a dilatation
+    type(lattice_workspace_type), intent(inout) :: workspace  !! unchanged if it has room
+
+    if (allocated(workspace%weights)) then
+      if (size(workspace%weights) /= size(family%block)) &
+        & call internal_fault('a workspace of another family')
+      return
+    end if
+    allocate (workspace%weights(size(family%block)), source=0_i4)
+    allocate (workspace%served(size(family%block)), source=0_i1)
+    if (family%mixed) call allocate_singles(family, model, workspace%singles)
+  end subroutine prepare_blocks
+
+  !> Number the kinds of blocks by their surroundings, into `weights` of the workspace.
+  subroutine find_kinds(family, workspace, first, uses)
+    type(lattice_family_type), intent(in) :: family
+    type(lattice_workspace_type), intent(inout) :: workspace
     integer(i8), allocatable, intent(out) :: first(:)  !! first slot of the first block of each kind
     integer, allocatable, intent(out) :: uses(:)       !! blocks of each kind
     type(lookup_type) :: kinds
@@ -86,7 +107,7 @@ contains
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(iand(key, family%key_bits), number, is_new)
-      family%weights(b) = int(number, i4)
+      workspace%weights(b) = int(number, i4)
       if (is_new) first(number) = family%block(b)
       uses(number) = uses(number) + 1
     end do
@@ -124,16 +145,17 @@ contains
   !> A key of 64 bits hardly ever belongs to two kinds of blocks. Where it does, blocks that look
   !> another way than the one that their table was made for, by its `first` slot, make their weights
   !> in every pass.
-  subroutine compare_surroundings(family, first)
-    type(lattice_family_type), intent(inout) :: family
+  subroutine compare_surroundings(family, first, workspace)
+    type(lattice_family_type), intent(in) :: family
     integer(i8), intent(in) :: first(:)
+    type(lattice_workspace_type), intent(inout) :: workspace
     integer :: b
 
-    !$omp parallel do schedule(static) default(none) shared(family, first) private(b)
+    !$omp parallel do schedule(static) default(none) shared(family, first, workspace) private(b)
     do b = 1, size(family%block)
-      if (family%weights(b) == 0_i4) cycle
-      if (.not. alike_blocks(family, family%block(b), first(family%weights(b)))) &
-        & family%weights(b) = 0_i4
+      if (workspace%weights(b) == 0_i4) cycle
+      if (.not. alike_blocks(family, family%block(b), first(workspace%weights(b)))) &
+        & workspace%weights(b) = 0_i4
     end do
   end subroutine compare_surroundings
 
@@ -198,19 +220,24 @@ contains
   end subroutine column_keys
 
   !> What the loops in mixed precision work on; the first pass fills it.
-  pure subroutine allocate_singles(family, model)
-    type(lattice_family_type), intent(inout) :: family
+  pure subroutine allocate_singles(family, model, singles)
+    type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
+    type(singles_type), intent(inout) :: singles
     integer :: n
 
     n = family%n_slots
-    associate (singles => family%singles)
-      singles%volume = 2.0_wp**exponent(maxval(family%grids%cell_volume))
-      allocate (singles%high(n, family%dim), singles%low(n, family%dim))
-      allocate (singles%p(merge(n, 0, model%dilatation)))
-      allocate (singles%sums(merge(n, 0, both_ends(family%dim, family%mixed)), family%dim))
-    end associate
+    singles%volume = volume_unit(family)
+    allocate (singles%high(n, family%dim), singles%low(n, family%dim))
+    allocate (singles%p(merge(n, 0, model%dilatation)))
+    allocate (singles%sums(merge(n, 0, both_ends(family%dim, family%mixed)), family%dim))
   end subroutine allocate_singles
+
+  !> The unit of volumes in single precision, a power of 2 [m3].
+  pure real(wp) function volume_unit(family)
+    type(lattice_family_type), intent(in) :: family
+    volume_unit = 2.0_wp**exponent(maxval(family%grids%cell_volume))
+  end function volume_unit
 
   !> Room for the weights of any block.
   pure subroutine allocate_weights(family, model, weights)
@@ -277,7 +304,7 @@ contains
     weights%single_geometry(:, :m) = real(weights%geometry(:, :m), sp)
     weights%single_stretch(:, :m) = real(weights%stretch(:, :m), sp)
     if (model%dilatation) weights%single_dilatation(:, :m) = &
-      & real(weights%dilatation(:, :m)/family%singles%volume, sp)
+      & real(weights%dilatation(:, :m)/volume_unit(family), sp)
   end subroutine block_weights
 
   !> Give back the room of offsets that were left out, and of the precision that is not needed.
@@ -302,9 +329,10 @@ contains
   end subroutine trim_weights
 
   !> The weights of a block as its bonds are now, those of broken bonds 0.
-  pure subroutine weights_now(family, model, b, weights)
-    type(lattice_family_type), intent(in) :: family  !! with its tables
+  pure subroutine weights_now(family, model, workspace, b, weights)
+    type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the tables were made for
+    type(lattice_workspace_type), intent(in) :: workspace  !! with tables, if there are any
     integer, intent(in) :: b                         !! number of the block
     type(weights_type), intent(inout) :: weights
       !! those of this block on return; gets room if it has none
@@ -314,8 +342,8 @@ contains
 
     first = family%block(b)
     if (.not. allocated(weights%offset)) call allocate_weights(family, model, weights)
-    if (family%weights(b) > 0) then
-      associate (shared => family%table(family%weights(b)))
+    if (workspace%weights(b) > 0) then
+      associate (shared => workspace%table(workspace%weights(b)))
         n = shared%n
         weights%n = n
         weights%n_forward = shared%n_forward
@@ -374,7 +402,7 @@ contains
     half%geometry(:, :n) = weights%geometry(:, :n)
     half%stretch(:, :n) = weights%single_stretch(skipped + 1:skipped + lanes, :n)
     if (size(weights%single_dilatation) > 0) half%dilatation(:, :n) = &
-      & family%singles%volume*weights%single_dilatation(skipped + 1:skipped + lanes, :n)
+      & volume_unit(family)*weights%single_dilatation(skipped + 1:skipped + lanes, :n)
   end subroutine half_of
 
 end module pd_force_weights

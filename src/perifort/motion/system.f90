@@ -10,6 +10,7 @@ module pd_motion_system
   use pd_force_model, only: model_type, options_of
   use pd_force_reference, only: point_dilatation, point_force
   use pd_force_term, only: term_list_type, term_view_type
+  use pd_force_workspace, only: workspace_type
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
     & moved_by_velocity, number_of_loads, load_of
   use pd_motion_heating, only: heating_type, heat, apply_factors
@@ -35,6 +36,7 @@ module pd_motion_system
     type(body_type) :: body
     class(family_type), allocatable :: family
     type(model_type) :: model
+    type(workspace_type) :: workspace           !! what the force loops keep, of this model
     type(state_type) :: state
     type(motion_type), allocatable :: motions(:)
     type(term_list_type) :: terms               !! what acts beside the bonds: loads first
@@ -196,7 +198,7 @@ contains
     if (now /= after_marks) call share_halo(system%body, system%state%u)
     associate (state => system%state)
       call internal_force(system%body, system%family, system%model, options_of(system%model), &
-        & state%u, state%p, state%force, system%strained, now)
+        & system%workspace, state%u, state%p, state%force, system%strained, now)
     end associate
     if (system%terms%inside == 0 .or. now == up_to_marks) return
     call view_of(system, t, view)
@@ -543,7 +545,7 @@ contains
     real(wp), allocatable :: density(:)
 
     allocate (density(system%body%n_slots))
-    call energy_pass(system%family, system%model, system%state%u, density)
+    call energy_pass(system%family, system%model, system%workspace, system%state%u, density)
     energy = inner(system%body%order, density, system%body%volume)
   end function strain_energy
 
@@ -623,7 +625,7 @@ contains
   !> `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
     type(system_type), intent(inout), target :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     real(wp), intent(in) :: v(:, :)               !! (n_slots, dim) [m/s]
     type(energies_type), intent(out) :: energies  !! those of this instant
     real(wp), allocatable :: density(:), mass(:)

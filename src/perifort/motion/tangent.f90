@@ -7,6 +7,7 @@ module pd_motion_tangent
   use pd_body_body, only: share_halo
   use pd_force_forces, only: internal_force
   use pd_force_model, only: force_options_type, model_type, options_of
+  use pd_force_workspace, only: workspace_type
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -44,15 +45,16 @@ contains
   !> An undeformed body without temperature change costs one evaluation of the forces, and the
   !> result is exact but for rounding. Elsewhere two evaluations make a central difference: some ten
   !> digits remain where displacements are as large as the spacing, more where they are smaller.
-  subroutine apply_tangent(system, u, w, kw, options, model)
+  subroutine apply_tangent(system, u, w, kw, options, model, workspace)
     type(system_type), intent(inout) :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     real(wp), intent(in), contiguous :: u(:, :)                !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: w(:, :)  !! (n_slots, dim) direction, of any length [m]
     real(wp), intent(inout), contiguous :: kw(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     type(force_options_type), intent(in), optional :: options  !! of the forces; the model's own by
                                                                !! default
     type(model_type), intent(in), optional :: model            !! the system's by default
+    type(workspace_type), intent(inout), optional :: workspace !! of `model`, given with it
     type(tangent_type) :: tangent
     real(wp), allocatable :: moved(:, :)
     real(wp) :: length, strain, spacing
@@ -79,14 +81,14 @@ contains
       tangent%options%projected = .false.
       tangent%options%double = .true.
     end if
-    call tangent_product(system, tangent, u, w, kw, moved, model=model)
+    call tangent_product(system, tangent, u, w, kw, moved, model=model, workspace=workspace)
   end subroutine apply_tangent
 
   !> `kw` = minus the difference of the internal force densities in the direction `w`, formed as
   !> `tangent` says: the one product with a stiffness.
-  subroutine tangent_product(system, tangent, u, w, kw, moved, forces, model)
+  subroutine tangent_product(system, tangent, u, w, kw, moved, forces, model, workspace)
     type(system_type), intent(inout) :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     type(tangent_type), intent(in) :: tangent
       !! kind of the difference, its step and what the forces take in
     real(wp), intent(in), contiguous :: u(:, :)          !! where; 0 if `at_rest` [m]
@@ -96,6 +98,7 @@ contains
     real(wp), intent(in), contiguous, optional :: forces(:, :)  !! those at `u`, for `one_sided`
                                                                 !! differences [N/m3]
     type(model_type), intent(in), optional :: model      !! the system's by default
+    type(workspace_type), intent(inout), optional :: workspace  !! of `model`, given with it
     real(wp), allocatable :: behind(:, :)
 
     associate (step => tangent%step, options => tangent%options)
@@ -104,24 +107,24 @@ contains
         if (abs(step - 1) > 0.0_wp) then
           call make_room()
           call displace(u, step, w, moved)
-          call forces_at(system, moved, kw, options, model)
+          call forces_at(system, moved, kw, options, model, workspace)
         else
-          call forces_at(system, w, kw, options, model)
+          call forces_at(system, w, kw, options, model, workspace)
         end if
         call multiply(-1/step, kw)
       case (one_sided)
         if (.not. present(forces)) call internal_fault('a one-sided difference without its side')
         call make_room()
         call displace(u, step, w, moved)
-        call forces_at(system, moved, kw, options, model)
+        call forces_at(system, moved, kw, options, model, workspace)
         call one_sided_difference(1/step, forces, kw)
       case (central)
         allocate (behind(size(w, 1), size(w, 2)))
         call make_room()
         call displace(u, -step, w, moved)
-        call forces_at(system, moved, behind, options, model)
+        call forces_at(system, moved, behind, options, model, workspace)
         call displace(u, step, w, moved)
-        call forces_at(system, moved, kw, options, model)
+        call forces_at(system, moved, kw, options, model, workspace)
         call central_difference(-1/(2*step), behind, kw)
       case default
         call internal_fault('a tangent by an unknown difference')
@@ -137,32 +140,34 @@ contains
 
   !> Internal force density at displacements `u`. The marks of strained slots, which bond breaking
   !> looks at, and the dilatation of the system's own state are left alone.
-  subroutine forces_at(system, u, force, options, model)
+  subroutine forces_at(system, u, force, options, model, workspace)
     type(system_type), intent(inout) :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     real(wp), intent(in), contiguous :: u(:, :)                !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: force(:, :)
       !! (n_slots, dim) set for all slots, terms not included [N/m3]
     type(force_options_type), intent(in), optional :: options  !! the model's own by default
     type(model_type), intent(in), optional :: model            !! the system's by default
+    type(workspace_type), intent(inout), optional :: workspace !! of `model`, given with it
     real(wp), allocatable :: shared(:, :)
 
     if (associated(system%body%order%ranks)) then
       shared = u
       call share_halo(system%body, shared)
-      call own_forces_at(system, shared, force, options, model)
+      call own_forces_at(system, shared, force, options, model, workspace)
     else
-      call own_forces_at(system, u, force, options, model)
+      call own_forces_at(system, u, force, options, model, workspace)
     end if
   end subroutine forces_at
 
   !> The same where displacements of points that other processes own are known.
-  subroutine own_forces_at(system, u, force, options, model)
+  subroutine own_forces_at(system, u, force, options, model, workspace)
     type(system_type), intent(inout) :: system
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: force(:, :)
     type(force_options_type), intent(in), optional :: options
     type(model_type), intent(in), optional :: model
+    type(workspace_type), intent(inout), optional :: workspace
     type(force_options_type) :: taken
     real(wp), allocatable :: p(:)
     integer(i1), allocatable :: strained(:)
@@ -175,10 +180,12 @@ contains
     end associate
     force = 0.0_wp  ! the passes leave out slots far from any point
     if (present(model)) then
-      call internal_force(system%body, system%family, model, taken, u, p, force, strained)
-    else
-      call internal_force(system%body, system%family, system%model, taken, u, p, force, &
+      if (.not. present(workspace)) call internal_fault('another model without its workspace')
+      call internal_force(system%body, system%family, model, taken, workspace, u, p, force, &
         & strained)
+    else
+      call internal_force(system%body, system%family, system%model, taken, system%workspace, u, &
+        & p, force, strained)
     end if
   end subroutine own_forces_at
 

@@ -5,6 +5,7 @@ module pd_set_up_conditions
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, load_group, is_set
+  use pd_scene_groups_course, only: ramp_of
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
   use pd_body_shapes, only: inside
@@ -212,25 +213,23 @@ contains
     number = 0
   end function body_number
 
-  !> How a condition varies in time; in relaxation, without other word, it grows over the load
-  !> steps.
+  !> How a condition varies in time.
   function course(scene, ramp_time, times, values) result(curve)
     type(scene_type), intent(in) :: scene
     real(wp), intent(in) :: ramp_time
     real(wp), allocatable, intent(in) :: times(:), values(:)
     type(curve_type) :: curve
+    real(wp) :: length
     logical :: tabulated
 
     tabulated = allocated(times)
     if (tabulated) tabulated = size(times) > 0
     if (tabulated) then
       curve = table_curve(times, values)
-    else if (is_set(ramp_time)) then
-      curve = ramp(ramp_time)
-    else if (scene%time%method == 'relaxation') then
-      curve = ramp(1.0_wp)
     else
+      length = ramp_of(scene%time%method, ramp_time)
       curve = constant_curve()
+      if (is_set(length)) curve = ramp(length)
     end if
   end function course
 

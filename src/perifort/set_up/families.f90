@@ -62,14 +62,14 @@ contains
     end if
   end subroutine make_family
 
-  !> What a family keeps of the model: the weights of its bonds.
+  !> What the force loops keep of the model: the weights of the bonds.
   subroutine finish_family(system)
-    type(system_type), intent(inout) :: system  !! with its model; its family gets the weights
+    type(system_type), intent(inout) :: system  !! with its model; its workspace is made
     select type (family => system%family)
     type is (lattice_family_type)
-      call build_weights(family, system%model)
+      call build_weights(family, system%model, system%workspace%lattice)
     type is (list_family_type)
-      call prepare_list(family, system%model)
+      call prepare_list(family, system%model, system%workspace%list)
     class default
       call internal_fault('finish_family does not know a kind of family')
     end select

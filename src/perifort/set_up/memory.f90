@@ -36,7 +36,7 @@ contains
     type(scene_type), intent(in) :: scene  !! a checked scene
     real(wp), parameter :: program = 20.0e6_wp                          !! without points
     real(wp), parameter :: per_point(3) = [165.0_wp, 280.0_wp, 500.0_wp]  !! in 1D, 2D, 3D
-    real(wp), parameter :: per_list_point = 60.0_wp, per_list_bond = 1.0_wp  !! bits and members
+    real(wp), parameter :: per_list_point = 90.0_wp, per_list_bond = 1.0_wp  !! bits and members
     real(wp), parameter :: per_exact_bond = 16.0_wp                     !! partial volumes of lists
     real(wp), parameter :: per_weight = 16.0_wp                         !! tables of lattices
     real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded

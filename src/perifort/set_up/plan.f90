@@ -5,6 +5,7 @@ module pd_set_up_plan
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_groups_relaxation, only: safety_of
   use pd_motion_static_relaxation, only: relaxation_type
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
     & stable_step_of, may_be_unstable, lowest_eigenvalue
@@ -19,7 +20,6 @@ module pd_set_up_plan
 
   !> Of the square of the largest frequency; the step is at most half of it less than the largest.
   real(wp), parameter :: accuracy = 0.01_wp
-  real(wp), parameter :: default_safety = 5.0_wp  !! of the masses that are not stable by themselves
 
   type :: plan_type
     logical :: relaxes = .false.
@@ -51,7 +51,7 @@ contains
     real(wp) :: stiffness, damping  ! of the terms of the force, over the density
 
     allocate (bound(system%body%n_slots))
-    call stiffness_bound(system%body, system%family, system%model, bound)
+    call stiffness_bound(system%body, system%family, system%model, system%workspace, bound)
     plan%relaxes = scene%time%method == 'relaxation'
     plan%integrator = trim(scene%time%integrator)
     if (.not. any(bound > 0.0_wp)) then
@@ -173,9 +173,7 @@ contains
     relaxation%maximum_iterations = scene%relaxation%maximum_iterations
     relaxation%tolerance = scene%relaxation%tolerance
     allocate (relaxation%mass(system%body%n_slots, system%body%dim), source=0.0_wp)
-    safety = default_safety
-    if (scene%relaxation%density_matrix == 'frame_invariant') safety = 1.0_wp
-    if (is_set(scene%relaxation%safety)) safety = scene%relaxation%safety
+    safety = safety_of(scene%relaxation)
     select case (scene%relaxation%density_matrix)
     case ('chapter')
       call chapter_stiffness(system%body, system%family, system%model, relaxation%mass)

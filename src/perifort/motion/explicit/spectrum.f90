@@ -7,18 +7,15 @@
 !> it does not harm the value itself nor its residual (C. C. Paige, J. Inst. Maths Applics 18 (1976)
 !> 341).
 module pd_motion_explicit_spectrum
-  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_base_numbers, only: pi
   use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, noise_after
   use pd_body_body, only: owned
   use pd_body_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_family_lattice, only: lattice_family_type
-  use pd_family_list, only: list_family_type
   use pd_family_surface, only: bond_factor
-  use pd_force_list, only: forget_model
   use pd_force_model, only: force_options_type, model_type, options_of
+  use pd_force_workspace, only: workspace_type
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   implicit none (type, external)
@@ -55,14 +52,15 @@ contains
   !> Appl. 13 (1992) 1094): for a random start vector, the chance that the value found is more than
   !> eps below the largest is at most 1.648 sqrt(n) exp(-sqrt(eps) (2 m - 1)) after m steps. The
   !> start vector is random, yet always the same, and so is the result, on any number of threads.
-  subroutine largest_frequency(system, accuracy, spectrum, options, model)
+  subroutine largest_frequency(system, accuracy, spectrum, options, model, workspace)
     type(system_type), intent(inout) :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     real(wp), intent(in) :: accuracy              !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum               !! what was found
     type(force_options_type), intent(in), optional :: options  !! of the forces; the model's own by
                                                                !! default
     type(model_type), intent(in), optional :: model            !! the system's by default
+    type(workspace_type), intent(inout), optional :: workspace !! of `model`, given with it
     real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :)
     real(wp), allocatable :: diagonal(:), beside(:)
     type(force_options_type) :: taken
@@ -84,7 +82,7 @@ contains
     length = length_of(system, now)
     do m = 1, most_evaluations
       call recur(system, taken, system%state%u, scale, length, now, before, w, kw, diagonal(m), &
-        & beside(m), model)
+        & beside(m), model, workspace)
       length = beside(m)
       spectrum%evaluations = m
       ! a length of rounding: the vectors so far hold all that the start vector consists of
@@ -108,7 +106,7 @@ contains
   !> the step, and a lattice keeps the tables of its weights.
   subroutine lasting_frequency(system, accuracy, spectrum)
     type(system_type), intent(inout) :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     real(wp), intent(in) :: accuracy               !! of omega^2, relative
     type(spectrum_type), intent(out) :: spectrum   !! `squared` and `residual` of the bound
     real(wp), parameter :: alike = 1.01_wp         !! one material's largest beta over another's
@@ -143,7 +141,8 @@ contains
   !> The largest frequency with the stiffness q of every slot times its `share`, rounded up by at
   !> most half a per cent (by more where that makes too many materials): slots of one material and
   !> of shares that are rounded to one number have a material of their own in a copy of the model,
-  !> with which a lattice makes its weights anew in every pass.
+  !> which has a workspace of its own: without tables, since they would be many, so that a lattice
+  !> makes its weights anew in every pass.
   subroutine stiffened_frequency(system, share, options, accuracy, spectrum)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: share(:)               !! at least 1 (n_slots) [-]
@@ -154,7 +153,7 @@ contains
     real(wp) :: grain                              !! one rounded share over the next smaller one
     type(model_type) :: stiffened
     type(material_type), allocatable :: finer(:)
-    integer(i4), allocatable :: tables(:)
+    type(workspace_type) :: workspace
     integer, allocatable :: number(:, :)
     integer :: k, g, n
 
@@ -179,24 +178,7 @@ contains
       end do
     end associate
     stiffened%materials = finer(:n)
-    select type (family => system%family)
-    type is (lattice_family_type)
-      tables = family%weights
-      family%weights = 0_i4
-    type is (list_family_type)
-      call forget_model(family)
-    class default
-      call internal_fault('a family without a rule for changed stiffness')
-    end select
-    call largest_frequency(system, accuracy, spectrum, options, stiffened)
-    select type (family => system%family)
-    type is (lattice_family_type)
-      family%weights = tables
-    type is (list_family_type)
-      call forget_model(family)
-    class default
-      call internal_fault('a family without a rule for changed stiffness')
-    end select
+    call largest_frequency(system, accuracy, spectrum, options, stiffened, workspace)
 
   contains
 
@@ -223,7 +205,7 @@ contains
   !> lowest eigenvalue may lie further down.
   subroutine lowest_eigenvalue(system, lowest)
     type(system_type), intent(inout) :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     real(wp), intent(out) :: lowest  !! < 0 if the body is unstable, else 0 [-]
     real(wp), allocatable :: scale(:, :, :), now(:, :), before(:, :), w(:, :), kw(:, :), &
       & undeformed(:, :)
@@ -353,7 +335,8 @@ contains
 
   !> One step of the recurrence: q = now/length becomes the newest vector, and
   !> A q - diagonal q - length before, of length `beside`, the one to come.
-  subroutine recur(system, options, u, scale, length, now, before, w, kw, diagonal, beside, model)
+  subroutine recur(system, options, u, scale, length, now, before, w, kw, diagonal, beside, model, &
+    & workspace)
     type(system_type), intent(inout) :: system
     type(force_options_type), intent(in) :: options      !! of the forces
     real(wp), intent(in), contiguous :: u(:, :)          !! about these displacements [m]
@@ -364,6 +347,7 @@ contains
     real(wp), intent(inout), contiguous :: w(:, :), kw(:, :)  !! room
     real(wp), intent(out) :: diagonal, beside
     type(model_type), intent(in), optional :: model      !! the system's by default
+    type(workspace_type), intent(inout), optional :: workspace  !! of `model`, given with it
     integer :: c
 
     do c = 1, size(now, 2)
@@ -371,7 +355,7 @@ contains
       w(:, c) = now(:, c)
       call multiply_by(w(:, c), scale(:, c, 1))
     end do
-    call apply_tangent(system, u, w, kw, options, model)
+    call apply_tangent(system, u, w, kw, options, model, workspace)
     do c = 1, size(now, 2)
       call multiply_by(kw(:, c), scale(:, c, 2))
       call subtract(kw(:, c), length, before(:, c))

@@ -10,6 +10,7 @@ module pd_motion_explicit_time_step
   use pd_family_lattice, only: lattice_family_type
   use pd_force_bound, only: lattice_bound, lattice_printed_bound
   use pd_force_model, only: model_type
+  use pd_force_workspace, only: workspace_type
   implicit none (type, external)
   private
   public :: stiffness_bound, stable_step, printed_step, printed_stiffness, book_step, &
@@ -21,10 +22,11 @@ contains
   !> M_k [N/m4] of every slot, 0 for points without bonds:
   !> sum_j [ (q_k+q_j) Gb + (m_k I_k + m_j I_j) Gd ] vc V_j/|xi|, m = 2 max(a,0) (d delta)^2,
   !> I_k = sum_l Gd vc V_l/|xi|. The step sqrt(2 rho/M) and the relaxation's mass come from it.
-  subroutine stiffness_bound(body, family, model, bound)
+  subroutine stiffness_bound(body, family, model, workspace, bound)
     type(body_type), intent(in) :: body       !! arranged in the slots of the family
     class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact
     type(model_type), intent(in) :: model     !! with surface factors, if there are any
+    type(workspace_type), intent(in) :: workspace  !! of this family and model
     real(wp), intent(inout), contiguous :: bound(:)  !! (n_slots) M_k [N/m4]
     type(bonds_type) :: bonds
     real(wp), allocatable :: inverse(:)
@@ -34,8 +36,8 @@ contains
     select type (family)
     type is (lattice_family_type)
       ! the weights hold all that is needed, unless they are not made yet
-      if (allocated(family%table)) then
-        call lattice_bound(family, model, bound)
+      if (allocated(workspace%lattice%table)) then
+        call lattice_bound(family, model, workspace%lattice, bound)
         return
       end if
     class default  ! below, bond by bond, which suits any family
@@ -53,7 +55,8 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          inverse(k) = inverse(k) + factor(model, model%D, n, k, j)*bonds%weight(i)/bonds%length(i)
+          inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
+            & /bonds%length(i)
         end do
         associate (m => model%materials(model%material(k)))
           inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*m%t**2
@@ -69,8 +72,8 @@ contains
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
         bound(k) = bound(k) + ((model%materials(model%material(k))%q &
-          & + model%materials(model%material(j))%q)*factor(model, model%S, n, k, j) &
-          & + (inverse(k) + inverse(j))*factor(model, model%D, n, k, j)) &
+          & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
+          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j)) &
           & *bonds%weight(i)/bonds%length(i)
       end do
     end do
@@ -78,14 +81,14 @@ contains
   end subroutine stiffness_bound
 
   !> The size of Gd or Gb of the bond k-j along the unit vector n.
-  pure real(wp) function factor(model, g, n, k, j)
+  pure real(wp) function surface_factor(model, g, n, k, j)
     type(model_type), intent(in) :: model
     real(wp), allocatable, intent(in) :: g(:, :)
     real(wp), intent(in) :: n(:)
     integer, intent(in) :: k, j
-    factor = 1.0_wp
-    if (model%surface) factor = abs(bond_factor(n, g(k, :), g(j, :)))
-  end function factor
+    surface_factor = 1.0_wp
+    if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :)))
+  end function surface_factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
   real(wp) function stable_step(body, model, bound) result(step)

@@ -91,7 +91,7 @@ contains
     allocate (energy(system%body%n_slots), source=0.0_wp)
     none = 0.0_wp
     call forces_at(system, none, force)
-    call energy_pass(system%family, system%model, none, energy)
+    call energy_pass(system%family, system%model, system%workspace, none, energy)
     do p = 1, rigid%pieces%number
       totals = of_piece(p)
       balance%thermal(p) = totals(1)
@@ -296,7 +296,7 @@ contains
   !> Twice the stored energy of every piece, or that of its heat alone if that is larger.
   subroutine weigh_energies(system, rigid, balance)
     type(system_type), intent(inout), target :: system
-      !! at the state that is weighed; its force loops keep their room in the family
+      !! at the state that is weighed; its workspace changes
     type(rigid_type), intent(in) :: rigid         !! its pieces
     type(balance_type), intent(inout) :: balance  !! gets the energy of every piece
     type(term_view_type) :: view
@@ -306,7 +306,7 @@ contains
     integer :: i, k, p
 
     allocate (energy(system%body%n_slots), source=0.0_wp)
-    call energy_pass(system%family, system%model, system%state%u, energy)
+    call energy_pass(system%family, system%model, system%workspace, system%state%u, energy)
     call view_of(system, system%time, view)
     call system%terms%add_energy(view, energy)
     do p = 1, size(balance%piece)

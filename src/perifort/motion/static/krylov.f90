@@ -184,7 +184,7 @@ contains
   !> there takes the place of the undeformed stiffness.
   subroutine linearise(system, deformed, krylov)
     type(system_type), intent(inout) :: system
-      !! at the displacements of the origin; its force loops keep their room in the family
+      !! at the displacements of the origin; its workspace changes
     logical, intent(in) :: deformed
       !! the tangent at these displacements, else the undeformed stiffness
     type(krylov_type), intent(inout) :: krylov
@@ -216,7 +216,7 @@ contains
   !> Terms of the force resist with the tangents that they give.
   subroutine apply_stiffness(system, krylov)
     type(system_type), intent(inout), target :: system
-      !! its state stays as it is; its force loops keep their room in the family
+      !! its state stays as it is; its workspace changes
     type(krylov_type), intent(inout), target :: krylov  !! with the direction; gets the product
     type(tangent_type) :: tangent
     type(term_view_type) :: view

@@ -30,7 +30,7 @@ contains
 
     associate (system => now%system)
       allocate (of_slots(system%body%n_slots))
-      call energy_pass(system%family, system%model, system%state%u, of_slots)
+      call energy_pass(system%family, system%model, system%workspace, system%state%u, of_slots)
       call gather(system%body, of_slots, values(:, 1))
     end associate
   end subroutine fill

@@ -26,7 +26,7 @@ contains
     integer :: i, k
 
     allocate (energy(system%body%n_slots))
-    call energy_pass(system%family, system%model, system%state%u, energy)
+    call energy_pass(system%family, system%model, system%workspace, system%state%u, energy)
     number = 0
     point = 0
     stretch = 0.0_wp

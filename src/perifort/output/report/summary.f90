@@ -125,7 +125,7 @@ contains
     character(:), allocatable :: text
 
     associate (model => system%model)
-      text = line('families', system%family%describe())
+      text = line('families', system%family%describe()//system%workspace%describe())
       if (model%dilatation) then
         text = text//line('forces', 'state-based: two passes over the bonds, for the '// &
           & 'dilatations and for the forces')
@@ -222,7 +222,8 @@ contains
     if (system%model%dilatation) reals = reals + 1
     if (system%model%breaking) reals = reals + 2  ! damage, s_c
     if (system%model%surface) reals = reals + 2*system%body%dim
-    bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) + system%family%bytes()
+    bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) &
+      & + system%family%bytes() + system%workspace%bytes()
   end function memory_of
 
   pure function position(system, k) result(text)

@@ -10,6 +10,7 @@ module pd_scene_content_check
   use pd_scene_content_groups, only: default_fields, default_probe_fields, table_of
   use pd_scene_content_rules, only: rule_fault, given, check_known, check_unique, check_vector
   use pd_scene_format_source, only: source_type
+  use pd_scene_groups_relaxation, only: safety_of
   use pd_scene_content_types, only: group_table, scene_type, is_set, name_length
   implicit none (type, external)
   private
@@ -150,10 +151,7 @@ contains
       call rule_fault(error, 'output', 1, 'interval', "'every' and 'interval' are both given", &
         & 'give one of them', source)
     end if
-    if (.not. is_set(scene%relaxation%safety)) then
-      scene%relaxation%safety = 5.0_wp
-      if (scene%relaxation%density_matrix == 'frame_invariant') scene%relaxation%safety = 1.0_wp
-    end if
+    scene%relaxation%safety = safety_of(scene%relaxation)
   end subroutine check_settings
 
   !> Names of one kind of group differ.

@@ -6,6 +6,7 @@ module pd_scene_content_check_actions
   use pd_scene_content_check_bodies, only: check_file
   use pd_scene_content_rules, only: rule_fault, check_known, check_components
   use pd_scene_format_source, only: source_type
+  use pd_scene_groups_course, only: ramp_of
   use pd_scene_content_types, only: scene_type, is_set, name_length
   implicit none (type, external)
   private
@@ -235,7 +236,7 @@ contains
       return
     end if
     if (.not. allocated(times)) then
-      if (relaxes .and. .not. is_set(ramp_time)) ramp_time = 1.0_wp
+      ramp_time = ramp_of(scene%time%method, ramp_time)
       if (relaxes .and. ramp_time > 1.0_wp) call rule_fault(error, group, number, 'ramp_time', &
         & "the ramp does not end: 'ramp_time' is "//to_text(ramp_time), load_time// &
         & '; expected at most 1', source)

@@ -1,5 +1,6 @@
 !> Rules for the initial geometry: bodies, shapes, materials and cracks.
 module pd_scene_content_check_bodies
+  use pd_base_elasticity, only: bond_based_ratio
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text, with_unit
@@ -10,7 +11,7 @@ module pd_scene_content_check_bodies
     & crack_group, is_set, name_length
   implicit none (type, external)
   private
-  public :: check_body, check_shape, check_material, check_crack, check_file, needed_ratio
+  public :: check_body, check_shape, check_material, check_crack, check_file
 
   real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
   !> Peak memory of a point of a lattice, while families are built, measured on cubes [bytes].
@@ -232,16 +233,6 @@ contains
 
   end subroutine check_shape
 
-  !> The Poisson's ratio of the bond-based model. It is 1/3 in plane stress, 1/4 in plane strain and
-  !> in 3D [-].
-  pure real(wp) function needed_ratio(dimension, plane) result(ratio)
-    integer, intent(in) :: dimension   !! of the scene: 2 or 3
-    character(*), intent(in) :: plane  !! 'stress' or 'strain'; counts in 2D only
-
-    ratio = 0.25_wp
-    if (dimension == 2 .and. plane == 'stress') ratio = 1.0_wp/3.0_wp
-  end function needed_ratio
-
   !> One `&material`; fills in the default Poisson's ratio and density. An error is set if a rule is
   !> broken.
   subroutine check_material(scene, number, error, source)
@@ -283,7 +274,7 @@ contains
     real(wp) :: needed
     character(:), allocatable :: kind
 
-    needed = needed_ratio(dimension, plane)
+    needed = bond_based_ratio(dimension, plane == 'strain')
     if (dimension == 1) then
       if (.not. is_set(material%poissons_ratio)) material%poissons_ratio = 0.0_wp
       return

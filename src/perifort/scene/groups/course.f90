@@ -1,10 +1,11 @@
 !> The keys of a course in time, which temperature changes, boundaries and loads share.
 module pd_scene_groups_course
   use pd_base_kinds, only: wp
+  use pd_scene_format_given, only: is_set
   use pd_scene_format_keys, only: keys_type
   implicit none (type, external)
   private
-  public :: visit_course, sides
+  public :: visit_course, ramp_of, sides
 
   !> Sides of a body.
   character(5), parameter :: sides(6) = [character(5) :: 'x_min', 'x_max', 'y_min', 'y_max', &
@@ -28,5 +29,15 @@ contains
     call keys%list('times', times, 's', 'instead of ramp_time: increasing times')
     call keys%list('values', values, '-', 'factors at these times, linear between them')
   end subroutine visit_course
+
+  !> The length of the ramp of a course without a table. In relaxation, where time runs from 0 to 1
+  !> over the load steps, one that says nothing is a ramp over all of them.
+  pure real(wp) function ramp_of(method, ramp_time) result(length)
+    character(*), intent(in) :: method   !! of `&time`
+    real(wp), intent(in) :: ramp_time    !! of the group [s]
+
+    length = ramp_time
+    if (method == 'relaxation' .and. .not. is_set(ramp_time)) length = 1.0_wp
+  end function ramp_of
 
 end module pd_scene_groups_course

@@ -1,12 +1,12 @@
 !> The group `&relaxation`: how static equilibrium is found.
 module pd_scene_groups_relaxation
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_given, only: is_set, name_length, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type, change_harmless, change_refused
   implicit none (type, external)
   private
-  public :: relaxation_group
+  public :: relaxation_group, safety_of
 
   !> `&relaxation`
   type, extends(group_type) :: relaxation_group
@@ -43,6 +43,17 @@ contains
     call keys%key('load_steps', group%load_steps, '', 'steps in which loads and imposed '// &
       & 'displacements grow', at_least=1)
   end subroutine visit
+
+  !> The factor on the fictitious mass, if nothing is said its default: masses that are stable by
+  !> themselves need none.
+  pure real(wp) function safety_of(group) result(safety)
+    type(relaxation_group), intent(in) :: group  !! checked or not
+
+    safety = group%safety
+    if (is_set(safety)) return
+    safety = 5.0_wp
+    if (group%density_matrix == 'frame_invariant') safety = 1.0_wp
+  end function safety_of
 
   !> More iterations are the same iterations.
   pure integer function change_of(key) result(change)

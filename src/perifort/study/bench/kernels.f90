@@ -11,6 +11,7 @@ module pd_study_bench_kernels
   use pd_family_lattice, only: both_ends, lattice_family_type
   use pd_family_list, only: list_family_type
   use pd_force_model, only: dilatation_of, options_of, no_dilatation, projected, unprojected
+  use pd_force_workspace, only: workspace_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: evaluate, system_type
@@ -89,8 +90,8 @@ contains
         timing%bonds = system%family%n_bonds
         timing%bytes = memory_of(system)
         timing%build = set_up%timer%seconds('families') + set_up%timer%seconds('surface correction')
-        timing%flops = flops_of_bond(system%family, dilatation_of(options_of(system%model))) &
-          & *timing%bonds
+        timing%flops = flops_of_bond(system%family, system%workspace, &
+          & dilatation_of(options_of(system%model)))*timing%bonds
         timing%traffic = bytes_of_step(system)
         call start_moving(system, scene)
         call time_steps(system, set_up%plan%step, seconds, timing, error)
@@ -257,9 +258,10 @@ contains
   !> List, both loops: eta d, e 4d, projected 2 more, polynomial 15. Dilatation: sum 2, projected 5.
   !> Force: magnitude 2, direction and sums 3d, with a dilatation 5 more, projected 9. Without
   !> stored geometry, both loops: xi d, |xi|^2 2d - 1, root and division 2, weight 3.
-  pure real(wp) function flops_of_bond(family, kind) result(flops)
+  pure real(wp) function flops_of_bond(family, workspace, kind) result(flops)
     class(family_type), intent(in) :: family  !! of lists or of one lattice; any other kind is an
                                               !! internal fault
+    type(workspace_type), intent(in) :: workspace  !! of its loops
     integer, intent(in) :: kind  !! of the dilatation, see `dilatation_of`
     real(wp) :: geometry
     integer :: d
@@ -270,8 +272,10 @@ contains
     select type (family)
     type is (list_family_type)
       geometry = 5*d + 15
-      if (allocated(family%shape)) geometry = geometry + (3*d + 4)*count(family%shape == 0_i8) &
-        & /real(max(1, size(family%shape)), wp)
+      associate (kept => workspace%list)
+        if (allocated(kept%shape)) geometry = geometry + (3*d + 4)*count(kept%shape == 0_i8) &
+          & /real(max(1, size(kept%shape)), wp)
+      end associate
       flops = geometry + 2 + 3*d
       if (dilatation) flops = flops + 5 + geometry + 2
       if (kind == projected) flops = flops + 2 + 4 + 2 + 3
@@ -312,9 +316,11 @@ contains
     select type (family => system%family)
     type is (list_family_type)
       bytes = bytes + passes*(11*real(size(family%bits), wp) + points*8*3*8)
-      if (allocated(family%weight_S)) bytes = bytes + 8*(real(size(family%weight_S), wp) &
-        & + 2*real(size(family%weight_D), wp))
-      if (allocated(family%geometry)) bytes = bytes + passes*8*real(size(family%geometry), wp)
+      associate (kept => system%workspace%list)
+        if (allocated(kept%weight_S)) bytes = bytes + 8*(real(size(kept%weight_S), wp) &
+          & + 2*real(size(kept%weight_D), wp))
+        if (allocated(kept%geometry)) bytes = bytes + passes*8*real(size(kept%geometry), wp)
+      end associate
     type is (lattice_family_type)
       if (system%model%breaking) bytes = bytes + passes*points*8*family%words
       both = both_ends(d, family%mixed)

@@ -77,7 +77,8 @@ contains
       call choose_threads(options, system)
       if (scene%header%title /= '') write (out, '(a)') trim(scene%header%title)
       write (out, '(a)') '  '//to_text(system%body%n_points)//' points, '// &
-        & to_text(system%family%n_bonds)//' bonds, '//system%family%describe()
+        & to_text(system%family%n_bonds)//' bonds, '//system%family%describe()// &
+        & system%workspace%describe()
       if (scene%time%method == 'relaxation') write (out, '(a)') '  The scene is static: '// &
         & 'these are the limits of explicit steps of its body, with the', &
         & '  densities given in &material, or 1 kg/m3 without one'
@@ -114,7 +115,7 @@ contains
     type(spectrum_type) :: lasting
 
     allocate (sums(system%body%n_slots), source=0.0_wp)
-    call stiffness_bound(system%body, system%family, system%model, sums)
+    call stiffness_bound(system%body, system%family, system%model, system%workspace, sums)
     call least_step(system, sums, limits%equation, limits%slot, limits%most)
     call printed_stiffness(system%body, system%family, system%model, sums)
     call least_step(system, sums, limits%printed, limits%printed_slot)

@@ -82,8 +82,8 @@ contains
       & twin%model%S)
     select type (family => twin%family)
     type is (lattice_family_type)
-      call build_weights(family, twin%model)
-    type is (list_family_type)  ! prepares itself in its first pass
+      call build_weights(family, twin%model, twin%workspace%lattice)
+    type is (list_family_type)  ! its first pass prepares the workspace
       continue
     class default
       call internal_fault('free_body does not know a kind of family')

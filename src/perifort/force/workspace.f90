@@ -1,0 +1,125 @@
+!> What the force loops keep between evaluations, beside the families, which they only read: what is
+!> made of the model (tables of weights, what it gives each slot), and what one pass leaves for the
+!> next. The owner of the model owns the workspace (`pd_motion_system`); another model takes another
+!> one.
+module pd_force_workspace
+  use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes
+  use pd_base_text, only: to_text
+  implicit none (type, external)
+  private
+  public :: workspace_type, lattice_workspace_type, list_workspace_type, weights_type, singles_type
+  public :: at_volume, at_moved, at_p
+
+  !> Where things stand in `at`: behind the position come volume, displacement and p.
+  integer, parameter :: at_volume = 4, at_moved = 4, at_p = 8
+
+  !> Weights of the bonds of one block, or of many that are alike, in the order of `offsets_type`.
+  !> Families in mixed precision keep the single ones; lengths are those of their blocks.
+  type :: weights_type
+    integer :: n = 0                           !! offsets that any lane has
+    integer :: n_forward = 0                   !! forward ones among them, which come first
+    integer(i4), allocatable :: offset(:)      !! their numbers (n)
+    integer(i8), allocatable :: shift(:)       !! their shifts (n)
+    real(wp), allocatable :: geometry(:, :)    !! their geometry (4, n)
+    real(wp), allocatable :: dilatation(:, :)  !! Gd v_c V_j (block_length, n)
+    real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb v_c V_j |xi| (block_length, n)
+    real(sp), allocatable :: single_geometry(:, :)
+    real(sp), allocatable :: single_dilatation(:, :) !! over the unit of volume (`volume_unit`)
+    real(sp), allocatable :: single_stretch(:, :)
+  end type weights_type
+
+  !> What the loops in mixed precision work on.
+  type :: singles_type
+    real(wp) :: volume = 1.0_wp                !! unit of volume, a power of 2 [m3]
+    real(sp), allocatable :: high(:, :)        !! leading digits of u (n_slots, dim), scaled
+    real(sp), allocatable :: low(:, :)         !! the digits that follow
+    real(sp), allocatable :: p(:)              !! p times the unit of volume (n_slots)
+    real(sp), allocatable :: sums(:, :)        !! what is added to both ends (n_slots, dim), 3D
+  end type singles_type
+
+  !> Of a lattice family. Blocks without a table make their weights in every pass.
+  type :: lattice_workspace_type
+    integer(i8) :: room = 256_i8*1024_i8**2    !! that tables may always take [bytes]
+    integer(i4), allocatable :: weights(:)     !! which table each block has; 0: none
+    type(weights_type), allocatable :: table(:)
+    integer(i1), allocatable :: served(:)      !! range of the fast formulas that served each block
+                                               !! in the last dilatation pass, 0: none
+    type(singles_type) :: singles              !! in mixed precision
+  end type lattice_workspace_type
+
+  !> Of a list family. Made by the first pass, if nobody has (`prepare_list`).
+  type :: list_workspace_type
+    integer :: least_shared = 8                !! clusters that tables are made for, if they share
+                                               !! them; tests take fewer or more
+    integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
+    real(wp), allocatable :: at(:, :)          !! of each slot, in one place: position, volume,
+                                               !! displacement and p of the pass (8, n_slots)
+    real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
+    integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike
+                                               !! (`pd_force_list_points`)
+    integer(i8), allocatable :: stored(:)      !! the place of each cluster's first pack in
+    real(wp), allocatable :: weight_D(:, :)    !! Gd vc V_j and
+    real(wp), allocatable :: weight_S(:, :)    !! (q_k + q_j) Gb vc V_j |xi| (lanes, packs),
+                                               !! of all bonds, intact or not; 0: has none
+    integer(i8), allocatable :: shape(:)       !! that of its first column in
+    real(wp), allocatable :: geometry(:, :)    !! xi and 2/|xi|^2 (lanes, columns of each pack)
+    integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
+  end type list_workspace_type
+
+  !> Of any family: the part that its loops use is filled, the other one empty.
+  type :: workspace_type
+    type(lattice_workspace_type) :: lattice
+    type(list_workspace_type) :: list
+  contains
+    procedure :: bytes
+    procedure :: describe
+  end type workspace_type
+
+contains
+
+  !> Memory of tables, and of what is kept of blocks, clusters and slots [bytes].
+  pure integer(i8) function bytes(workspace)
+    class(workspace_type), intent(in) :: workspace  !! of any family
+
+    bytes = bytes_of_lattice(workspace%lattice) + bytes_of_list(workspace%list)
+  end function bytes
+
+  pure integer(i8) function bytes_of_lattice(workspace) result(bytes)
+    type(lattice_workspace_type), intent(in) :: workspace
+    integer :: t
+
+    bytes = 0_i8
+    if (allocated(workspace%weights)) bytes = bytes + 4_i8*size(workspace%weights)
+    associate (s => workspace%singles)
+      if (allocated(s%high)) bytes = bytes + 4_i8*(2*size(s%high) + size(s%p) + size(s%sums))
+    end associate
+    if (.not. allocated(workspace%table)) return
+    do t = 1, size(workspace%table)
+      bytes = bytes + workspace%table(t)%n*(16_i8*lanes &
+        & + merge(60, 44, allocated(workspace%singles%high)))
+    end do
+  end function bytes_of_lattice
+
+  pure integer(i8) function bytes_of_list(workspace) result(bytes)
+    type(list_workspace_type), intent(in) :: workspace
+
+    bytes = 0_i8
+    if (.not. allocated(workspace%given)) return
+    bytes = 8*(size(workspace%at, kind=i8) + size(workspace%given, kind=i8) &
+      & + size(workspace%weight_D, kind=i8) + size(workspace%weight_S, kind=i8) &
+      & + size(workspace%geometry, kind=i8)) + 18_i8*size(workspace%large)
+  end function bytes_of_list
+
+  !> How many tables there are, to follow the family's own description; empty where nobody counts
+  !> them.
+  pure function describe(workspace) result(text)
+    class(workspace_type), intent(in) :: workspace  !! of any family
+    character(:), allocatable :: text
+
+    text = ''
+    if (allocated(workspace%lattice%table)) text = '; points have '// &
+      & to_text(size(workspace%lattice%table))//' different surroundings'
+  end function describe
+
+end module pd_force_workspace
