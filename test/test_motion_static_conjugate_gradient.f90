@@ -10,6 +10,7 @@ module test_motion_static_conjugate_gradient
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, add_loads
   use pd_scene_content_types, only: scene_type
+  use elimination, only: eliminate
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: at_point, box_scene, expect, expect_true, noise, ready, youngs_modulus
@@ -166,7 +167,8 @@ contains
     type(error_type), allocatable, intent(inout) :: error
     real(wp), allocatable :: K(:, :), x(:), w(:, :), force(:, :)
     integer, allocatable :: slots(:), components(:)
-    integer :: n, c, s, i, j, m
+    integer :: n, c, s, i, j
+    logical :: singular
 
     associate (body => system%body)
       allocate (slots(0), components(0))
@@ -199,22 +201,11 @@ contains
       do i = 1, n
         x(i) = w(slots(i), components(i)) - force(slots(i), components(i))
       end do
-      do m = 1, n
-        i = m - 1 + maxloc(abs(K(m:, m)), dim=1)
-        K([i, m], :) = K([m, i], :)
-        x([i, m]) = x([m, i])
-        if (abs(K(m, m)) <= 0.0_wp) then
-          call test_failed(error, 'the linear equations are singular')
-          return
-        end if
-        do i = m + 1, n
-          x(i) = x(i) - K(i, m)/K(m, m)*x(m)
-          K(i, m + 1:) = K(i, m + 1:) - K(i, m)/K(m, m)*K(m, m + 1:)
-        end do
-      end do
-      do m = n, 1, -1
-        x(m) = (x(m) - dot_product(K(m, m + 1:), x(m + 1:)))/K(m, m)
-      end do
+      call eliminate(K, x, singular)
+      if (singular) then
+        call test_failed(error, 'the linear equations are singular')
+        return
+      end if
       do i = 1, n
         u(slots(i), components(i)) = x(i)
       end do

@@ -6,6 +6,7 @@ module test_motion_static_relaxation
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_system, only: system_type, add_loads, evaluate
   use pd_scene_content_types, only: scene_type, unset
+  use elimination, only: eliminate
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: at_point, box_scene, diary_type, expect, expect_true, ready, ready_alone, &
@@ -110,7 +111,8 @@ contains
     real(wp), parameter :: h = 1.0e-7_wp*spacing
     real(wp), allocatable :: K(:, :), b(:, :), plus(:, :), x(:)
     integer, allocatable :: slots(:), components(:)
-    integer :: n, c, s, i, j, m
+    integer :: n, c, s, i, j
+    logical :: singular
 
     associate (body => system%body, state => system%state)
       allocate (slots(0), components(0))
@@ -143,22 +145,11 @@ contains
       do i = 1, n
         x(i) = b(slots(i), components(i))
       end do
-      do m = 1, n
-        i = m - 1 + maxloc(abs(K(m:, m)), dim=1)
-        K([i, m], :) = K([m, i], :)
-        x([i, m]) = x([m, i])
-        if (abs(K(m, m)) <= 0.0_wp) then
-          call test_failed(error, 'the linear system is singular')
-          return
-        end if
-        do i = m + 1, n
-          x(i) = x(i) - K(i, m)/K(m, m)*x(m)
-          K(i, m + 1:) = K(i, m + 1:) - K(i, m)/K(m, m)*K(m, m + 1:)
-        end do
-      end do
-      do m = n, 1, -1
-        x(m) = (x(m) - dot_product(K(m, m + 1:), x(m + 1:)))/K(m, m)
-      end do
+      call eliminate(K, x, singular)
+      if (singular) then
+        call test_failed(error, 'the linear system is singular')
+        return
+      end if
       allocate (u(body%n_slots, body%dim), source=0.0_wp)
       do i = 1, n
         u(slots(i), components(i)) = x(i)

@@ -10,9 +10,9 @@ module test_ranks
   use omp_lib, only: omp_get_num_threads, omp_get_thread_num
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_error, only: fault_type => error_type
-  use pd_base_reduce, only: add_point, ascending_order, block_points, first_largest, first_where, &
-    & inner, largest_over, least_over, new_running, noise, noise_after, number_points, order_type, &
-    & ranks_type, running_type, sum_over, total_of_running
+  use pd_base_order, only: ascending_order, block_points, number_points, order_type, ranks_type
+  use pd_base_reduce, only: add_point, first_largest, first_where, inner, largest_over, &
+    & least_over, new_running, noise, noise_after, running_type, sum_over, total_of_running
   use pd_body_body, only: allocate_points, body_type, gather, keep_points, own_points
   use pd_family_cracks, only: cut_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family

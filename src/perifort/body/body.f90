@@ -9,7 +9,7 @@
 !> own. One process alone owns all.
 module pd_body_body
   use pd_base_kinds, only: wp, i2, i4, i8
-  use pd_base_reduce, only: number_points, order_type, owns
+  use pd_base_order, only: number_points, order_type, owns
   implicit none (type, external)
   private
   public :: body_type, grid_type, allocate_points, append_points, keep_points, arrange, &

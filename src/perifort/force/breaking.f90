@@ -2,8 +2,8 @@
 !> decided here, by one formula that gives both ends of a bond the same bits.
 module pd_force_breaking
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_reduce, only: add_point, ascending_order, count_of_ranks, new_running, owns, &
-    & running_type, total_of_running
+  use pd_base_order, only: ascending_order, owns
+  use pd_base_reduce, only: add_point, count_of_ranks, new_running, running_type, total_of_running
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds

@@ -5,8 +5,9 @@
 !> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
 module pd_motion_explicit_integrators
   use pd_base_kinds, only: wp
-  use pd_base_reduce, only: add_block, block_points, largest_of_ranks, new_sums, slots_of_block, &
-    & sum_of_ranks, sum_over, sums_type, total_of
+  use pd_base_order, only: block_points, slots_of_block
+  use pd_base_reduce, only: add_block, largest_of_ranks, new_sums, sum_of_ranks, sum_over, &
+    & sums_type, total_of
   use pd_base_error, only: error_type, fail, internal_fault, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun

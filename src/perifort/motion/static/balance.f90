@@ -3,8 +3,9 @@
 !> be off.
 module pd_motion_static_balance
   use pd_base_kinds, only: wp, i1
-  use pd_base_reduce, only: add_point, ascending_order, largest_of_ranks, largest_over, &
-    & new_running, running_type, total_of_running
+  use pd_base_order, only: ascending_order
+  use pd_base_reduce, only: add_point, largest_of_ranks, largest_over, new_running, running_type, &
+    & total_of_running
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text
   use pd_force_forces, only: energy_pass

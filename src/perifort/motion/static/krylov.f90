@@ -3,9 +3,9 @@
 !> inner products are weighted with the points' volumes, in which the stiffness is symmetric.
 module pd_motion_static_krylov
   use pd_base_kinds, only: wp, i1
-  use pd_base_reduce, only: add_block, add_point, block_points, inner, largest_of_ranks, &
-    & largest_over, new_running, new_sums, put_block, running_type, take_block, total_of, &
-    & total_of_running, summed_type => sums_type
+  use pd_base_order, only: block_points, put_block, take_block
+  use pd_base_reduce, only: add_block, add_point, inner, largest_of_ranks, largest_over, &
+    & new_running, new_sums, running_type, total_of, total_of_running, summed_type => sums_type
   use pd_body_body, only: share_halo
   use pd_force_model, only: force_options_type, options_of
   use pd_motion_conditions, only: number_of_loads

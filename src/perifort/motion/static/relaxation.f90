@@ -4,8 +4,8 @@
 module pd_motion_static_relaxation
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_error, only: error_type, fail, status_input, status_no_answer
-  use pd_base_reduce, only: add_block, block_points, new_sums, slots_of_block, total_of, &
-    & summed_type => sums_type
+  use pd_base_order, only: block_points, slots_of_block
+  use pd_base_reduce, only: add_block, new_sums, total_of, summed_type => sums_type
   use pd_base_text, only: to_text
   use pd_motion_static_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &

@@ -2,7 +2,8 @@
 !> of balance.
 module pd_motion_static_residual
   use pd_base_kinds, only: wp, i1
-  use pd_base_reduce, only: add_block, block_points, new_sums, slots_of_block, sums_type, total_of
+  use pd_base_order, only: block_points, slots_of_block
+  use pd_base_reduce, only: add_block, new_sums, sums_type, total_of
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private

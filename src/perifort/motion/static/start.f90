@@ -2,8 +2,7 @@
 !> which nothing acts are put into their equilibrium, which is known without an iteration.
 module pd_motion_static_start
   use pd_base_kinds, only: wp, i1
-  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
-    & largest_of_ranks
+  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, largest_of_ranks
   use pd_base_text, only: to_text
   use pd_motion_conditions, only: impose, number_of_loads
   use pd_motion_static_pieces, only: piece_text
