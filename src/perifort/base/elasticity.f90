@@ -11,7 +11,7 @@ contains
   !> stress, else 1/4 [-].
   pure real(wp) function bond_based_ratio(dim, plane_strain) result(ratio)
     integer, intent(in) :: dim           !! of the scene: 1, 2 or 3
-    logical, intent(in) :: plane_strain  !! 2D: plane strain, else plane stress; not used otherwise
+    logical, intent(in) :: plane_strain  !! plane strain, else plane stress; used in 2D only
 
     ratio = 0.25_wp
     if (dim == 2 .and. .not. plane_strain) ratio = 1.0_wp/3.0_wp
