@@ -5,7 +5,7 @@ module bodies
   use pd_base_error, only: fault_type => error_type
   use pd_base_reduce, only: noise
   use pd_body_body, only: body_type
-  use pd_body_material, only: material_type, new_material
+  use pd_law_material, only: material_type, new_material
   use pd_set_up_prepare, only: set_up_type, prepare
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density

@@ -5,7 +5,7 @@ module force_subjects
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: body_type, grid_type, allocate_points, keep_points
-  use pd_body_material, only: material_type, new_material
+  use pd_law_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
   use pd_family_family, only: family_type
   use pd_family_lattice, only: lattice_family_type, new_lattice_family

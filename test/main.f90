@@ -19,7 +19,7 @@ program main
   use test_base_version, only: collect_base_version
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
-  use test_body_material, only: collect_body_material
+  use test_law_material, only: collect_law_material
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
@@ -106,7 +106,7 @@ program main
   call register('base_version', collect_base_version)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
-  call register('body_material', collect_body_material)
+  call register('law_material', collect_law_material)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)

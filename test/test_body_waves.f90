@@ -1,7 +1,7 @@
 !> Wave speeds and the energy of a critical stretch, against closed forms.
 module test_body_waves
   use pd_base_kinds, only: wp
-  use pd_body_material, only: energy_from_critical_stretch, material_type, new_material
+  use pd_law_material, only: energy_from_critical_stretch, material_type, new_material
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: expect

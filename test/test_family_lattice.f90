@@ -4,7 +4,7 @@ module test_family_lattice
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_body_body, only: body_type, grid_type, allocate_points, gather, keep_points
-  use pd_body_material, only: material_type, new_material
+  use pd_law_material, only: material_type, new_material
   use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: bonds_type, allocate_bonds, family_type
   use pd_family_lattice, only: lattice_family_type, new_lattice_family

@@ -1,7 +1,7 @@
 !> Speeds of elastic waves, from the moduli of the dimension.
 module pd_body_waves
   use pd_base_kinds, only: wp
-  use pd_body_material, only: material_type
+  use pd_law_material, only: material_type
   implicit none (type, external)
   private
   public :: longitudinal_speed, shear_speed, rayleigh_speed

@@ -3,7 +3,7 @@
 module pd_family_surface
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type
-  use pd_body_material, only: material_type
+  use pd_law_material, only: material_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private

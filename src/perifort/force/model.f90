@@ -3,7 +3,7 @@
 module pd_force_model
   use pd_base_kinds, only: wp, i1, i2
   use pd_body_body, only: body_type
-  use pd_body_material, only: material_type, never
+  use pd_law_material, only: material_type, never
   implicit none (type, external)
   private
   public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early

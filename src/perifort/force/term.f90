@@ -16,7 +16,7 @@ module pd_force_term
   use pd_base_reduce, only: inner
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
-  use pd_body_material, only: material_type
+  use pd_law_material, only: material_type
   use pd_family_family, only: family_type
   implicit none (type, external)
   private

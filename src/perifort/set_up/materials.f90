@@ -1,7 +1,7 @@
 !> The materials of a scene, with the constants that follow from dimension and horizon.
 module pd_set_up_materials
   use pd_base_kinds, only: wp
-  use pd_body_material, only: material_type, new_material, critical_stretch_from_energy
+  use pd_law_material, only: material_type, new_material, critical_stretch_from_energy
   use pd_scene_content_types, only: scene_type, is_set
   implicit none (type, external)
   private

@@ -9,7 +9,7 @@ module pd_set_up_prepare
   use pd_body_generate, only: generate_body
   use pd_body_initial, only: initial_state
   use pd_body_layers, only: layer_count_type, layer_count_text
-  use pd_body_material, only: material_type
+  use pd_law_material, only: material_type
   use pd_family_cracks, only: cut_bonds
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors

@@ -11,7 +11,7 @@ module pd_motion_explicit_spectrum
   use pd_base_numbers, only: pi
   use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, noise_after
   use pd_body_body, only: owned
-  use pd_body_material, only: material_type
+  use pd_law_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: force_options_type, model_type, options_of

@@ -6,7 +6,7 @@ module pd_output_report_overview
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
   use pd_scene_content_types, only: scene_type
-  use pd_body_material, only: material_type, energy_from_critical_stretch, never
+  use pd_law_material, only: material_type, energy_from_critical_stretch, never
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_set_up_conditions, only: no_fail_mask, region_mask

@@ -7,7 +7,7 @@ module pd_study_limits_vibration
   use pd_base_error, only: error_type, internal_fault
   use pd_base_reduce, only: largest_of_ranks, noise, noise_after
   use pd_body_body, only: body_type, allocate_points, gather, scatter
-  use pd_body_material, only: material_type, never
+  use pd_law_material, only: material_type, never
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family

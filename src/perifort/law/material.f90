@@ -1,5 +1,5 @@
 !> Material parameters of the peridynamic force from the classical ones (doc/theory.md, 1).
-module pd_body_material
+module pd_law_material
   use pd_base_kinds, only: wp
   use pd_base_elasticity, only: bond_based_ratio
   use pd_base_numbers, only: pi
@@ -114,4 +114,4 @@ contains
     Gc = (m%critical_stretch/critical_stretch_from_energy(m, 1.0_wp, dim, delta))**2
   end function energy_from_critical_stretch
 
-end module pd_body_material
+end module pd_law_material

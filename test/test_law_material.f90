@@ -1,22 +1,22 @@
 !> Material parameters, derived again from the energies they must reproduce.
-module test_body_material
+module test_law_material
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
   use pd_base_elasticity, only: bond_based_ratio
-  use pd_body_material, only: material_type, new_material, &
+  use pd_law_material, only: material_type, new_material, &
     & critical_stretch_from_energy
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: expect, expect_true, youngs_modulus
   implicit none (type, external)
   private
-  public :: collect_body_material
+  public :: collect_law_material
 
   real(wp), parameter :: ratios(*) = [-0.3_wp, 0.0_wp, 0.2_wp, 0.25_wp, 1.0_wp/3, 0.4_wp, 0.49_wp]
   real(wp), parameter :: delta = 2.7_wp, h = 0.3_wp, A = 0.2_wp  !! no powers of each other
 
 contains
 
-  subroutine collect_body_material(testsuite)
+  subroutine collect_law_material(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('isotropic expansion has the classical energy and dilatation', &
@@ -27,7 +27,7 @@ contains
       & new_unittest('bond constants have the published values', test_bond_constants), &
       & new_unittest('the critical stretch releases Gc', test_critical_stretch), &
       & new_unittest('energy released by all bonds through a plane, by quadrature', test_released)]
-  end subroutine collect_body_material
+  end subroutine collect_law_material
 
   !> Integrals over a whole horizon of the unit vector's function, done with Gauss points in angle:
   !> sum_j F(n) |xi|^power V_j. The integrands are polynomials of n: exact to rounding.
@@ -284,4 +284,4 @@ contains
     end do
   end subroutine test_released
 
-end module test_body_material
+end module test_law_material
