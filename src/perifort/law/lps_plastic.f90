@@ -39,7 +39,6 @@ module pd_law_lps_plastic
     procedure :: forces
     procedure :: energy
     procedure :: commit
-    procedure :: equivalent_stress
     procedure :: refusal
   end type lps_plastic_law_type
 
@@ -132,16 +131,6 @@ contains
     end associate
     bonds%of_point(strain) = bonds%of_point(strain) + now%flow
   end subroutine commit
-
-  !> The equivalent stress of a point, after flow [Pa].
-  pure real(wp) function equivalent_stress(self, bonds)
-    class(lps_plastic_law_type), intent(in) :: self  !! the law
-    type(law_bonds_type), intent(in) :: bonds        !! of the point, with its history
-    type(state_type) :: now
-
-    call find_state(self, bonds, now)
-    equivalent_stress = now%left*now%equivalent
-  end function equivalent_stress
 
   !> The law holds in 3D.
   pure function refusal(self) result(reason)
