@@ -56,6 +56,7 @@ module pd_law_law
     logical :: weighted = .false.                !! it runs on the fast loops
     logical :: bond_based = .false.              !! it holds for one Poisson's ratio
     logical :: corrected = .true.                !! it takes surface factors, where the scene has them
+    logical :: plastic = .false.                 !! what it dissipates is plastic energy
     logical :: softens = .false.                 !! `bond_damage` is not 0 for some intact bonds
     integer :: bond_history = 0                  !! reals of history of a bond
     integer :: point_history = 0                 !! reals of history of a point
