@@ -67,6 +67,7 @@ contains
     law%lps_law_type = lps_law()
     law%name = 'lps_plastic'
     law%weighted = .false.
+    law%plastic = .true.
     law%bond_history = 2
     law%point_history = 1
     law%point_constants = 2
