@@ -20,6 +20,7 @@ program main
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
   use test_law_material, only: collect_law_material
+  use test_law_strength, only: collect_law_strength
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
@@ -41,6 +42,7 @@ program main
   use test_force_frame, only: collect_force_frame
   use test_force_term, only: collect_force_term
   use test_library, only: collect_library
+  use test_own_law, only: collect_own_law
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_static_conjugate_gradient, only: collect_motion_static_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
@@ -107,6 +109,7 @@ program main
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
   call register('law_material', collect_law_material)
+  call register('law_strength', collect_law_strength)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)
@@ -128,6 +131,7 @@ program main
   call register('force_frame', collect_force_frame)
   call register('force_term', collect_force_term)
   call register('library', collect_library)
+  call register('own_law', collect_own_law)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_static_conjugate_gradient', collect_motion_static_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)

@@ -68,10 +68,10 @@ module pd_law_law
     real(wp) :: depth = 1.0_wp                   !! thickness in 2D [m], area in 1D [m2]
   contains
     procedure, non_overridable :: set_up
-    procedure(find_constants_interface), deferred :: find_constants
     procedure(forces_interface), deferred :: forces
     procedure(energy_interface), deferred :: energy
     procedure(stiffness_interface), deferred :: stiffness
+    procedure :: find_constants => no_constants
     procedure :: omega
     procedure :: begin => begin_nothing
     procedure :: commit => commit_nothing
@@ -84,13 +84,6 @@ module pd_law_law
   end type bond_law_type
 
   abstract interface
-    !> Set what follows from moduli, dimension and horizon, in `material` and in the law.
-    subroutine find_constants_interface(self)
-      import :: bond_law_type
-      implicit none (type, external)
-      class(bond_law_type), intent(inout) :: self  !! with its moduli, dimension and horizon
-    end subroutine find_constants_interface
-
     !> The point's own part of each bond's pair force density; the other end gives the rest.
     !> Positive values pull. It must depend on what it is given alone, and leave broken bonds at 0.
     pure subroutine forces_interface(self, bonds, pull)
@@ -139,6 +132,14 @@ contains
     self%depth = depth
     call self%find_constants()
   end subroutine set_up
+
+  !> Set what follows from moduli, dimension and horizon, in `material` and in the law. By default
+  !> nothing does: `material` has the moduli and the constants of the chapter's laws.
+  subroutine no_constants(self)
+    class(bond_law_type), intent(inout) :: self  !! with its moduli, dimension and horizon
+    associate (unused => self)
+    end associate
+  end subroutine no_constants
 
   !> The influence function omega of a bond. A law with a function of its own overrides it.
   pure real(wp) function omega(self, ratio)
