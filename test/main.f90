@@ -19,6 +19,7 @@ program main
   use test_base_version, only: collect_base_version
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
+  use test_law_contract, only: collect_law_contract
   use test_law_material, only: collect_law_material
   use test_law_strength, only: collect_law_strength
   use test_body_overlap, only: collect_body_overlap
@@ -108,6 +109,7 @@ program main
   call register('base_version', collect_base_version)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
+  call register('law_contract', collect_law_contract)
   call register('law_material', collect_law_material)
   call register('law_strength', collect_law_strength)
   call register('body_overlap', collect_body_overlap)
