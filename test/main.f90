@@ -20,6 +20,7 @@ program main
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
   use test_law_material, only: collect_law_material
+  use test_law_softening, only: collect_law_softening
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
@@ -107,6 +108,7 @@ program main
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
   call register('law_material', collect_law_material)
+  call register('law_softening', collect_law_softening)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)
