@@ -3,7 +3,9 @@
 module pd_family_surface
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type
+  use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
+  use pd_law_weighted, only: weighted_law_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private
@@ -14,24 +16,29 @@ contains
   !> D and S (n_slots, dim) of every slot: classical over peridynamic dilatation and energy under
   !> unit uniaxial strain along each direction, with the linearised stretch. A point without bonds
   !> along a direction gets 1. Families must be whole: cracks are cut afterwards.
-  subroutine surface_factors(body, family, materials, D, S)
+  subroutine surface_factors(body, family, materials, D, S, laws)
     type(body_type), intent(in) :: body                     !! arranged in the slots of the family
     class(family_type), intent(in) :: family                !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
     real(wp), allocatable, intent(out) :: D(:, :), S(:, :)
       !! (n_slots, dim) factors of the dilatation and of the bond part of the energy [-]
+    type(law_item_type), intent(in), optional :: laws(:)
+      !! (materials) their bond laws; points of laws without correction get 1
     type(bonds_type) :: bonds
-    real(wp) :: strain, dilatation, energy, scale
+    real(wp) :: strain, dilatation, energy, scale, gb, gd
     integer :: k, i, c
 
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
-    !$omp parallel default(none) shared(body, family, materials, D, S) &
-    !$omp private(bonds, strain, dilatation, energy, scale, k, i, c)
+    !$omp parallel default(none) shared(body, family, materials, D, S, laws) &
+    !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, k, i, c)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
       if (body%point(k) == 0) cycle
       if (family%alike(k) /= k) cycle
+      if (present(laws)) then
+        if (.not. laws(body%material(k))%law%corrected) cycle
+      end if
       call family%bonds_of(k, bonds)
       associate (m => materials(body%material(k)))
         do c = 1, body%dim
@@ -40,8 +47,9 @@ contains
           scale = 0.0_wp
           do i = 1, bonds%n
             strain = (bonds%xi(i, c)/bonds%length(i))**2
-            dilatation = dilatation + strain*bonds%weight(i)
-            energy = energy + strain**2*bonds%length(i)*bonds%weight(i)
+            call law_factors(laws, int(body%material(k)), bonds%length(i), gb, gd)
+            dilatation = dilatation + gd*strain*bonds%weight(i)
+            energy = energy + gb*strain**2*bonds%length(i)*bonds%weight(i)
             scale = scale + bonds%length(i)*bonds%weight(i)
           end do
           ! a chain inside a plane has no stretch across it, up to the rounding of its positions
@@ -60,6 +68,25 @@ contains
     end do
     !$omp end parallel
   end subroutine surface_factors
+
+  !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1 without laws
+  !> and for laws with a force of their own.
+  pure subroutine law_factors(laws, material, length, gb, gd)
+    type(law_item_type), intent(in), optional :: laws(:)
+    integer, intent(in) :: material
+    real(wp), intent(in) :: length
+    real(wp), intent(out) :: gb, gd
+
+    gb = 1.0_wp
+    gd = 1.0_wp
+    if (.not. present(laws)) return
+    select type (law => laws(material)%law)
+    class is (weighted_law_type)
+      if (law%has_factors()) call law%bond_factors(length/law%delta, gb, gd)
+    class default  ! it says itself what it does with a factor
+      continue
+    end select
+  end subroutine law_factors
 
   !> G of a bond along the unit vector `n` between points with factors `gk` and `gj`.
   pure real(wp) function bond_factor(n, gk, gj) result(G)

@@ -4,7 +4,7 @@ module pd_force_bound
   use pd_base_kinds, only: wp, i8
   use pd_base_lanes, only: lanes
   use pd_family_lattice, only: lattice_family_type, grid_at
-  use pd_force_model, only: model_type
+  use pd_force_model, only: model_type, t_of
   use pd_force_weights, only: allocate_weights, block_weights, half_of
   use pd_force_workspace, only: lattice_workspace_type, weights_type
   implicit none (type, external)
@@ -94,7 +94,7 @@ contains
     end if
     do l = 1, lanes
       associate (m => model%materials(model%material(first + l - 1)))
-        inverse(first + l - 1) = sums(l)*2*max(m%a, 0.0_wp)*m%t**2
+        inverse(first + l - 1) = sums(l)*2*max(m%a, 0.0_wp)*t_of(model, int(first) + l - 1)**2
       end associate
     end do
   end subroutine add

@@ -1,15 +1,18 @@
 !> Bond breaking. The fast loops only say which slots are strained to the limit; what breaks is
 !> decided here, by one formula that gives both ends of a bond the same bits.
 module pd_force_breaking
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_order, only: ascending_order, owns
   use pd_base_reduce, only: add_point, count_of_ranks, new_running, running_type, total_of_running
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_force_generic, only: generic_energy_product, generic_point_damage, generic_point_energy
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
     & energy_product, point_damage
+  use pd_force_workspace, only: generic_workspace_type
   implicit none (type, external)
   private
   public :: strained_slots, break_bonds, damage_of
@@ -43,20 +46,22 @@ contains
   !> the stretches and dilatations under `u` and under that set in place of the squares
   !> (doc/theory.md, 9).
   subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated, others, &
-    & products)
+    & products, laws)
     type(body_type), intent(in) :: body          !! its volumes [m3]
     class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
     type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
-    real(wp), intent(in) :: u(:, :)       !! displacements (n_slots, dim) [m]
+    real(wp), intent(in), contiguous :: u(:, :)  !! displacements (n_slots, dim) [m]
     integer(i4), allocatable, intent(inout) :: slots(:)  !! where to look, ascending;
                                                          !! then those that lost a bond
     real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
     integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
     real(wp), intent(out) :: dissipated   !! energy lost at fixed u [J]
-    real(wp), intent(in), optional :: others(:, :, :)  !! other displacements, read at `slots` and
+    real(wp), intent(in), contiguous, optional :: others(:, :, :)  !! other displacements, read at `slots` and
                                                        !! at the ends of their bonds alone
                                                        !! (n_slots, dim, sets) [m]
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
+    type(generic_workspace_type), intent(in), optional :: laws
+      !! history of the bond laws, where the model is generic
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:)
     integer, allocatable :: number(:), first(:), order(:)
@@ -71,7 +76,7 @@ contains
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
     !$omp parallel default(none) &
-    !$omp shared(body, family, model, u, others, slots, damage, lost, number, first) &
+    !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
     !$omp firstprivate(before) private(bonds, g, m, k, i, breaks)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 4)
@@ -82,15 +87,19 @@ contains
         do i = 1, bonds%n
           call decide(model, u, k, bonds, i, breaks)
           if (.not. breaks) cycle
-          if (number(m) == 0) call energies(model, u, k, bonds, before, others)
+          if (number(m) == 0) call energies(family, model, laws, u, k, bonds, before, others)
           number(m) = number(m) + 1
           call family%break_bond(k, i)
         end do
         if (number(m) == 0) cycle
         call family%bonds_of(k, bonds)
-        call energies(model, u, k, bonds, lost(m, :), others)
+        call energies(family, model, laws, u, k, bonds, lost(m, :), others)
         lost(m, :) = (before - lost(m, :))*body%volume(k)
-        damage(k) = point_damage(bonds)
+        if (model%generic) then
+          damage(k) = generic_point_damage(family, model, laws, u, k, bonds)
+        else
+          damage(k) = point_damage(bonds)
+        end if
       end do
     end do
     !$omp end parallel
@@ -109,15 +118,25 @@ contains
   end subroutine break_bonds
 
   !> Energy density of slot `k` [J/m3]: as it is, and with the products of each set of `others`.
-  pure subroutine energies(model, u, k, bonds, density, others)
+  pure subroutine energies(family, model, laws, u, k, bonds, density, others)
+    class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
-    real(wp), intent(in) :: u(:, :)                    !! displacements (n_slots, dim) [m]
+    type(generic_workspace_type), intent(in), optional :: laws
+    real(wp), intent(in), contiguous :: u(:, :)        !! displacements (n_slots, dim) [m]
     integer, intent(in) :: k
     type(bonds_type), intent(in) :: bonds              !! of slot `k`
     real(wp), intent(out) :: density(0:)               !! (0:sets) [J/m3]
-    real(wp), intent(in), optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
+    real(wp), intent(in), contiguous, optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
     integer :: o
 
+    if (model%generic) then
+      if (.not. present(laws)) call internal_fault('bonds of laws break without their history')
+      density(0) = generic_point_energy(family, model, laws, u, k, bonds)
+      do o = 1, ubound(density, 1)
+        density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k, bonds)
+      end do
+      return
+    end if
     density(0) = point_energy(model, u, k, bonds)
     do o = 1, ubound(density, 1)
       density(o) = energy_product(model, u, others(:, :, o), k, bonds)

@@ -7,6 +7,7 @@ module pd_force_forces
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
   use pd_family_lattice, only: lattice_family_type
+  use pd_force_generic, only: generic_energy, generic_force, generic_pulls
   use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
   use pd_force_model, only: force_options_type, model_type
@@ -18,7 +19,8 @@ module pd_force_forces
 
   !> Parts of an evaluation. The first pass over the bonds marks what is strained to the limit; who
   !> breaks bonds does so between the parts, and then renews what the first pass gave the points
-  !> that lost some: their dilatation or, where the forces have none, their force.
+  !> that lost some: their dilatation or, where the forces have none, their force; on the generic
+  !> pass the pulls.
   integer, parameter :: whole = 0, up_to_marks = 1, after_marks = 2
 
 contains
@@ -45,7 +47,11 @@ contains
 
     now = whole
     if (present(part)) now = part
-    if (options%dilatation) then
+    if (model%generic) then
+      if (now /= after_marks) &
+        & call generic_pulls(family, model, workspace%generic, u, strained)
+      if (now /= up_to_marks) call generic_force(family, workspace%generic, u, force)
+    else if (options%dilatation) then
       if (now /= after_marks) &
         & call dilatation_pass(family, model, options, workspace, u, p, strained)
       if (now /= up_to_marks) call share_halo(body, p)
@@ -107,6 +113,10 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
 
+    if (model%generic) then
+      call generic_energy(family, model, workspace%generic, u, energy)
+      return
+    end if
     select type (family)
     type is (list_family_type)
       call list_energy(family, model, workspace%list, u, energy)

@@ -3,7 +3,7 @@
 module pd_force_general
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
-  use pd_force_model, only: early, force_options_type, model_type
+  use pd_force_model, only: early, force_options_type, model_type, q_of
   use pd_force_workspace, only: weights_type
   implicit none (type, external)
   private
@@ -109,12 +109,12 @@ contains
       call deform_block(model, options, first, weights%shift(m), weights%geometry(:, m), u, s, &
         & lambda, r, along)
       if (options%dilatation) theta = theta + weights%dilatation(:, m)*s*lambda
-      if (size(model%materials) > 1) then
+      if (size(model%materials) > 1 .or. allocated(model%scale)) then
         ! the weights hold q_k + q_j, the energy takes q_k/2 of the slot's own material
         j = first + weights%shift(m)
         do l = 1, lanes
-          associate (q => model%materials(model%material(first + l - 1))%q)
-            s(l) = s(l)*sqrt(2*q/(q + model%materials(model%material(j + l - 1))%q))
+          associate (q => q_of(model, int(first) + l - 1))
+            s(l) = s(l)*sqrt(2*q/(q + q_of(model, int(j) + l - 1)))
           end associate
         end do
       end if

@@ -19,7 +19,7 @@ module pd_force_lattice
   use pd_force_fast, only: fast_dilatation, fast_force, fast_energy
   use pd_force_general, only: general_dilatation, general_force, general_energy
   use pd_force_mixed, only: mixed_dilatation, mixed_force
-  use pd_force_model, only: dilatation_of, force_options_type, model_type, options_of
+  use pd_force_model, only: dilatation_of, force_options_type, model_type, options_of, p_of, t_of
   use pd_force_polynomial, only: fast_limit, fast_terms, narrow, wide, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
   use pd_force_weights, only: prepare_blocks, weights_now, half_of
@@ -228,15 +228,13 @@ contains
     real(wp) :: factor
     integer(i8) :: k
 
-    if (size(model%materials) == 1) then
+    if (size(model%materials) == 1 .and. .not. allocated(model%scale)) then
       factor = model%materials(1)%p*model%materials(1)%t
       p(first:first + lanes - 1) = factor*p(first:first + lanes - 1)
       return
     end if
     do k = first, first + lanes - 1
-      associate (m => model%materials(model%material(k)))
-        p(k) = m%p*m%t*p(k)
-      end associate
+      p(k) = p_of(model, int(k))*t_of(model, int(k))*p(k)
     end do
   end subroutine scale
 
@@ -449,7 +447,7 @@ contains
     integer :: l
 
     options = options_of(model)
-    if (size(model%materials) > 1 .or. .not. fast_terms(options)) then
+    if (size(model%materials) > 1 .or. allocated(model%scale) .or. .not. fast_terms(options)) then
       call general_energy(model, options, weights, first, u, stretches, theta)
     else
       call fast_energy(model%dim, dilatation_of(options), weights%n, size(u, 1), &
@@ -458,7 +456,8 @@ contains
     end if
     do l = 1, lanes
       associate (m => model%materials(model%material(first + l - 1)))
-        energy(first + l - 1) = stretches(l)/4 + m%a*(m%t*theta(l))**2
+        energy(first + l - 1) = stretches(l)/4 &
+          & + m%a*(t_of(model, int(first) + l - 1)*theta(l))**2
       end associate
     end do
   end subroutine energy_of_lanes

@@ -13,7 +13,7 @@ module pd_force_list
     & cluster_energy, take_given, take_up
   use pd_force_list_points, only: new_task, plain_task, survey
   use pd_force_list_tables, only: make_tables
-  use pd_force_model, only: early, force_options_type, model_type, options_of
+  use pd_force_model, only: early, force_options_type, model_type, options_of, p_of, t_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
   use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p
   implicit none (type, external)
@@ -100,9 +100,7 @@ contains
       end if
       do l = 1, lanes
         k = work%first + l - 1
-        associate (m => model%materials(model%material(k)))
-          p(k) = m%p*m%t*sums(l, 1)
-        end associate
+        p(k) = p_of(model, k)*t_of(model, k)*sums(l, 1)
       end do
     end do
   end subroutine list_dilatation
@@ -183,7 +181,7 @@ contains
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
       call take_given(workspace, work)
-      if (options%thermal) then
+      if (options%thermal .or. model%weighted) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
             & .true., work)
@@ -196,7 +194,7 @@ contains
         k = work%first + l - 1
         associate (m => model%materials(model%material(k)))
           energy(k) = sums(l, 1)
-          if (options%dilatation) energy(k) = energy(k) + m%a*(m%t*sums(l, 2))**2
+          if (options%dilatation) energy(k) = energy(k) + m%a*(t_of(model, k)*sums(l, 2))**2
         end associate
       end do
     end do

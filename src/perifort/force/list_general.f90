@@ -9,7 +9,7 @@ module pd_force_list_general
   use pd_family_volume, only: volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
-  use pd_force_model, only: force_options_type, model_type
+  use pd_force_model, only: bond_factors_of, force_options_type, model_type
   use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p
   implicit none (type, external)
   private
@@ -86,10 +86,10 @@ contains
     logical, intent(in) :: own          !! 2 q_k in place of q_k + q_j
     type(work_type), intent(inout) :: work
       !! of the cluster it has taken up; gets the tables of its bonds
-    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c
+    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c, gb, gd
     logical :: there(lanes), from(lanes)
     integer(i8) :: e
-    integer :: i, j, m, f
+    integer :: i, j, m, f, l
 
     call allocate_tables(family, work)
     call take_given(workspace, work)
@@ -125,6 +125,15 @@ contains
       work%geometry(:, i) = 1/length**2
       work%dilatation(:, i) = weight
       work%stretch(:, i) = q*weight/length
+      if (model%weighted) then
+        do l = 1, lanes
+          gb(l) = 0.0_wp
+          gd(l) = 0.0_wp
+          if (there(l)) call bond_factors_of(model, work%first + l - 1, length(l), gb(l), gd(l))
+        end do
+        work%stretch(:, i) = work%stretch(:, i)*gb
+        work%dilatation(:, i) = weight*gd
+      end if
       if (.not. model%surface) cycle
       x = x/length
       y = y/length
@@ -137,7 +146,7 @@ contains
           & + merge(workspace%given(f + 2, j), workspace%given(f + 2, m), from)
         ! with a common denominator there is one division
         a = 0.5_wp*a*b*c/sqrt(merge((x*b*c)**2 + (y*a*c)**2 + (z*a*b)**2, 1.0_wp, there))
-        if (f == given_D) work%dilatation(:, i) = weight*a
+        if (f == given_D) work%dilatation(:, i) = work%dilatation(:, i)*a
         if (f == given_S) work%stretch(:, i) = work%stretch(:, i)*a
       end do
     end do

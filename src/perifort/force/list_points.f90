@@ -10,7 +10,7 @@ module pd_force_list_points
   use pd_family_volume, only: volume_none, volume_linear, volume_linear_extended, volume_exact
   use pd_force_list_fast, only: task_type, no_correction, one_spacing, own_spacing, &
     & stored_fraction
-  use pd_force_model, only: force_options_type, model_type
+  use pd_force_model, only: force_options_type, model_type, q_of
   use pd_force_workspace, only: list_workspace_type
   implicit none (type, external)
   private
@@ -39,7 +39,7 @@ contains
     !$omp parallel default(none) shared(family, model, workspace) private(k, c, d)
     !$omp do schedule(static)
     do k = 1, family%n_slots
-      workspace%given(given_q, k) = model%materials(model%material(k))%q
+      workspace%given(given_q, k) = q_of(model, k)
       workspace%given(given_half, k) = family%spacing(k)/2
       if (.not. model%surface) cycle
       do d = 1, family%dim
@@ -49,6 +49,8 @@ contains
     end do
     !$omp do schedule(dynamic, 32)
     do c = 1, size(workspace%plain)
+      ! loops of plain clusters know no factors of a law
+      if (model%weighted) cycle
       if (is_plain(family, workspace%given, model%surface, c)) workspace%plain(c) = 1_i1
     end do
     !$omp end parallel

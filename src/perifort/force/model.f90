@@ -1,12 +1,16 @@
 !> What the force loops need to know beside the family: parameters of each slot, and which terms the
 !> scene has. Chosen once before the loop, so that a step costs only what the scene uses.
 module pd_force_model
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i2
   use pd_body_body, only: body_type
+  use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never
+  use pd_law_weighted, only: weighted_law_type
   implicit none (type, external)
   private
   public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early
+  public :: bond_factors_of, q_of, t_of, p_of, has_scales
   public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
@@ -35,8 +39,12 @@ module pd_force_model
     logical :: thermal = .false.      !! some temperature change
     logical :: breaking = .false.     !! some bond can fail
     logical :: compression = .false.  !! some bonds break in compression too
+    logical :: weighted = .false.     !! bonds have factors of their length, from the laws
+    logical :: generic = .false.      !! the generic pass computes the forces, by the laws
     type(material_type), allocatable :: materials(:)
+    type(law_item_type), allocatable :: laws(:)  !! of the materials; not allocated: the chapter's
     integer(i2), allocatable :: material(:)  !! of each slot
+    real(wp), allocatable :: scale(:)        !! of q, t and p of each slot, if some law has scales
     real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
     real(wp), allocatable :: expansion(:)    !! alpha dT of each slot [-], allocated if thermal
@@ -49,13 +57,15 @@ contains
 
   !> The model of a body. `zone` marks slots in no-fail zones, `temperature_change` [K] is per slot.
   !> Surface factors are set by whoever computes them.
-  pure subroutine new_model(body, materials, with_lambda, zone, temperature_change, model)
+  subroutine new_model(body, materials, with_lambda, zone, temperature_change, model, laws)
     type(body_type), intent(in) :: body              !! arranged in slots
     type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
     logical, intent(in) :: with_lambda  !! the dilatation is `projected`, as printed
     logical, intent(in) :: zone(:)                   !! (n_slots) slots in no-fail zones
     real(wp), intent(in) :: temperature_change(:)    !! (n_slots) of each slot [K]
-    type(model_type), intent(out) :: model           !! without surface factors
+    type(model_type), intent(out) :: model           !! without surface factors and scales
+    type(law_item_type), intent(in), optional :: laws(:)
+      !! (materials) their bond laws, set up; without, those of the chapter
     logical :: used(size(materials))
     integer :: k
 
@@ -68,6 +78,10 @@ contains
       if (body%point(k) > 0) used(body%material(k)) = .true.
     end do
     model%dilatation = any(used .and. abs(materials%a) > 0.0_wp)
+    if (present(laws)) then
+      allocate (model%laws, source=laws)
+      call choose_pass(used, model)
+    end if
     model%thermal = any(abs(temperature_change) > 0.0_wp) .and. &
       & any(used .and. abs(materials%expansion) > 0.0_wp)
     if (model%thermal) model%expansion = materials(body%material)%expansion*temperature_change
@@ -83,6 +97,92 @@ contains
       model%compressed = merge(1_i1, 0_i1, materials(body%material)%break_in_compression)
     end if
   end subroutine new_model
+
+  !> Which pass computes the forces of the laws in use. The fast loops have one weight of a bond for
+  !> each of its two forces, so that both ends need the same factors.
+  subroutine choose_pass(used, model)
+    logical, intent(in) :: used(:)
+    type(model_type), intent(inout) :: model
+    integer :: i, first
+
+    first = findloc(used, .true., dim=1)
+    if (first == 0) return
+    do i = 1, size(used)
+      if (.not. used(i)) cycle
+      model%generic = model%generic .or. .not. model%laws(i)%law%weighted
+      select type (law => model%laws(i)%law)
+      class is (weighted_law_type)
+        model%weighted = model%weighted .or. law%has_factors()
+      class default  ! a law with a force of its own
+        model%generic = .true.
+      end select
+      associate (one => model%laws(first)%law, other => model%laws(i)%law)
+        model%generic = model%generic .or. .not. (same_type_as(one, other) &
+          & .and. one%influence == other%influence)
+      end associate
+    end do
+    if (.not. model%generic) return
+    model%weighted = .false.
+    model%dilatation = .false.  ! the laws have it
+  end subroutine choose_pass
+
+  !> Factors of the stretch and of the dilatation of a bond of slot `k`, by its length (doc/theory.md,
+  !> 10).
+  pure subroutine bond_factors_of(model, k, length, gb, gd)
+    type(model_type), intent(in) :: model  !! with weighted laws
+    integer, intent(in) :: k               !! slot
+    real(wp), intent(in) :: length         !! |xi| [m]
+    real(wp), intent(out) :: gb            !! factor of the stretch's force [-]
+    real(wp), intent(out) :: gd            !! factor of the dilatation [-]
+
+    select type (law => model%laws(model%material(k))%law)
+    class is (weighted_law_type)
+      call law%bond_factors(length/law%delta, gb, gd)
+    class default
+      call internal_fault('a law without weights on the fast loops')
+    end select
+  end subroutine bond_factors_of
+
+  !> Whether some law in use has points of different scales.
+  pure logical function has_scales(model)
+    type(model_type), intent(in) :: model  !! with its laws
+    integer :: i
+
+    has_scales = .false.
+    if (.not. model%weighted) return
+    do i = 1, size(model%laws)
+      select type (law => model%laws(i)%law)
+      class is (weighted_law_type)
+        has_scales = has_scales .or. law%scaled
+      class default  ! the generic pass asks the law
+        continue
+      end select
+    end do
+  end function has_scales
+
+  !> q of slot `k` (doc/theory.md, 2), with its scale [N/m6].
+  pure real(wp) function q_of(model, k) result(q)
+    type(model_type), intent(in) :: model  !! the model
+    integer, intent(in) :: k               !! slot
+    q = model%materials(model%material(k))%q
+    if (allocated(model%scale)) q = model%scale(k)*q
+  end function q_of
+
+  !> t of slot `k`: theta_k = t sum(...), with its scale [1/m3].
+  pure real(wp) function t_of(model, k) result(t)
+    type(model_type), intent(in) :: model  !! the model
+    integer, intent(in) :: k               !! slot
+    t = model%materials(model%material(k))%t
+    if (allocated(model%scale)) t = model%scale(k)*t
+  end function t_of
+
+  !> p of slot `k`: p_k = p theta_k, with its scale [N/m5].
+  pure real(wp) function p_of(model, k) result(p)
+    type(model_type), intent(in) :: model  !! the model
+    integer, intent(in) :: k               !! slot
+    p = model%materials(model%material(k))%p
+    if (allocated(model%scale)) p = model%scale(k)*p
+  end function p_of
 
   !> What the forces of the model itself take in.
   pure type(force_options_type) function options_of(model) result(options)

@@ -4,7 +4,7 @@ module pd_force_reference
   use pd_base_kinds, only: wp
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
-  use pd_force_model, only: model_type
+  use pd_force_model, only: bond_factors_of, model_type, p_of, q_of, t_of
   implicit none (type, external)
   private
   public :: bond_state_type, state_of_bond, point_dilatation, point_force, point_energy
@@ -15,7 +15,7 @@ module pd_force_reference
     real(wp) :: stretch = 0.0_wp       !! mechanical: without thermal expansion [-]
     real(wp) :: direction(3) = 0.0_wp  !! unit vector of the deformed bond
     real(wp) :: lambda = 1.0_wp        !! its cosine with the undeformed one, 1 if unprojected
-    real(wp) :: Gd = 1.0_wp            !! surface factors
+    real(wp) :: Gd = 1.0_wp            !! surface factors times those of the law
     real(wp) :: Gb = 1.0_wp
   end type bond_state_type
 
@@ -30,7 +30,7 @@ contains
     type(bonds_type), intent(in) :: bonds  !! of slot `k`
     integer, intent(in) :: i               !! number of the bond, from 1
     type(bond_state_type) :: state
-    real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length, y
+    real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length, y, gb, gd
     integer :: j
 
     j = bonds%j(i)
@@ -46,6 +46,11 @@ contains
     if (model%surface) then
       state%Gd = bond_factor(xi/length, model%D(k, :), model%D(j, :))
       state%Gb = bond_factor(xi/length, model%S(k, :), model%S(j, :))
+    end if
+    if (model%weighted) then
+      call bond_factors_of(model, k, length, gb, gd)
+      state%Gd = state%Gd*gd
+      state%Gb = state%Gb*gb
     end if
   end function state_of_bond
 
@@ -64,7 +69,7 @@ contains
       state = state_of_bond(model, u, k, bonds, i)
       theta = theta + state%Gd*state%stretch*state%lambda*bonds%weight(i)
     end do
-    theta = theta*model%materials(model%material(k))%t
+    theta = theta*t_of(model, k)
   end function point_dilatation
 
   !> Force density of slot `k` [N/m3] (7.37, 7.38) from the coefficients p_k = 2 a d delta theta_k.
@@ -84,8 +89,7 @@ contains
       if (.not. bonds%intact(i)) cycle
       j = bonds%j(i)
       state = state_of_bond(model, u, k, bonds, i)
-      magnitude = (model%materials(model%material(k))%q + model%materials(model%material(j))%q) &
-        & *state%Gb*state%stretch
+      magnitude = (q_of(model, k) + q_of(model, j))*state%Gb*state%stretch
       if (model%dilatation) &
         & magnitude = magnitude + (p(k) + p(j))*state%Gd*state%lambda/bonds%length(i)
       force = force + magnitude*bonds%weight(i)*state%direction(:size(u, 2))
@@ -121,7 +125,7 @@ contains
         & *bonds%weight(i)
     end do
     associate (m => model%materials(model%material(k)))
-      energy = m%q/2*energy
+      energy = q_of(model, k)/2*energy
       if (abs(m%a) > 0.0_wp) energy = energy + m%a*point_dilatation(model, u, k, bonds) &
         & *point_dilatation(model, other, k, bonds)
     end associate
@@ -176,7 +180,7 @@ contains
     allocate (p(family%n_slots), source=0.0_wp)
     if (model%dilatation) then
       call reference_dilatation(family, model, u, p)
-      p = p*model%materials(model%material)%p
+      p = p*[(p_of(model, k), k=1, family%n_slots)]
     end if
     !$omp parallel default(none) shared(family, model, u, p, force) private(bonds, k)
     call allocate_bonds(family, bonds)

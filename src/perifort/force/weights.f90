@@ -8,7 +8,7 @@ module pd_force_weights
   use pd_base_lookup, only: lookup_type, mix
   use pd_family_lattice, only: lattice_family_type, use_double, grid_at, both_ends
   use pd_family_surface, only: bond_factor
-  use pd_force_model, only: model_type, options_of
+  use pd_force_model, only: bond_factors_of, model_type, options_of, q_of
   use pd_force_polynomial, only: fast_limit, narrow, single
   use pd_force_workspace, only: lattice_workspace_type, singles_type, weights_type
   implicit none (type, external)
@@ -38,7 +38,7 @@ contains
       & call use_double(family)
     call prepare_blocks(family, model, workspace)
     ! without surface factors, members farther away than a block's own do not count
-    if (.not. model%surface) family%class_of = merge(int(model%material, i4), 0_i4, &
+    if (.not. (model%surface .or. allocated(model%scale))) family%class_of = merge(int(model%material, i4), 0_i4, &
       & family%alive == 1_i1)
     call find_kinds(family, workspace, first, uses)
     order = most_used_first(uses)
@@ -263,7 +263,7 @@ contains
     integer(i8), intent(in) :: first                 !! slot of the block's first lane
     type(weights_type), intent(inout) :: weights
       !! with room for any block; those of this one on return
-    real(wp) :: weight, n(family%dim)
+    real(wp) :: weight, n(family%dim), gb, gd
     integer(i8) :: k, j
     integer :: i, o, l, m, length
 
@@ -289,13 +289,18 @@ contains
           if (model%dilatation) weights%dilatation(l, m) = 0.0_wp
           if (alive(k) == 0_i1 .or. alive(j) == 0_i1) cycle
           weight = grid%fraction(o)*grid%cell_volume
-          weights%stretch(l, m) = weight*grid%length(o)*(model%materials(model%material(k))%q &
-            & + model%materials(model%material(j))%q)
+          weights%stretch(l, m) = weight*grid%length(o)*(q_of(model, int(k)) + q_of(model, int(j)))
           if (model%dilatation) weights%dilatation(l, m) = weight
+          if (model%weighted) then
+            call bond_factors_of(model, int(k), grid%length(o), gb, gd)
+            weights%stretch(l, m) = weights%stretch(l, m)*gb
+            if (model%dilatation) weights%dilatation(l, m) = weight*gd
+          end if
           if (.not. model%surface) cycle
           weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
           if (.not. model%dilatation) cycle
-          weights%dilatation(l, m) = weight*bond_factor(n, model%D(k, :), model%D(j, :))
+          weights%dilatation(l, m) = weights%dilatation(l, m) &
+            & *bond_factor(n, model%D(k, :), model%D(j, :))
         end do
       end do
     end associate

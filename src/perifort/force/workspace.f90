@@ -3,12 +3,13 @@
 !> next. The owner of the model owns the workspace (`pd_motion_system`); another model takes another
 !> one.
 module pd_force_workspace
-  use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_kinds, only: wp, sp, i1, i2, i4, i8
   use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
   implicit none (type, external)
   private
   public :: workspace_type, lattice_workspace_type, list_workspace_type, weights_type, singles_type
+  public :: generic_workspace_type
   public :: at_volume, at_moved, at_p
 
   !> Where things stand in `at`: behind the position come volume, displacement and p.
@@ -67,10 +68,23 @@ module pd_force_workspace
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
   end type list_workspace_type
 
-  !> Of any family: the part that its loops use is filled, the other one empty.
+  !> Of the generic pass, on any family (`pd_force_generic`). Values of bonds are in the order of
+  !> `bonds_of`.
+  type :: generic_workspace_type
+    integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
+    integer(i2), allocatable :: back(:)        !! the bond's number in the family of its other end
+    real(wp), allocatable :: pull(:)           !! the slot's own part of each pair force density at
+                                               !! the displacements of the last pass [N/m6]
+    real(wp), allocatable :: history(:, :)     !! of each ordered bond (reals, bonds)
+    real(wp), allocatable :: of_point(:, :)    !! of each slot (reals, n_slots)
+    real(wp), allocatable :: constants(:, :)   !! that the laws have made (reals, n_slots)
+  end type generic_workspace_type
+
+  !> Of any family: the part that its loops use is filled, the others are empty.
   type :: workspace_type
     type(lattice_workspace_type) :: lattice
     type(list_workspace_type) :: list
+    type(generic_workspace_type) :: generic
   contains
     procedure :: bytes
     procedure :: describe
@@ -82,7 +96,8 @@ contains
   pure integer(i8) function bytes(workspace)
     class(workspace_type), intent(in) :: workspace  !! of any family
 
-    bytes = bytes_of_lattice(workspace%lattice) + bytes_of_list(workspace%list)
+    bytes = bytes_of_lattice(workspace%lattice) + bytes_of_list(workspace%list) &
+      & + bytes_of_generic(workspace%generic)
   end function bytes
 
   pure integer(i8) function bytes_of_lattice(workspace) result(bytes)
@@ -110,6 +125,16 @@ contains
       & + size(workspace%weight_D, kind=i8) + size(workspace%weight_S, kind=i8) &
       & + size(workspace%geometry, kind=i8)) + 18_i8*size(workspace%large)
   end function bytes_of_list
+
+  pure integer(i8) function bytes_of_generic(workspace) result(bytes)
+    type(generic_workspace_type), intent(in) :: workspace
+
+    bytes = 0_i8
+    if (.not. allocated(workspace%start)) return
+    bytes = 10*size(workspace%pull, kind=i8) + 8*(size(workspace%start, kind=i8) &
+      & + size(workspace%history, kind=i8) + size(workspace%of_point, kind=i8) &
+      & + size(workspace%constants, kind=i8))
+  end function bytes_of_generic
 
   !> How many tables there are, to follow the family's own description; empty where nobody counts
   !> them.

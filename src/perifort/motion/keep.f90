@@ -5,6 +5,7 @@ module pd_motion_keep
   use pd_base_archive, only: archive_type
   use pd_base_checksum, only: checksum_type
   use pd_base_kinds, only: wp, i1, i8
+  use pd_force_generic, only: keep_laws
   use pd_motion_heating, only: keep_heating
   use pd_motion_memory, only: keep_memory
   use pd_motion_system, only: system_type
@@ -31,6 +32,8 @@ contains
     call system%family%keep_bonds(archive)
     call archive%keep('broken bonds', system%broken)
     call archive%keep('dissipated energy', system%dissipated)
+    call keep_laws(archive, system%workspace%generic)
+    call archive%keep('dissipation of laws', system%law_dissipation)
     call archive%keep('external work', system%external_work)
     call archive%keep('dissipation due', system%dissipation_due)
     call archive%keep('work due', system%work_due)

@@ -6,8 +6,9 @@ module pd_motion_system
   use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
+  use pd_force_generic, only: commit_laws, renew_pulls
   use pd_force_forces, only: internal_force, energy_pass, whole, up_to_marks, after_marks
-  use pd_force_model, only: model_type, options_of
+  use pd_force_model, only: model_type, options_of, p_of
   use pd_force_reference, only: point_dilatation, point_force
   use pd_force_term, only: term_list_type, term_view_type
   use pd_force_workspace, only: workspace_type
@@ -45,6 +46,7 @@ module pd_motion_system
     integer(i1), allocatable :: strained(:)     !! marks of the last pass
     integer(i8) :: broken = 0_i8                !! bonds broken during the run
     real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking [J]
+    real(wp) :: law_dissipation = 0.0_wp        !! what bond laws with a history dissipated [J]
     real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
     real(wp) :: dissipation_due = 0.0_wp        !! parts of both that fall into the step to come,
     real(wp) :: work_due = 0.0_wp               !! of bonds that broke after the last forces [J]
@@ -168,7 +170,10 @@ contains
     if (early) then
       call renew_forces(system, t, up_to_marks)
       call break_marked(system, t, pair, slots)
-      if (system%model%dilatation) then
+      if (system%model%generic) then
+        call renew_pulls(system%family, system%model, system%workspace%generic, system%state%u, &
+          & slots)
+      else if (system%model%dilatation) then
         call renew_dilatation(system, slots)
       else
         call renew_force(system, slots)
@@ -244,7 +249,7 @@ contains
       call displacements_at(system, t, pairing, slots, others)
       allocate (products(size(others, 3)))
       call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
-        & system%state%damage, broken, dissipated, others, products)
+        & system%state%damage, broken, dissipated, others, products, system%workspace%generic)
       ! what bonds that break after the forces still do, they do in the step to come
       system%dissipation_due = products(1) - dissipated
       ! the trapezoidal rule lets bonds pull at constrained points up to half a step before or after
@@ -253,7 +258,7 @@ contains
       if (.not. system%break_late) call settle_account(system)
     else
       call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
-        & system%state%damage, broken, dissipated)
+        & system%state%damage, broken, dissipated, laws=system%workspace%generic)
     end if
     system%broken = system%broken + broken
     system%dissipated = system%dissipated + dissipated
@@ -335,8 +340,7 @@ contains
       do m = 1, size(slots)
         k = slots(m)
         call system%family%bonds_of(k, bonds)
-        system%state%p(k) = model%materials(model%material(k))%p &
-          & *point_dilatation(model, system%state%u, k, bonds)
+        system%state%p(k) = p_of(model, k)*point_dilatation(model, system%state%u, k, bonds)
       end do
     end associate
   end subroutine renew_dilatation
@@ -424,7 +428,7 @@ contains
   !> where imposed motion has no speed) nothing is accelerated.
   !>
   !> Terms of the force come to the present, too: their work is summed, and they bring their history
-  !> up to date.
+  !> up to date. So do bond laws: the step is accepted.
   subroutine account(system, t, at_rest)
     type(system_type), intent(inout), target :: system
       !! its work, reactions and the histories of its terms are those of this instant on return
@@ -492,11 +496,22 @@ contains
         system%external_work = system%external_work + totals(1)
       end do
     end do
+    if (system%model%generic) call commit(system)
     if (system%terms%number() == number_of_loads(system%terms)) return
     call view_of(system, t, view)
     call system%terms%account(view, system%external_work, system%dissipated)
     call system%terms%advance(view)
   end subroutine account
+
+  !> Commit the histories of the bond laws.
+  subroutine commit(system)
+    type(system_type), intent(inout) :: system
+    real(wp) :: dissipated
+
+    call commit_laws(system%body, system%family, system%model, system%workspace%generic, &
+      & system%state%u, system%state%damage, dissipated)
+    system%law_dissipation = system%law_dissipation + dissipated
+  end subroutine commit
 
   !> Work of varying temperature since the last call: the strain energy that it changes at fixed
   !> displacements, by the trapezoidal rule. The energy is quadratic in the thermal strain, so that

@@ -65,6 +65,8 @@ contains
   !> What the force loops keep of the model: the weights of the bonds.
   subroutine finish_family(system)
     type(system_type), intent(inout) :: system  !! with its model; its workspace is made
+
+    if (system%model%generic) return  ! its pass needs no weights
     select type (family => system%family)
     type is (lattice_family_type)
       call build_weights(family, system%model, system%workspace%lattice)

@@ -73,7 +73,8 @@ contains
     if (damping > 0.0_wp) plan%equation = damped_step(plan%equation, damping, plan%integrator)
     plan%limit = plan%equation
     if (scene%time%limit == 'spectral') call measure_limit(system, stiffness, damping, plan)
-    call printed_step(system%body, system%family, system%model, plan%printed)
+    if (.not. (system%model%weighted .or. system%model%generic)) &
+      & call printed_step(system%body, system%family, system%model, plan%printed)
     plan%book = book_step(system%model, system%body%dim, system%family%rule%delta, &
       & depth_of(scene), minval(system%body%spacing, mask=system%body%point > 0))
     plan%step = scene%time%safety*plan%limit

@@ -9,17 +9,19 @@ module pd_set_up_prepare
   use pd_body_generate, only: generate_body
   use pd_body_initial, only: initial_state
   use pd_body_layers, only: layer_count_type, layer_count_text
+  use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_family_cracks, only: cut_bonds
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of
+  use pd_force_generic, only: begin_laws
   use pd_force_model, only: new_model
   use pd_force_term, only: term_list_type
   use pd_motion_conditions, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system
-  use pd_scene_content_rules, only: place_fault
+  use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_conditions, only: motions_of_scene, loads_of_scene, heating_of_scene, &
@@ -60,6 +62,7 @@ contains
     type(term_list_type), intent(in), optional :: terms  !! copied; none if absent
     type(load_type), allocatable :: loads(:)
     type(material_type), allocatable :: materials(:)
+    type(law_item_type), allocatable :: laws(:)
     real(wp), allocatable :: temperature_change(:)
     integer(i2), allocatable :: heated_by(:)
     type(layer_count_type), allocatable :: layers(:)
@@ -78,7 +81,8 @@ contains
         if (layer_count_text(scene, layers(i)) /= '') call set_up%warnings%add('layer '// &
           & to_text(i), layer_count_text(scene, layers(i)), tell=.false.)
       end do
-      materials = materials_of_scene(scene, delta)
+      call materials_of_scene(scene, delta, materials, laws, error)
+      if (allocated(error)) return
       call timer%stop('points')
 
       call timer%start('families')
@@ -99,7 +103,9 @@ contains
         & heated_by, error)
       if (allocated(error)) return
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
-        & in_no_fail_zones(scene, system%body), temperature_change, system%model)
+        & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
+      call check_laws(scene, system, error)
+      if (allocated(error)) return
       if (system%model%thermal) call heating_of_scene(scene, heated_by, system%model%expansion, &
         & system%heating)
       call motions_of_scene(scene, system%body, system%motions, error)
@@ -113,7 +119,8 @@ contains
       call timer%start('surface correction')
       system%model%surface = scene%horizon%surface_correction == 'energy'
       if (system%model%surface) call surface_factors(system%body, system%family, materials, &
-        & system%model%D, system%model%S)
+        & system%model%D, system%model%S, laws)
+      call begin_laws(system%body, system%family, system%model, system%workspace%generic)
       call finish_family(system)
       call timer%stop('surface correction')
 
@@ -140,5 +147,32 @@ contains
       call timer%stop('time step')
     end associate
   end subroutine prepare
+
+  !> An error is set if the generic pass cannot serve what a scene asks for.
+  subroutine check_laws(scene, system, error)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system  !! with its model
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: why
+
+    if (.not. (system%model%generic .or. system%model%weighted)) return
+    if (scene%time%method == 'relaxation' .and. &
+      & scene%relaxation%density_matrix /= 'frame_invariant') then
+      call scene_fault(error, scene, 'relaxation', 1, 'density_matrix', "density_matrix = '"// &
+        & trim(scene%relaxation%density_matrix)//"' holds for the chapter's laws with influence "// &
+        & "= 'inverse'", "this scene has another law: use 'frame_invariant'")
+      return
+    end if
+    if (.not. system%model%generic) return
+    why = 'its bond laws are computed on the generic pass, in double precision'
+    if (scene%header%precision == 'mixed') then
+      call scene_fault(error, scene, 'scene', 1, 'precision', &
+        & "the scene cannot have precision = 'mixed'", why)
+    else if (scene%time%method == 'explicit' .and. scene%time%limit == 'spectral') then
+      call scene_fault(error, scene, 'time', 1, 'limit', &
+        & "the scene cannot have limit = 'spectral'", 'its bond laws may change their stiffness: '// &
+        & "use limit = 'equation'")
+    end if
+  end subroutine check_laws
 
 end module pd_set_up_prepare

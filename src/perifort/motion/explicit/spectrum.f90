@@ -14,7 +14,7 @@ module pd_motion_explicit_spectrum
   use pd_law_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
-  use pd_force_model, only: force_options_type, model_type, options_of
+  use pd_force_model, only: bond_factors_of, force_options_type, model_type, options_of, q_of, t_of
   use pd_force_workspace, only: workspace_type
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
@@ -252,12 +252,13 @@ contains
     type(system_type), intent(in) :: system
     real(wp), allocatable, intent(out) :: beta(:)   !! (n_slots) [-]
     type(bonds_type) :: bonds
-    real(wp) :: sum_of_bonds, Gd, Gb, n(system%body%dim)
+    real(wp) :: sum_of_bonds, Gd, Gb, n(system%body%dim), stretch_factor, dilatation_factor
     integer :: k, i
 
     allocate (beta(system%body%n_slots), source=1.0_wp)
     if (.not. system%model%dilatation) return
-    !$omp parallel default(none) shared(system, beta) private(bonds, sum_of_bonds, Gd, Gb, n, k, i)
+    !$omp parallel default(none) shared(system, beta) &
+    !$omp private(bonds, sum_of_bonds, Gd, Gb, n, stretch_factor, dilatation_factor, k, i)
     call allocate_bonds(system%family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, system%body%n_slots
@@ -276,9 +277,15 @@ contains
             Gd = bond_factor(n, model%D(k, :), model%D(bonds%j(i), :))
             Gb = bond_factor(n, model%S(k, :), model%S(bonds%j(i), :))
           end if
+          if (model%weighted) then
+            call bond_factors_of(model, k, bonds%length(i), stretch_factor, dilatation_factor)
+            Gd = dilatation_factor*merge(Gd, 1.0_wp, model%surface)
+            Gb = stretch_factor*merge(Gb, 1.0_wp, model%surface)
+            if (.not. Gb > 0.0_wp) cycle
+          end if
           sum_of_bonds = sum_of_bonds + Gd**2/Gb*bonds%weight(i)/bonds%length(i)
         end do
-        beta(k) = 1 + 2*material%a*material%t**2*sum_of_bonds/material%q
+        beta(k) = 1 + 2*material%a*t_of(model, k)**2*sum_of_bonds/q_of(model, k)
       end associate
     end do
     !$omp end parallel

@@ -9,7 +9,8 @@ module pd_motion_explicit_time_step
   use pd_family_surface, only: bond_factor
   use pd_family_lattice, only: lattice_family_type
   use pd_force_bound, only: lattice_bound, lattice_printed_bound
-  use pd_force_model, only: model_type
+  use pd_force_generic, only: generic_bound
+  use pd_force_model, only: bond_factors_of, model_type, q_of, t_of
   use pd_force_workspace, only: workspace_type
   implicit none (type, external)
   private
@@ -33,6 +34,10 @@ contains
     real(wp) :: n(body%dim)
     integer :: k, i, j
 
+    if (model%generic) then
+      call generic_bound(family, model, workspace%generic, bound)
+      return
+    end if
     select type (family)
     type is (lattice_family_type)
       ! the weights hold all that is needed, unless they are not made yet
@@ -55,11 +60,11 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
-            & /bonds%length(i)
+          inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
+            & *law_factor(model, k, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
         end do
         associate (m => model%materials(model%material(k)))
-          inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*m%t**2
+          inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*t_of(model, k)**2
         end associate
       end do
     end if
@@ -71,10 +76,10 @@ contains
       do i = 1, bonds%n
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
-        bound(k) = bound(k) + ((model%materials(model%material(k))%q &
-          & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
-          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j)) &
-          & *bonds%weight(i)/bonds%length(i)
+        bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j)) &
+          & *surface_factor(model, model%S, n, k, j)*law_factor(model, k, bonds%length(i), .false.) &
+          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j) &
+          & *law_factor(model, k, bonds%length(i), .true.))*bonds%weight(i)/bonds%length(i)
       end do
     end do
     !$omp end parallel
@@ -89,6 +94,20 @@ contains
     surface_factor = 1.0_wp
     if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :)))
   end function surface_factor
+
+  !> The size of a law's factor of a bond: that of the dilatation or of the stretch.
+  pure real(wp) function law_factor(model, k, length, of_dilatation) result(factor)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k
+    real(wp), intent(in) :: length
+    logical, intent(in) :: of_dilatation
+    real(wp) :: gb, gd
+
+    factor = 1.0_wp
+    if (.not. model%weighted) return
+    call bond_factors_of(model, k, length, gb, gd)
+    factor = abs(merge(gd, gb, of_dilatation))
+  end function law_factor
 
   !> 7.25: the smallest sqrt(2 rho_k/M_k) [s].
   real(wp) function stable_step(body, model, bound) result(step)
@@ -106,7 +125,7 @@ contains
   end function stable_step
 
   !> 7.25 as printed: without surface factors, and with the plain sign of a. Negative sums have no
-  !> step: 0 is returned. Shown beside the step that is used.
+  !> step: 0 is returned. Shown beside the step that is used, for the chapter's laws alone.
   subroutine printed_step(body, family, model, step)
     type(body_type), intent(in) :: body       !! arranged in the slots of the family
     class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact

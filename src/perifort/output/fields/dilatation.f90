@@ -3,7 +3,9 @@ module pd_output_fields_dilatation
   use pd_base_kinds, only: wp
   use pd_body_body, only: gather
   use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_force_generic, only: generic_point_dilatation
   use pd_force_reference, only: point_dilatation, reference_dilatation
+  use pd_motion_system, only: system_type
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type
   implicit none (type, external)
@@ -28,7 +30,11 @@ contains
 
     associate (system => now%system)
       allocate (of_slots(system%body%n_slots))
-      call reference_dilatation(system%family, system%model, system%state%u, of_slots)
+      if (system%model%generic) then
+        call dilatation_by_laws(system, of_slots)
+      else
+        call reference_dilatation(system%family, system%model, system%state%u, of_slots)
+      end if
       call gather(system%body, of_slots, values(:, 1))
     end associate
   end subroutine fill
@@ -42,9 +48,32 @@ contains
     associate (system => now%system)
       call allocate_bonds(system%family, bonds)
       call system%family%bonds_of(k, bonds)
-      values = point_dilatation(system%model, system%state%u, k, bonds)
+      if (system%model%generic) then
+        values = generic_point_dilatation(system%family, system%model, system%workspace%generic, &
+          & system%state%u, k, bonds)
+      else
+        values = point_dilatation(system%model, system%state%u, k, bonds)
+      end if
     end associate
   end subroutine at_slot
+
+  !> Of all slots, each by its law.
+  subroutine dilatation_by_laws(system, theta)
+    type(system_type), intent(in) :: system
+    real(wp), intent(out) :: theta(:)
+    type(bonds_type) :: bonds
+    integer :: k
+
+    !$omp parallel default(none) shared(system, theta) private(bonds, k)
+    call allocate_bonds(system%family, bonds)
+    !$omp do schedule(static)
+    do k = 1, system%body%n_slots
+      call system%family%bonds_of(k, bonds)
+      theta(k) = generic_point_dilatation(system%family, system%model, system%workspace%generic, &
+        & system%state%u, k, bonds)
+    end do
+    !$omp end parallel
+  end subroutine dilatation_by_laws
 
   pure subroutine exact(state, values, known)
     type(exact_type), intent(in) :: state

@@ -4,6 +4,7 @@ module pd_output_fields_energy_density
   use pd_body_body, only: gather
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
+  use pd_force_generic, only: generic_point_energy
   use pd_force_reference, only: point_energy
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type
@@ -44,7 +45,12 @@ contains
     associate (system => now%system)
       call allocate_bonds(system%family, bonds)
       call system%family%bonds_of(k, bonds)
-      values = point_energy(system%model, system%state%u, k, bonds)
+      if (system%model%generic) then
+        values = generic_point_energy(system%family, system%model, system%workspace%generic, &
+          & system%state%u, k, bonds)
+      else
+        values = point_energy(system%model, system%state%u, k, bonds)
+      end if
     end associate
   end subroutine at_slot
 

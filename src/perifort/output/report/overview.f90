@@ -6,7 +6,8 @@ module pd_output_report_overview
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
   use pd_scene_content_types, only: scene_type
-  use pd_law_material, only: material_type, energy_from_critical_stretch, never
+  use pd_law_law, only: bond_law_type
+  use pd_law_material, only: material_type, never
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_set_up_conditions, only: no_fail_mask, region_mask
@@ -30,16 +31,16 @@ contains
     do i = 1, size(scene%materials)
       if (size(scene%materials) > 1) text = text//line('material', trim(scene%materials(i)%name))
       text = text//material_lines(scene, system%model%materials(i), &
-        & system%family%rule%delta, density_counts)
+        & system%model%laws(i)%law, density_counts)
     end do
     text = text//lengths(scene, system)//counts(scene, system)
   end function overview
 
   !> Wave speeds and critical stretch of a material.
-  pure function material_lines(scene, m, delta, density_counts) result(text)
+  function material_lines(scene, m, law, density_counts) result(text)
     type(scene_type), intent(in) :: scene
     type(material_type), intent(in) :: m
-    real(wp), intent(in) :: delta           !! horizon [m]
+    class(bond_law_type), intent(in) :: law
     logical, intent(in) :: density_counts
     character(:), allocatable :: text
 
@@ -62,9 +63,22 @@ contains
     end if
     if (m%critical_stretch >= never) return
     text = text//line('crit. stretch', to_text(m%critical_stretch, 4))// &
-      & line('Gc', with_unit(energy_from_critical_stretch(m, scene%header%dimension, delta), &
-      & 'J/m2', 4)//', from the critical stretch at this horizon')
+      & line('Gc', with_unit(energy_of(m%critical_stretch, law), 'J/m2', 4)// &
+      & ', from the critical stretch at this horizon')
   end function material_lines
+
+  !> The critical energy release rate of a critical stretch, which grows with a power of it; 0 for a
+  !> law without one [J/m2].
+  pure real(wp) function energy_of(s_c, law) result(Gc)
+    real(wp), intent(in) :: s_c
+    class(bond_law_type), intent(in) :: law
+    real(wp) :: one, four
+
+    Gc = 0.0_wp
+    one = law%critical_stretch(1.0_wp)
+    four = law%critical_stretch(4.0_wp)
+    if (one > 0.0_wp) Gc = (s_c/one)**(log(4.0_wp)/log(four/one))
+  end function energy_of
 
   !> The horizon compared with spacings, bodies and cracks.
   function lengths(scene, system) result(text)

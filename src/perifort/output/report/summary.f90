@@ -9,6 +9,7 @@ module pd_output_report_summary
   use pd_scene_content_types, only: scene_type
   use pd_family_lattice, only: lattice_family_type
   use pd_family_list, only: list_family_type
+  use pd_force_model, only: model_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_report_probes, only: probe_type
@@ -112,8 +113,10 @@ contains
     else if (scene%time%limit == 'spectral') then
       text = text//line('', 'the largest frequency does not allow a larger step')
     end if
-    text = text//line('7.25 as printed', printed(plan))
-    text = text//line('book''s estimate', with_unit(plan%book, 's', 6))
+    if (.not. (system%model%weighted .or. system%model%generic)) then
+      text = text//line('7.25 as printed', printed(plan))
+      text = text//line('book''s estimate', with_unit(plan%book, 's', 6))
+    end if
     text = text//line('steps', to_text(plan%steps))
     text = text//line('end time', with_unit(plan%steps*plan%step, 's', 6))
   end function steps
@@ -126,7 +129,13 @@ contains
 
     associate (model => system%model)
       text = line('families', system%family%describe()//system%workspace%describe())
-      if (model%dilatation) then
+      text = text//laws_of(model)
+      if (model%generic) then
+        text = text//line('forces', 'generic pass: each law gets all bonds of a point at a time')
+        text = text//line('', with_unit(8.0_wp*size(system%workspace%generic%history, kind=i8), &
+          & 'B', 3)//' of history of bonds, '//to_text(size(system%workspace%generic%history, 1))// &
+          & ' reals for each direction of a bond')
+      else if (model%dilatation) then
         text = text//line('forces', 'state-based: two passes over the bonds, for the '// &
           & 'dilatations and for the forces')
         text = text//line('dilatation', trim(scene%horizon%dilatation))
@@ -148,6 +157,23 @@ contains
       text = text//line('precision', precision_of(scene, system))
     end associate
   end function forces
+
+  !> The bond laws, where they are not the chapter's with its influence function.
+  function laws_of(model) result(text)
+    type(model_type), intent(in) :: model
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    if (.not. (model%weighted .or. model%generic)) return
+    do i = 1, size(model%laws)
+      associate (law => model%laws(i)%law)
+        text = text//line(trim(merge('bond law', '        ', i == 1)), trim(law%name)// &
+          & ', influence '//trim(law%influence)//trim(merge(', not corrected at surfaces', &
+          & repeat(' ', 27), model%surface .and. .not. law%corrected)))
+      end associate
+    end do
+  end function laws_of
 
   !> A line for each term of the force with a description.
   function terms_of(system) result(text)

@@ -3,7 +3,9 @@ module pd_scene_content_check_bodies
   use pd_base_elasticity, only: bond_based_ratio
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
-  use pd_base_text, only: to_text, with_unit
+  use pd_base_text, only: join, nearest_name, to_text, with_unit
+  use pd_law_law, only: required
+  use pd_law_laws, only: all_laws, law_item_type, law_table_type
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: rule_fault, given, check_known, check_vector, check_finite_box
   use pd_scene_format_source, only: source_type
@@ -241,6 +243,10 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
 
+    type(law_item_type) :: item
+
+    call find_law(scene, number, item, error, source)
+    if (allocated(error)) return
     associate (material => scene%materials(number))
       if (.not. is_set(material%youngs_modulus)) then
         call rule_fault(error, 'material', number, '', &
@@ -255,17 +261,86 @@ contains
           & "group &material lacks the key 'density'", &
           & 'explicit steps in time need the mass density [kg/m3]', source)
       else
-        call check_ratio(material, scene%header%dimension, scene%header%plane, number, error, &
-          & source)
+        call check_ratio(material, item%law%bond_based, scene%header%dimension, &
+          & scene%header%plane, number, error, source)
       end if
       ! Relaxation has its own mass; 1 keeps quantities derived from the density finite.
       if (.not. is_set(material%density)) material%density = 1.0_wp
     end associate
   end subroutine check_material
 
-  !> Poisson's ratio: in its range, and that of the bond-based model if this model is selected.
-  subroutine check_ratio(material, dimension, plane, number, error, source)
+  !> The law of a material, whose influence function and parameters get their defaults. An error is
+  !> set if there is no such law, if it lacks a parameter, or if it does not have one that is given.
+  subroutine find_law(scene, number, item, error, source)
+    type(scene_type), intent(inout) :: scene
+    integer, intent(in) :: number
+    type(law_item_type), intent(out) :: item
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    type(law_table_type) :: laws
+    character(:), allocatable :: note, nearest
+    integer :: i, j
+
+    laws = all_laws()
+    if (allocated(scene%laws%items)) laws = scene%laws
+    associate (material => scene%materials(number))
+      i = laws%number_of(material%model)
+      if (i == 0) then
+        note = 'allowed: '//join(laws%names(), ', ')
+        nearest = nearest_name(trim(material%model), laws%names())
+        if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note
+        call rule_fault(error, 'material', number, 'model', "unknown value '"// &
+          & trim(material%model)//"' of key 'model' in group &material", note, source)
+        return
+      end if
+      allocate (item%law, source=laws%items(i)%law)
+      if (material%influence == '') material%influence = item%law%influence
+      if (.not. allocated(material%parameters)) return
+      do i = 1, size(material%parameters)
+        associate (given => material%parameters(i))
+          j = 0
+          if (allocated(item%law%parameters)) j = findloc(item%law%parameters%name, given%name, &
+            & dim=1)
+          if (j == 0 .and. is_set(given%value)) then
+            call rule_fault(error, 'material', number, trim(given%name), "'"//trim(given%name)// &
+              & "' is no key of model = '"//trim(material%model)//"'", 'it belongs to '// &
+              & owners(laws, given%name), source)
+            return
+          else if (j > 0 .and. .not. is_set(given%value)) then
+            given%value = item%law%parameters(j)%default
+            if (given%value <= required) then
+              call rule_fault(error, 'material', number, '', "group &material lacks the key '"// &
+                & trim(given%name)//"'", "model = '"//trim(material%model)//"' needs it: "// &
+                & trim(given%meaning)//' ['//trim(given%unit)//']', source)
+              return
+            end if
+          end if
+        end associate
+      end do
+    end associate
+  end subroutine find_law
+
+  !> The laws that have a parameter: `model = 'a', 'b'`.
+  pure function owners(laws, name) result(text)
+    type(law_table_type), intent(in) :: laws
+    character(*), intent(in) :: name
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(laws%items)
+      if (.not. allocated(laws%items(i)%law%parameters)) cycle
+      if (.not. any(laws%items(i)%law%parameters%name == name)) cycle
+      if (len(text) > 0) text = text//', '
+      text = text//"'"//trim(laws%items(i)%law%name)//"'"
+    end do
+    text = 'model = '//text
+  end function owners
+
+  !> Poisson's ratio: in its range, and that of a bond-based law.
+  subroutine check_ratio(material, bond_based, dimension, plane, number, error, source)
     type(material_group), intent(inout) :: material
+    logical, intent(in) :: bond_based
     integer, intent(in) :: dimension
     character(*), intent(in) :: plane
     integer, intent(in) :: number
@@ -281,7 +356,7 @@ contains
     end if
     kind = 'in 3D'
     if (dimension == 2) kind = 'in plane '//trim(plane)
-    if (material%model == 'bond_based') then
+    if (bond_based) then
       if (is_set(material%poissons_ratio) .and. .not. material%ignore_poissons_ratio .and. &
         & abs(material%poissons_ratio - needed) > ratio_tolerance) then
         call rule_fault(error, 'material', number, 'poissons_ratio', 'the bond-based model '// &
@@ -295,7 +370,7 @@ contains
     else if (.not. is_set(material%poissons_ratio)) then
       call rule_fault(error, 'material', number, '', &
         & "group &material lacks the key 'poissons_ratio'", &
-        & 'the state-based model needs it '//kind, source)
+        & "model = '"//trim(material%model)//"' needs it "//kind, source)
     else if (material%poissons_ratio >= 0.5_wp .and. .not. (dimension == 2 .and. &
       & plane == 'stress')) then
       call rule_fault(error, 'material', number, 'poissons_ratio', &

@@ -30,7 +30,8 @@ contains
     file = ''
     if (allocated(scene%file)) file = scene%file
     call scan_source(scene_text(scene), file, source, error, in_memory=.true.)
-    if (.not. allocated(error)) call read_scene_source(source, complete, error, scene%table)
+    if (.not. allocated(error)) call read_scene_source(source, complete, error, &
+      & scene%table, scene%laws)
     if (allocated(error)) return
     if (allocated(scene%text)) complete%text = scene%text
     if (allocated(scene%changes)) complete%changes = scene%changes

@@ -2,6 +2,7 @@
 module pd_scene_content_read
   use pd_base_error, only: error_type
   use pd_base_text, only: join, nearest_name
+  use pd_law_laws, only: law_table_type
   use pd_scene_content_change, only: apply_changes
   use pd_scene_content_check, only: check_scene
   use pd_scene_format_file, only: line_type, read_text_file
@@ -17,46 +18,49 @@ contains
 
   !> Read the scene file at `path`. On an error `scene` is not fit for use. An error is set if the
   !> file cannot be read, or if the scene or a change breaks a rule.
-  subroutine read_scene(path, scene, error, changes, table)
+  subroutine read_scene(path, scene, error, changes, table, laws)
     character(*), intent(in) :: path  !! of the file; paths in it are relative to its folder
     type(scene_type), intent(out) :: scene               !! checked and complete, with its text
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(group_table), intent(in), optional :: table     !! of the groups that it may have
+    type(law_table_type), intent(in), optional :: laws   !! bond laws that it may name
     character(:), allocatable :: text
 
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call read_scene_text(text, path, scene, error, changes, table)
+    call read_scene_text(text, path, scene, error, changes, table, laws)
   end subroutine read_scene
 
   !> Read a scene from its text; `name` stands for the file in messages and for relative paths. An
   !> error is set if the scene or a change breaks a rule.
-  subroutine read_scene_text(text, name, scene, error, changes, table)
+  subroutine read_scene_text(text, name, scene, error, changes, table, laws)
     character(*), intent(in) :: text                     !! of a scene file
     character(*), intent(in) :: name                     !! path of the file; there need be none
     type(scene_type), intent(out) :: scene               !! checked and complete, with its text
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
     type(group_table), intent(in), optional :: table     !! of the groups that it may have
+    type(law_table_type), intent(in), optional :: laws   !! bond laws that it may name
     type(source_type) :: source
 
     call scan_source(text, name, source, error)
     if (allocated(error)) return
     if (present(changes)) call apply_changes(source, changes, error, table)
     if (allocated(error)) return
-    call read_scene_source(source, scene, error, table)
+    call read_scene_source(source, scene, error, table, laws)
     scene%text = text
     if (present(changes)) scene%changes = changes
   end subroutine read_scene_text
 
   !> Read a scene from a scanned file; its text is left empty. An error is set if the scene breaks a
   !> rule.
-  subroutine read_scene_source(source, scene, error, table)
+  subroutine read_scene_source(source, scene, error, table, laws)
     type(source_type), intent(in), target :: source      !! scanned, with all changes in it
     type(scene_type), intent(out) :: scene               !! checked and complete, without its text
     type(error_type), allocatable, intent(out) :: error
     type(group_table), intent(in), optional :: table     !! of the groups that it may have
+    type(law_table_type), intent(in), optional :: laws   !! bond laws that it may name
     type(group_table) :: known
     type(keys_type) :: keys
     integer :: g, s
@@ -67,6 +71,7 @@ contains
     else
       call list_groups(known)
     end if
+    if (present(laws)) scene%laws = laws
     call check_groups(source, known, error)
     if (allocated(error)) return
     scene%file = source%file

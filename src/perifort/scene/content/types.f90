@@ -5,6 +5,7 @@
 !> Whoever builds a scene without a file fills these types directly.
 module pd_scene_content_types
   use pd_base_error, only: internal_fault
+  use pd_law_laws, only: law_table_type
   use pd_scene_format_file, only: line_type
   use pd_scene_format_given, only: is_set, name_length, path_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
@@ -87,6 +88,7 @@ module pd_scene_content_types
     type(study_group), allocatable :: studies(:)
     type(added_type), allocatable :: added(:)    !! groups of a table with more than these
     type(group_table), allocatable :: table      !! that table; without, the program's own
+    type(law_table_type) :: laws                 !! bond laws; without any, the program's own
   end type scene_type
 
   abstract interface

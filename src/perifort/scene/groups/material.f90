@@ -1,6 +1,10 @@
 !> The group `&material`: how bonds carry force and when they break.
 module pd_scene_groups_material
   use pd_base_kinds, only: wp
+  use pd_base_text, only: join
+  use pd_law_influence, only: influence_names
+  use pd_law_law, only: parameter_type
+  use pd_law_laws, only: all_laws, law_table_type
   use pd_scene_format_given, only: name_length, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type
@@ -11,7 +15,8 @@ module pd_scene_groups_material
   !> `&material`
   type, extends(group_type) :: material_group
     character(name_length) :: name = ''
-    character(name_length) :: model = 'state_based'        !! or 'bond_based'
+    character(name_length) :: model = 'state_based'        !! name of a bond law
+    character(name_length) :: influence = ''               !! '': that of the law
     real(wp) :: youngs_modulus = unset                     !! E [Pa]
     real(wp) :: poissons_ratio = unset                     !! nu [-]
     logical :: ignore_poissons_ratio = .false.             !! bond-based with another nu: accept
@@ -20,6 +25,7 @@ module pd_scene_groups_material
     real(wp) :: critical_energy_release_rate = unset       !! Gc [J/m2]
     logical :: break_in_compression = .false.
     real(wp) :: thermal_expansion = 0.0_wp                 !! alpha [1/K]
+    type(parameter_type), allocatable :: parameters(:)     !! keys of single laws
   contains
     procedure :: visit
   end type material_group
@@ -30,10 +36,17 @@ contains
   subroutine visit(group, keys)
     class(material_group), intent(inout) :: group  !! its components are read or shown
     type(keys_type), intent(inout) :: keys         !! the visitor: reads, describes, writes
+    type(law_table_type) :: laws
+    integer :: i
 
+    laws = all_laws()
+    if (.not. allocated(group%parameters)) group%parameters = laws%parameters()
     call keys%key('name', group%name, 'name of the material', word=.true.)
-    call keys%key('model', group%model, 'law of the bonds; bond_based holds for one '// &
-      & "Poisson's ratio only", allowed=[character(11) :: 'state_based', 'bond_based'])
+    call keys%key('model', group%model, 'law of the bonds: '//join(laws%names(), ', ')// &
+      & "; bond_based and softening hold for one Poisson's ratio only", word=.true.)
+    call keys%key('influence', group%influence, 'influence function omega(|xi|): delta/|xi|, 1, '// &
+      & '1 - |xi|/delta or exp(-(|xi|/delta)^2)', allowed=influence_names, &
+      & default="lps, lps_plastic: 'constant'; else 'inverse'")
     call keys%key('youngs_modulus', group%youngs_modulus, 'Pa', "Young's modulus E", &
       & required=.true., above=0.0_wp)
     call keys%key('poissons_ratio', group%poissons_ratio, '-', "Poisson's ratio nu, below 1/2 "// &
@@ -51,6 +64,16 @@ contains
       & 'critical stretch in compression too')
     call keys%key('thermal_expansion', group%thermal_expansion, '1/K', &
       & 'coefficient of linear thermal expansion alpha')
+    do i = 1, size(group%parameters)
+      associate (own => group%parameters(i))
+        if (own%zero) then
+          call keys%key(trim(own%name), own%value, trim(own%unit), trim(own%meaning), &
+            & at_least=0.0_wp)
+        else
+          call keys%key(trim(own%name), own%value, trim(own%unit), trim(own%meaning), above=0.0_wp)
+        end if
+      end associate
+    end do
   end subroutine visit
 
 end module pd_scene_groups_material

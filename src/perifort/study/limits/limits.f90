@@ -17,6 +17,7 @@ module pd_study_limits_limits
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   use pd_motion_explicit_time_step, only: printed_stiffness, stiffness_bound
+  use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type
   use pd_study_limits_drift, only: study_drift
   use pd_study_limits_rounding, only: study_rounding
@@ -73,6 +74,12 @@ contains
     call check_names(scene, fields_of(options), error)
     if (.not. allocated(error)) call prepare(explicit, set_up, error)
     if (allocated(error)) return
+    if (set_up%system%model%weighted .or. set_up%system%model%generic) then
+      call scene_fault(error, scene, 'material', 1, 'model', &
+        & "limits are measured for the chapter's laws with influence = 'inverse' only", &
+        & 'the free vibration that they are compared with has no other laws')
+      return
+    end if
     associate (system => set_up%system)
       call choose_threads(options, system)
       if (scene%header%title /= '') write (out, '(a)') trim(scene%header%title)
