@@ -97,7 +97,7 @@ contains
       text = join([character(w) :: &
         & 'perifort bench [--points N ...] [--dimension D ...] [--threads N,...] [--model MODEL]', &
         & '               [--family FAMILY] [--breaking WORD] [--precision WORD] [--surface]', &
-        & '               [--seconds S] [--csv FILE]', &
+        & '               [--generic] [--seconds S] [--csv FILE]', &
         & '', &
         & 'Measure the speed of the force loops on standard bodies (cube, plate, bar), and', &
         & 'compare it with the memory bandwidth and the peak performance of this machine.', &
@@ -111,6 +111,7 @@ contains
         & '  --breaking WORD   on: bonds can break; off; or both (default, for lists off)', &
         & '  --precision WORD  of bonds: double (default), mixed or both', &
         & '  --surface         with surface correction (default: without)', &
+        & '  --generic         the laws on the generic pass, which computes any law', &
         & '  --seconds S       least time of each of five or more repeats [s] (default: 0.25)', &
         & '  --csv FILE        also write the numbers to FILE; an existing file is replaced'], &
         & newline)

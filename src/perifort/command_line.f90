@@ -17,9 +17,9 @@ module pd_command_line
     & 'run', 'check', 'limits', 'study', 'choose', 'template', 'reference', 'bench', 'version', &
     & 'help']
   integer, parameter :: restart_option = 4  !! its place in `option_names`
-  character(word_length), parameter :: option_names(19) = [character(word_length) :: &
+  character(word_length), parameter :: option_names(20) = [character(word_length) :: &
     & '--output', '--threads', '--overwrite', '--restart', '--max-minutes', '--quiet', '--points', &
-    & '--dimension', '--model', '--family', '--breaking', '--precision', '--surface', '--seconds', &
+    & '--dimension', '--model', '--family', '--breaking', '--precision', '--surface', '--generic', '--seconds', &
     & '--csv', '--error', '--time', '--set', '--help']
 
   !> A command line, understood and checked.
@@ -272,6 +272,8 @@ contains
       if (len(value) == 0) call usage(error, line, "'"//name//"' needs a word")
     case ('--surface')
       line%bench%surface = .true.
+    case ('--generic')
+      line%bench%generic = .true.
     case ('--seconds')
       status = 1
       if (len(value) > 0 .and. verify(value, '0123456789.') == 0) &
@@ -367,7 +369,7 @@ contains
   pure logical function takes_value(name)
     character(*), intent(in) :: name
     takes_value = all(name /= [character(word_length) :: '--overwrite', '--restart', '--quiet', &
-      & '--surface', '--help'])
+      & '--surface', '--generic', '--help'])
   end function takes_value
 
   !> Whether several words may follow. Where a file comes next, one must do.
@@ -392,7 +394,7 @@ contains
     case ('--error', '--time')
       belongs = command == 'choose'
     case ('--points', '--dimension', '--model', '--family', '--breaking', '--precision', &
-      & '--surface', '--csv')
+      & '--surface', '--generic', '--csv')
       belongs = command == 'bench'
     case ('--restart', '--max-minutes')
       belongs = command == 'run'

@@ -8,7 +8,8 @@ module pd_force_breaking
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
-  use pd_force_generic, only: generic_energy_product, generic_point_damage, generic_point_energy
+  use pd_force_generic, only: generic_energy_product, generic_point_damage, generic_point_energy, &
+    & refresh_slot
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
     & energy_product, point_damage
@@ -60,8 +61,8 @@ contains
                                                        !! at the ends of their bonds alone
                                                        !! (n_slots, dim, sets) [m]
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
-    type(generic_workspace_type), intent(in), optional :: laws
-      !! history of the bond laws, where the model is generic
+    type(generic_workspace_type), intent(inout), optional :: laws
+      !! of the generic pass, where the model is generic; knows the broken bonds on return
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:)
     integer, allocatable :: number(:), first(:), order(:)
@@ -93,6 +94,7 @@ contains
         end do
         if (number(m) == 0) cycle
         call family%bonds_of(k, bonds)
+        if (model%generic) call refresh_slot(k, bonds, laws)
         call energies(family, model, laws, u, k, bonds, lost(m, :), others)
         lost(m, :) = (before - lost(m, :))*body%volume(k)
         if (model%generic) then
@@ -131,9 +133,9 @@ contains
 
     if (model%generic) then
       if (.not. present(laws)) call internal_fault('bonds of laws break without their history')
-      density(0) = generic_point_energy(family, model, laws, u, k, bonds)
+      density(0) = generic_point_energy(family, model, laws, u, k)
       do o = 1, ubound(density, 1)
-        density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k, bonds)
+        density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k)
       end do
       return
     end if

@@ -21,7 +21,7 @@ module pd_force_generic
   private
   public :: begin_laws, generic_pulls, generic_force, renew_pulls, generic_energy, generic_bound
   public :: commit_laws, generic_point_energy, generic_point_dilatation, generic_point_damage
-  public :: generic_energy_product, keep_laws, new_law_bonds
+  public :: generic_energy_product, keep_laws, new_law_bonds, refresh_bonds, refresh_slot
 
 contains
 
@@ -40,6 +40,7 @@ contains
     if (.not. (model%generic .or. has_scales(model))) return
     if (model%generic) then
       allocate (workspace%start(family%n_slots + 1))
+      workspace%x = body%x
       call allocate_bonds(family, bonds)
       n = 1_i8
       do k = 1, family%n_slots
@@ -48,7 +49,9 @@ contains
         n = n + bonds%n
       end do
       workspace%start(family%n_slots + 1) = n
+      allocate (workspace%member(n - 1), workspace%volume(n - 1))
       call find_other_ends(family, workspace)
+      call refresh_bonds(family, workspace)
       allocate (workspace%pull(n - 1), source=0.0_wp)
       allocate (workspace%history(most(model, 'bond'), n - 1), source=0.0_wp)
       allocate (workspace%of_point(most(model, 'point'), family%n_slots), source=0.0_wp)
@@ -138,6 +141,7 @@ contains
       call family%bonds_of(k, bonds)
       do i = 1, bonds%n
         j = bonds%j(i)
+        workspace%member(workspace%start(k) + i - 1) = int(j, i4)
         workspace%back(workspace%start(k) + i - 1) = sorted(workspace%start(j) + met(j))
         met(j) = met(j) + 1_i4
       end do
@@ -184,60 +188,112 @@ contains
 
   ! ---------------------------------------------------------------- what a law sees
 
+  !> Note which bonds are intact.
+  subroutine refresh_bonds(family, workspace)
+    class(family_type), intent(in) :: family      !! as its bonds are now
+    type(generic_workspace_type), intent(inout) :: workspace  !! begun; gets the volumes of bonds
+    type(bonds_type) :: bonds
+    integer :: k
+
+    if (.not. allocated(workspace%start)) return
+    !$omp parallel default(none) shared(family, workspace) private(bonds, k)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 64)
+    do k = 1, family%n_slots
+      call family%bonds_of(k, bonds)
+      call refresh_slot(k, bonds, workspace)
+    end do
+    !$omp end parallel
+  end subroutine refresh_bonds
+
+  !> Note which bonds of slot `k` are intact.
+  pure subroutine refresh_slot(k, bonds, workspace)
+    integer, intent(in) :: k                !! slot
+    type(bonds_type), intent(in) :: bonds   !! its bonds as they are now
+    type(generic_workspace_type), intent(inout) :: workspace  !! begun; gets the volumes of bonds
+
+    workspace%volume(workspace%start(k):workspace%start(k + 1) - 1) = &
+      & merge(bonds%weight(:bonds%n), 0.0_wp, bonds%intact(:bonds%n))
+  end subroutine refresh_slot
+
   !> The bonds of slot `k` at displacements `u` as its law sees them, with the committed history.
-  pure subroutine look(model, workspace, u, k, bonds, seen)
+  pure subroutine look(model, workspace, u, k, seen)
     type(model_type), intent(in) :: model
     type(generic_workspace_type), intent(in) :: workspace
     real(wp), intent(in), contiguous :: u(:, :)
     integer, intent(in) :: k
-    type(bonds_type), intent(in) :: bonds
     type(law_bonds_type), intent(inout) :: seen
-    real(wp) :: eta, along, square, y, direction(size(u, 2))
-    integer(i8) :: first
-    integer :: i, j, c, n
+    integer(i8) :: first, last
+    integer :: n
 
-    n = bonds%n
-    seen%n = n
-    do i = 1, n
-      j = bonds%j(i)
-      along = 0.0_wp
-      square = 0.0_wp
-      y = 0.0_wp
-      do c = 1, size(u, 2)
-        eta = u(j, c) - u(k, c)
-        along = along + bonds%xi(i, c)*eta
-        square = square + eta**2
-        y = y + (bonds%xi(i, c) + eta)**2
-      end do
-      y = sqrt(y)
-      associate (length => bonds%length(i))
-        seen%length(i) = length
-        seen%volume(i) = merge(bonds%weight(i), 0.0_wp, bonds%intact(i))
-        ! without cancellation (doc/theory.md, 2)
-        seen%stretch(i) = (2*along + square)/(length*(y + length))
-        if (model%projected) then
-          seen%projection(i) = 0.0_wp
-          if (y > 0.0_wp) seen%projection(i) = (length**2 + along)/(y*length)
-        end if
-      end associate
-    end do
-    if (model%thermal) then
-      do i = 1, n
-        seen%stretch(i) = seen%stretch(i) - (model%expansion(k) + model%expansion(bonds%j(i)))/2
-      end do
-    end if
-    if (model%surface) then
-      do i = 1, n
-        direction = bonds%xi(i, :)/bonds%length(i)
-        seen%Gd(i) = bond_factor(direction, model%D(k, :), model%D(bonds%j(i), :))
-        seen%Gb(i) = bond_factor(direction, model%S(k, :), model%S(bonds%j(i), :))
-      end do
-    end if
     first = workspace%start(k)
-    if (size(seen%history, 1) > 0) seen%history(:, :n) = workspace%history(:, first:first + n - 1)
+    last = workspace%start(k + 1) - 1
+    n = int(last - first) + 1
+    seen%n = n
+    seen%volume(:n) = workspace%volume(first:last)
+    call deform(size(u, 1), size(u, 2), n, workspace%member(first:last), workspace%x, u, k, &
+      & model%projected, seen%length, seen%stretch, seen%projection)
+    if (model%thermal) seen%stretch(:n) = seen%stretch(:n) - (model%expansion(k) &
+      & + model%expansion(workspace%member(first:last)))/2
+    if (model%surface) call correct(model, workspace, k, seen)
+    if (size(seen%history, 1) > 0) seen%history(:, :n) = workspace%history(:, first:last)
     seen%of_point = workspace%of_point(:, k)
     seen%constants = workspace%constants(:, k)
   end subroutine look
+
+  !> Lengths, stretches without cancellation (doc/theory.md, 2) and, if `projected`, Lambda.
+  pure subroutine deform(n_slots, dim, n, member, x, u, k, projected, length, stretch, projection)
+    integer, intent(in) :: n_slots, dim, n, k
+    integer(i4), intent(in) :: member(n)
+    real(wp), intent(in) :: x(n_slots, dim), u(n_slots, dim)
+    logical, intent(in) :: projected
+    real(wp), intent(inout) :: length(n), stretch(n), projection(n)
+    real(wp) :: along(n), xi, eta
+    integer :: i, c
+
+    length = 0.0_wp
+    stretch = 0.0_wp
+    along = 0.0_wp
+    do c = 1, dim
+      do i = 1, n
+        xi = x(member(i), c) - x(k, c)
+        eta = u(member(i), c) - u(k, c)
+        length(i) = length(i) + xi**2
+        along(i) = along(i) + xi*eta
+        stretch(i) = stretch(i) + eta**2
+      end do
+    end do
+    do i = 1, n
+      stretch(i) = 2*along(i) + stretch(i)
+    end do
+    if (projected) then
+      do i = 1, n
+        projection(i) = (length(i) + along(i))/max(sqrt(max(length(i) + stretch(i), 0.0_wp) &
+          & *length(i)), tiny(1.0_wp))
+      end do
+    end if
+    do i = 1, n
+      stretch(i) = stretch(i)/(length(i) + sqrt(max(length(i) + stretch(i), 0.0_wp)*length(i)))
+      length(i) = sqrt(length(i))
+    end do
+  end subroutine deform
+
+  !> Surface factors of the bonds of slot `k`.
+  pure subroutine correct(model, workspace, k, seen)
+    type(model_type), intent(in) :: model
+    type(generic_workspace_type), intent(in) :: workspace
+    integer, intent(in) :: k
+    type(law_bonds_type), intent(inout) :: seen
+    real(wp) :: direction(model%dim)
+    integer :: i, j
+
+    do i = 1, seen%n
+      j = workspace%member(workspace%start(k) + i - 1)
+      direction = (workspace%x(j, :) - workspace%x(k, :))/seen%length(i)
+      seen%Gd(i) = bond_factor(direction, model%D(k, :), model%D(j, :))
+      seen%Gb(i) = bond_factor(direction, model%S(k, :), model%S(j, :))
+    end do
+  end subroutine correct
 
   ! ---------------------------------------------------------------- forces
 
@@ -250,37 +306,31 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     integer(i1), intent(inout), contiguous :: strained(:)
       !! (n_slots) marks, of size 0 if no bond can break
-    type(bonds_type) :: bonds
     type(law_bonds_type) :: seen
     integer :: k
 
     call check_room(family, workspace)
-    !$omp parallel default(none) shared(family, model, workspace, u, strained) &
-    !$omp private(bonds, seen, k)
-    call allocate_bonds(family, bonds)
+    !$omp parallel default(none) shared(family, model, workspace, u, strained) private(seen, k)
     call new_law_bonds(family, model, seen)
     !$omp do schedule(dynamic, 64)
     do k = 1, family%n_slots
       if (size(strained) > 0) strained(k) = 0_i1
       if (workspace%start(k + 1) == workspace%start(k)) cycle
-      call pulls_of(family, model, workspace, u, k, bonds, seen)
+      call pulls_of(model, workspace, u, k, seen)
       if (model%breaking .and. size(strained) > 0) call mark(model, k, seen, strained)
     end do
     !$omp end parallel
   end subroutine generic_pulls
 
   !> The pulls of one slot.
-  subroutine pulls_of(family, model, workspace, u, k, bonds, seen)
-    class(family_type), intent(in) :: family
+  subroutine pulls_of(model, workspace, u, k, seen)
     type(model_type), intent(in) :: model
     type(generic_workspace_type), intent(inout) :: workspace
     real(wp), intent(in), contiguous :: u(:, :)
     integer, intent(in) :: k
-    type(bonds_type), intent(inout) :: bonds
     type(law_bonds_type), intent(inout) :: seen
 
-    call family%bonds_of(k, bonds)
-    call look(model, workspace, u, k, bonds, seen)
+    call look(model, workspace, u, k, seen)
     associate (first => workspace%start(k), last => workspace%start(k + 1) - 1)
       call model%laws(model%material(k))%law%forces(seen, workspace%pull(first:last))
     end associate
@@ -307,59 +357,74 @@ contains
     type(generic_workspace_type), intent(inout) :: workspace  !! gets the pulls of these slots
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     integer(i4), intent(in) :: slots(:)          !! (any number) which
-    type(bonds_type) :: bonds
     type(law_bonds_type) :: seen
     integer :: m
 
     if (size(slots) == 0) return
-    call allocate_bonds(family, bonds)
     call new_law_bonds(family, model, seen)
     do m = 1, size(slots)
-      call pulls_of(family, model, workspace, u, int(slots(m)), bonds, seen)
+      call pulls_of(model, workspace, u, int(slots(m)), seen)
     end do
   end subroutine renew_pulls
 
   !> Force density from the pulls of both ends of each bond, along the deformed bond (7.3, 7.4).
   subroutine generic_force(family, workspace, u, force)
-    class(family_type), intent(in) :: family     !! as its bonds are now
+    class(family_type), intent(in) :: family     !! who interacts with whom
     type(generic_workspace_type), intent(in) :: workspace  !! with the pulls at `u`
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
-    type(bonds_type) :: bonds
-    real(wp) :: y(3), square, pull, sums(3)
-    integer(i8) :: b
-    integer :: k, i, j, c
+    real(wp) :: sums(3)
+    integer(i8) :: first, last
+    integer :: k, c
 
     !$omp parallel default(none) shared(family, workspace, u, force) &
-    !$omp private(bonds, y, square, pull, sums, b, k, i, j, c)
-    call allocate_bonds(family, bonds)
+    !$omp private(sums, first, last, k, c)
     !$omp do schedule(dynamic, 64)
     do k = 1, family%n_slots
-      sums = 0.0_wp
-      if (workspace%start(k + 1) > workspace%start(k)) call family%bonds_of(k, bonds)
-      do i = 1, int(workspace%start(k + 1) - workspace%start(k))
-        if (.not. bonds%intact(i)) cycle
-        j = bonds%j(i)
-        b = workspace%start(k) + i - 1
-        pull = workspace%pull(b) + workspace%pull(workspace%start(j) + workspace%back(b) - 1)
-        square = 0.0_wp
-        do c = 1, size(u, 2)
-          y(c) = bonds%xi(i, c) + u(j, c) - u(k, c)
-          square = square + y(c)**2
-        end do
-        ! a bond crushed to a point has no direction
-        if (.not. square > 0.0_wp) cycle
-        pull = pull*bonds%weight(i)/sqrt(square)
-        do c = 1, size(u, 2)
-          sums(c) = sums(c) + pull*y(c)
-        end do
-      end do
-      do c = 1, size(u, 2)
+      first = workspace%start(k)
+      last = workspace%start(k + 1) - 1
+      call add_pulls(size(u, 1), family%dim, int(last - first) + 1, workspace%member(first:last), &
+        & workspace%start, workspace%back(first:last), workspace%volume(first:last), &
+        & workspace%pull(first:last), workspace%pull, workspace%x, u, k, sums)
+      do c = 1, family%dim
         force(k, c) = sums(c)
       end do
     end do
     !$omp end parallel
   end subroutine generic_force
+
+  !> The sum over the `n` bonds of slot `k`. A bond crushed to a point has no direction.
+  pure subroutine add_pulls(n_slots, dim, n, member, start, back, volume, own, pull, x, u, k, sums)
+    integer, intent(in) :: n_slots, dim, n, k
+    integer(i4), intent(in) :: member(n)
+    integer(i8), intent(in) :: start(n_slots + 1)
+    integer(i2), intent(in) :: back(n)
+    real(wp), intent(in) :: volume(n), own(n), pull(*), x(n_slots, dim), u(n_slots, dim)
+    real(wp), intent(out) :: sums(3)
+    real(wp) :: y(n, dim), square(n), both(n)
+    integer :: i, c
+
+    square = 0.0_wp
+    do c = 1, dim
+      do i = 1, n
+        y(i, c) = (x(member(i), c) - x(k, c)) + (u(member(i), c) - u(k, c))
+        square(i) = square(i) + y(i, c)**2
+      end do
+    end do
+    do i = 1, n
+      both(i) = own(i) + pull(start(member(i)) + back(i) - 1)
+    end do
+    do i = 1, n
+      both(i) = merge(both(i)*volume(i)/sqrt(max(square(i), tiny(1.0_wp))), 0.0_wp, &
+        & square(i) > 0.0_wp)
+    end do
+    sums = 0.0_wp
+    do c = 1, dim
+      do i = 1, n
+        sums(c) = sums(c) + both(i)*y(i, c)
+      end do
+    end do
+  end subroutine add_pulls
 
   !> A workspace that was made for another family is an error of the program.
   subroutine check_room(family, workspace)
@@ -380,44 +445,40 @@ contains
     type(generic_workspace_type), intent(in) :: workspace  !! with the history
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
-    type(bonds_type) :: bonds
     type(law_bonds_type) :: seen
     integer :: k
 
     call check_room(family, workspace)
-    !$omp parallel default(none) shared(family, model, workspace, u, energy) private(bonds, seen, k)
-    call allocate_bonds(family, bonds)
+    !$omp parallel default(none) shared(family, model, workspace, u, energy) private(seen, k)
     call new_law_bonds(family, model, seen)
     !$omp do schedule(dynamic, 64)
     do k = 1, family%n_slots
       energy(k) = 0.0_wp
       if (workspace%start(k + 1) == workspace%start(k)) cycle
-      call family%bonds_of(k, bonds)
-      call look(model, workspace, u, k, bonds, seen)
+      call look(model, workspace, u, k, seen)
       energy(k) = model%laws(model%material(k))%law%energy(seen)
     end do
     !$omp end parallel
   end subroutine generic_energy
 
   !> Strain energy density of one slot [J/m3].
-  pure real(wp) function generic_point_energy(family, model, workspace, u, k, bonds) result(energy)
+  pure real(wp) function generic_point_energy(family, model, workspace, u, k) result(energy)
     class(family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model        !! with its laws
     type(generic_workspace_type), intent(in) :: workspace  !! with the history
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     integer, intent(in) :: k                     !! slot
-    type(bonds_type), intent(in) :: bonds        !! of slot `k`
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, workspace, u, k, bonds, seen)
+    call look(model, workspace, u, k, seen)
     energy = model%laws(model%material(k))%law%energy(seen)
   end function generic_point_energy
 
   !> The strain energy density of one slot with the products of the stretches under `u` and `other`
   !> in place of their squares; of laws with a history, whose energy is no form of the stretches
   !> alone, that under `u` [J/m3].
-  pure real(wp) function generic_energy_product(family, model, workspace, u, other, k, bonds) &
+  pure real(wp) function generic_energy_product(family, model, workspace, u, other, k) &
     & result(energy)
     class(family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model        !! with its laws
@@ -426,40 +487,40 @@ contains
     real(wp), intent(in), contiguous :: other(:, :)
       !! (n_slots, dim) displacements of another instant [m]
     integer, intent(in) :: k                     !! slot
-    type(bonds_type), intent(in) :: bonds        !! of slot `k`
     type(law_bonds_type) :: seen
-    real(wp) :: stretch(bonds%n), stretch_of_other(bonds%n)
+    real(wp), allocatable :: stretch(:), stretch_of_other(:)
+    integer :: n
 
     associate (law => model%laws(model%material(k))%law)
       if (law%bond_history + law%point_history > 0) then
-        energy = generic_point_energy(family, model, workspace, u, k, bonds)
+        energy = generic_point_energy(family, model, workspace, u, k)
         return
       end if
+      n = int(workspace%start(k + 1) - workspace%start(k))
       call new_law_bonds(family, model, seen)
-      call look(model, workspace, other, k, bonds, seen)
-      stretch_of_other = seen%stretch(:bonds%n)
-      call look(model, workspace, u, k, bonds, seen)
-      stretch = seen%stretch(:bonds%n)
+      call look(model, workspace, other, k, seen)
+      stretch_of_other = seen%stretch(:n)
+      call look(model, workspace, u, k, seen)
+      stretch = seen%stretch(:n)
       ! Q(a, b) = Q((a + b)/2) - Q((a - b)/2) of a quadratic form Q
-      seen%stretch(:bonds%n) = (stretch + stretch_of_other)/2
+      seen%stretch(:n) = (stretch + stretch_of_other)/2
       energy = law%energy(seen)
-      seen%stretch(:bonds%n) = (stretch - stretch_of_other)/2
+      seen%stretch(:n) = (stretch - stretch_of_other)/2
       energy = energy - law%energy(seen)
     end associate
   end function generic_energy_product
 
   !> Dilatation of one slot by its law [-].
-  pure real(wp) function generic_point_dilatation(family, model, workspace, u, k, bonds) result(theta)
+  pure real(wp) function generic_point_dilatation(family, model, workspace, u, k) result(theta)
     class(family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model        !! with its laws
     type(generic_workspace_type), intent(in) :: workspace  !! with the history
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     integer, intent(in) :: k                     !! slot
-    type(bonds_type), intent(in) :: bonds        !! of slot `k`
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, workspace, u, k, bonds, seen)
+    call look(model, workspace, u, k, seen)
     theta = model%laws(model%material(k))%law%dilatation(seen)
   end function generic_point_dilatation
 
@@ -475,7 +536,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, workspace, u, k, bonds, seen)
+    call look(model, workspace, u, k, seen)
     damage = damage_seen(model, k, bonds, seen)
   end function generic_point_damage
 
@@ -519,8 +580,8 @@ contains
     do k = 1, family%n_slots
       if (workspace%start(k + 1) == workspace%start(k)) cycle
       call family%bonds_of(k, bonds)
-      bonds%intact = .true.
-      call look(model, workspace, undeformed, k, bonds, seen)
+      call look(model, workspace, undeformed, k, seen)
+      seen%volume(:bonds%n) = bonds%weight(:bonds%n)
       call model%laws(model%material(k))%law%stiffness(seen, &
         & own(workspace%start(k):workspace%start(k + 1) - 1))
     end do
@@ -569,7 +630,7 @@ contains
         & last => workspace%start(k + 1) - 1)
         if (law%bond_history + law%point_history == 0) cycle
         call family%bonds_of(k, bonds)
-        call look(model, workspace, u, k, bonds, seen)
+        call look(model, workspace, u, k, seen)
         call law%commit(seen, density(k))
         if (size(seen%history, 1) > 0) workspace%history(:, first:last) = seen%history(:, :seen%n)
         workspace%of_point(:, k) = seen%of_point
@@ -580,14 +641,16 @@ contains
     dissipated = inner(body%order, density, body%volume)
   end subroutine commit_laws
 
-  !> Keep the history, or put it back.
-  subroutine keep_laws(archive, workspace)
+  !> Keep the history, or put it back. The bonds of the family were kept before.
+  subroutine keep_laws(archive, family, workspace)
     class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
+    class(family_type), intent(in) :: family       !! with its broken bonds
     type(generic_workspace_type), intent(inout) :: workspace  !! set where the archive reads
 
     if (.not. allocated(workspace%start)) return
     call archive%keep('history of bonds', workspace%history)
     call archive%keep('history of points', workspace%of_point)
+    call refresh_bonds(family, workspace)
   end subroutine keep_laws
 
 end module pd_force_generic

@@ -73,6 +73,9 @@ module pd_force_workspace
   type :: generic_workspace_type
     integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
     integer(i2), allocatable :: back(:)        !! the bond's number in the family of its other end
+    integer(i4), allocatable :: member(:)      !! slot of that
+    real(wp), allocatable :: volume(:)         !! vc V_j, 0 where the bond is broken [m3]
+    real(wp), allocatable :: x(:, :)           !! positions (n_slots, dim) [m]
     real(wp), allocatable :: pull(:)           !! the slot's own part of each pair force density at
                                                !! the displacements of the last pass [N/m6]
     real(wp), allocatable :: history(:, :)     !! of each ordered bond (reals, bonds)
@@ -131,8 +134,8 @@ contains
 
     bytes = 0_i8
     if (.not. allocated(workspace%start)) return
-    bytes = 10*size(workspace%pull, kind=i8) + 8*(size(workspace%start, kind=i8) &
-      & + size(workspace%history, kind=i8) + size(workspace%of_point, kind=i8) &
+    bytes = 22*size(workspace%pull, kind=i8) + 8*(size(workspace%start, kind=i8) &
+      & + size(workspace%x, kind=i8) + size(workspace%history, kind=i8) + size(workspace%of_point, kind=i8) &
       & + size(workspace%constants, kind=i8))
   end function bytes_of_generic
 

@@ -32,7 +32,7 @@ contains
     call system%family%keep_bonds(archive)
     call archive%keep('broken bonds', system%broken)
     call archive%keep('dissipated energy', system%dissipated)
-    call keep_laws(archive, system%workspace%generic)
+    call keep_laws(archive, system%family, system%workspace%generic)
     call archive%keep('dissipation of laws', system%law_dissipation)
     call archive%keep('external work', system%external_work)
     call archive%keep('dissipation due', system%dissipation_due)

@@ -38,7 +38,7 @@ contains
       p = table%number_of(scene%materials(i)%model)
       allocate (laws(i)%law, source=table%items(p)%law)
       associate (group => scene%materials(i), law => laws(i)%law)
-        law%influence = group%influence
+        if (group%influence /= '') law%influence = group%influence
         if (allocated(group%parameters) .and. allocated(law%parameters)) then
           do p = 1, size(law%parameters)
             q = findloc(group%parameters%name, law%parameters(p)%name, dim=1)

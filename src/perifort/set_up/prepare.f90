@@ -16,7 +16,7 @@ module pd_set_up_prepare
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of
-  use pd_force_generic, only: begin_laws
+  use pd_force_generic, only: begin_laws, refresh_bonds
   use pd_force_model, only: new_model
   use pd_force_term, only: term_list_type
   use pd_motion_conditions, only: add_loads_to, load_type
@@ -132,6 +132,7 @@ contains
         set_up%cut = set_up%cut + cut
       end do
       if (set_up%cut > 0_i8) then
+        call refresh_bonds(system%family, system%workspace%generic)
         allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
         call damage_of(system%body, system%family, system%state%damage)
       end if

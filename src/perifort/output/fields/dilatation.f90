@@ -50,7 +50,7 @@ contains
       call system%family%bonds_of(k, bonds)
       if (system%model%generic) then
         values = generic_point_dilatation(system%family, system%model, system%workspace%generic, &
-          & system%state%u, k, bonds)
+          & system%state%u, k)
       else
         values = point_dilatation(system%model, system%state%u, k, bonds)
       end if
@@ -61,18 +61,13 @@ contains
   subroutine dilatation_by_laws(system, theta)
     type(system_type), intent(in) :: system
     real(wp), intent(out) :: theta(:)
-    type(bonds_type) :: bonds
     integer :: k
 
-    !$omp parallel default(none) shared(system, theta) private(bonds, k)
-    call allocate_bonds(system%family, bonds)
-    !$omp do schedule(static)
+    !$omp parallel do schedule(static) default(none) shared(system, theta) private(k)
     do k = 1, system%body%n_slots
-      call system%family%bonds_of(k, bonds)
       theta(k) = generic_point_dilatation(system%family, system%model, system%workspace%generic, &
-        & system%state%u, k, bonds)
+        & system%state%u, k)
     end do
-    !$omp end parallel
   end subroutine dilatation_by_laws
 
   pure subroutine exact(state, values, known)

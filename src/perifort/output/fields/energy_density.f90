@@ -47,7 +47,7 @@ contains
       call system%family%bonds_of(k, bonds)
       if (system%model%generic) then
         values = generic_point_energy(system%family, system%model, system%workspace%generic, &
-          & system%state%u, k, bonds)
+          & system%state%u, k)
       else
         values = point_energy(system%model, system%state%u, k, bonds)
       end if

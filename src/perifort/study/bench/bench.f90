@@ -49,7 +49,7 @@ contains
     do t = 1, size(threads)
       call measure_machine(threads(t), options%triad, 5, machines(t))
     end do
-    call table_head(out, machines, options%surface)
+    call table_head(out, machines, options%surface, options%generic)
     if (csv /= 0) call csv_head(csv)
     flush (out)
 
@@ -105,6 +105,7 @@ contains
     if (allocated(options%dimensions)) dimensions = options%dimensions
     allocate (kernels(0))
     one%surface = options%surface
+    one%generic = options%generic
     do d = 1, size(dimensions)
       one%dimension = dimensions(d)
       points = [default_points(one%dimension)]
@@ -142,7 +143,8 @@ contains
     measured = kernel%precision == 'double'
     if (given(options%precision)) measured = chosen(options%precision, trim(kernel%precision))
     if (kernel%precision == 'mixed') &
-      & measured = measured .and. kernel%family == 'lattice' .and. kernel%dimension > 1
+      & measured = measured .and. kernel%family == 'lattice' .and. kernel%dimension > 1 &
+      & .and. .not. kernel%generic
   end function measured
 
   !> Threads to measure with, ascending and each once; 1 is always there, since the others are

@@ -12,6 +12,7 @@ module pd_study_bench_kernels
   use pd_family_list, only: list_family_type
   use pd_force_model, only: dilatation_of, options_of, no_dilatation, projected, unprojected
   use pd_force_workspace, only: workspace_type
+  use pd_law_laws, only: all_laws
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: evaluate, system_type
@@ -32,6 +33,7 @@ module pd_study_bench_kernels
     character(8) :: precision = 'double'           !! 'mixed'
     logical :: breaking = .false.                  !! bonds can break; none gets near it
     logical :: surface = .false.                   !! surface correction
+    logical :: generic = .false.                   !! the law on the generic pass
     integer :: threads = 1
   end type kernel_type
 
@@ -93,6 +95,10 @@ contains
         timing%flops = flops_of_bond(system%family, system%workspace, &
           & dilatation_of(options_of(system%model)))*timing%bonds
         timing%traffic = bytes_of_step(system)
+        if (kernel%generic) then  ! whose operations and traffic depend on the law
+          timing%flops = 0.0_wp
+          timing%traffic = 0.0_wp
+        end if
         call start_moving(system, scene)
         call time_steps(system, set_up%plan%step, seconds, timing, error)
         if (.not. allocated(error)) call time_forces(system, seconds, timing)
@@ -103,7 +109,7 @@ contains
   end subroutine measure_kernel
 
   !> A steel cube, plate or bar of a kernel's kind, horizon 3.015 spacings.
-  pure subroutine standard_scene(kernel, scene)
+  subroutine standard_scene(kernel, scene)
     type(kernel_type), intent(in) :: kernel  !! gives dimension, points and what is measured of them
     type(scene_type), intent(out) :: scene   !! of one body without loads and boundaries, for one
                                              !! step
@@ -111,6 +117,7 @@ contains
     real(wp), parameter :: far_away = 0.1_wp                     ! stretch that is never reached [-]
     ! in 2D (plane stress) and 3D bond-based bodies have no other; in 1D any will do
     real(wp), parameter :: ratios(3) = [0.25_wp, 1.0_wp/3, 0.25_wp]
+    integer :: i
 
     scene%file = ''
     scene%text = ''
@@ -132,6 +139,12 @@ contains
       if (kernel%model == 'state_based') material%poissons_ratio = 0.3_wp
       if (kernel%breaking) material%critical_stretch = far_away
     end associate
+    if (kernel%generic) then
+      scene%laws = all_laws()
+      do i = 1, size(scene%laws%items)
+        scene%laws%items(i)%law%weighted = .false.
+      end do
+    end if
     scene%horizon%ratio = 3.015_wp
     scene%horizon%surface_correction = trim(merge('energy', 'none  ', kernel%surface))
     scene%horizon%family = kernel%family
@@ -347,6 +360,7 @@ contains
     bytes = 400*points
     ! 5 bytes of a bond while it is searched; two stored weights where points differ
     if (kernel%family == 'list') bytes = bytes + 5*bonds(kernel%dimension)*points
+    if (kernel%generic) bytes = bytes + 14*bonds(kernel%dimension)*points
     if (kernel%family == 'list' .and. kernel%surface) &
       & bytes = bytes + 20*bonds(kernel%dimension)*points
   end function bytes_needed

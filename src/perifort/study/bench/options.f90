@@ -25,6 +25,7 @@ module pd_study_bench_options
     character(:), allocatable :: precision   !! one of `precisions`, default 'double', or 'both'
     character(:), allocatable :: csv         !! file for the numbers, '' for none
     logical :: surface = .false.             !! with surface correction
+    logical :: generic = .false.             !! the laws on the generic pass
     real(wp) :: seconds = 0.25_wp            !! each repeat takes at least so long [s]
     integer(i8) :: triad = 16000000_i8       !! elements of each of the arrays for the bandwidth
   end type bench_options_type

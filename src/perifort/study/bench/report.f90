@@ -49,11 +49,12 @@ contains
   end function csv_row
 
   !> The head of the table: program, peak performance of the machine, and meaning of the columns.
-  !> `surface`: with surface correction.
-  subroutine table_head(unit, machines, surface)
+  !> `surface`: with surface correction; `generic`: on the generic pass.
+  subroutine table_head(unit, machines, surface, generic)
     integer, intent(in) :: unit                    !! of an open file or the terminal
     type(machine_type), intent(in) :: machines(:)  !! (thread counts) in the order of the rows
     logical, intent(in) :: surface                 !! the bodies have a surface correction
+    logical, intent(in) :: generic                 !! the generic pass computes the laws
     integer :: t
 
     write (unit, '(a)') 'perifort '//program_version//', commit '//commit(), &
@@ -63,7 +64,8 @@ contains
     end do
     write (unit, '(a)') '', &
       & 'Horizon 3.015 spacings, '//trim(merge('with   ', 'without', surface))// &
-      & ' surface correction; bonds are directed.', &
+      & ' surface correction; bonds are directed.'//trim(merge(' Generic pass.', repeat(' ', 14), &
+      & generic)), &
       & '  ns/bond   a complete step (forces, detection of breaking bonds, external work, new', &
       & '            velocities and displacements; no output), wall time, median', &
       & '  cpu       the same in processor time per thread', &
