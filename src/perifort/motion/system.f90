@@ -45,8 +45,8 @@ module pd_motion_system
     integer(i1), allocatable :: held(:, :)      !! 1 where a component is constrained (n_slots, dim)
     integer(i1), allocatable :: strained(:)     !! marks of the last pass
     integer(i8) :: broken = 0_i8                !! bonds broken during the run
-    real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking [J]
-    real(wp) :: law_dissipation = 0.0_wp        !! what bond laws with a history dissipated [J]
+    real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking, laws and terms [J]
+    real(wp) :: law_dissipation = 0.0_wp        !! the part of it by laws with a history [J]
     real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
     real(wp) :: dissipation_due = 0.0_wp        !! parts of both that fall into the step to come,
     real(wp) :: work_due = 0.0_wp               !! of bonds that broke after the last forces [J]
@@ -511,6 +511,7 @@ contains
     call commit_laws(system%body, system%family, system%model, system%workspace%generic, &
       & system%state%u, system%state%damage, dissipated)
     system%law_dissipation = system%law_dissipation + dissipated
+    system%dissipated = system%dissipated + dissipated
   end subroutine commit
 
   !> Work of varying temperature since the last call: the strain energy that it changes at fixed
