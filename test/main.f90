@@ -82,6 +82,7 @@ program main
   use test_scene_content_template, only: collect_scene_content_template
   use test_scene_format_values, only: collect_scene_format_values
   use test_scene_content_write, only: collect_scene_content_write
+  use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_study_limits_limits, only: collect_study_limits_limits
   use test_study_trade_closed_form, only: collect_study_trade_closed_form
@@ -170,6 +171,7 @@ program main
   call register('scene_content_template', collect_scene_content_template)
   call register('scene_format_values', collect_scene_format_values)
   call register('scene_content_write', collect_scene_content_write)
+  call register('softening_cracks', collect_softening_cracks)
   call register('study_bench_bench', collect_study_bench_bench)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)
