@@ -110,7 +110,7 @@ contains
       & most(model, 'constants'), seen)
   end subroutine new_law_bonds
 
-  !> The number that each bond has in the family of its other end. The bonds of j in the order of
+  !> Where each bond stands in the family of its other end. The bonds of j in the order of
   !> their other ends belong, one by one, to the slots that have a bond to j, in their order.
   subroutine find_other_ends(family, workspace)
     class(family_type), intent(in) :: family
@@ -121,8 +121,8 @@ contains
     integer(i2), allocatable :: sorted(:)
     integer :: k, i, j
 
-    allocate (workspace%back(workspace%start(family%n_slots + 1) - 1))
-    allocate (sorted(size(workspace%back, kind=i8)))
+    allocate (workspace%partner(workspace%start(family%n_slots + 1) - 1))
+    allocate (sorted(size(workspace%partner, kind=i8)))
     !$omp parallel default(none) shared(family, workspace, sorted) private(bonds, order, k, i)
     call allocate_bonds(family, bonds)
     allocate (order(family%most_bonds))
@@ -142,7 +142,8 @@ contains
       do i = 1, bonds%n
         j = bonds%j(i)
         workspace%member(workspace%start(k) + i - 1) = int(j, i4)
-        workspace%back(workspace%start(k) + i - 1) = sorted(workspace%start(j) + met(j))
+        workspace%partner(workspace%start(k) + i - 1) = workspace%start(j) &
+          & + sorted(workspace%start(j) + met(j)) - 1
         met(j) = met(j) + 1_i4
       end do
     end do
@@ -384,7 +385,7 @@ contains
       first = workspace%start(k)
       last = workspace%start(k + 1) - 1
       call add_pulls(size(u, 1), family%dim, int(last - first) + 1, workspace%member(first:last), &
-        & workspace%start, workspace%back(first:last), workspace%volume(first:last), &
+        & workspace%partner(first:last), workspace%volume(first:last), &
         & workspace%pull(first:last), workspace%pull, workspace%x, u, k, sums)
       do c = 1, family%dim
         force(k, c) = sums(c)
@@ -394,11 +395,10 @@ contains
   end subroutine generic_force
 
   !> The sum over the `n` bonds of slot `k`. A bond crushed to a point has no direction.
-  pure subroutine add_pulls(n_slots, dim, n, member, start, back, volume, own, pull, x, u, k, sums)
+  pure subroutine add_pulls(n_slots, dim, n, member, partner, volume, own, pull, x, u, k, sums)
     integer, intent(in) :: n_slots, dim, n, k
     integer(i4), intent(in) :: member(n)
-    integer(i8), intent(in) :: start(n_slots + 1)
-    integer(i2), intent(in) :: back(n)
+    integer(i8), intent(in) :: partner(n)
     real(wp), intent(in) :: volume(n), own(n), pull(*), x(n_slots, dim), u(n_slots, dim)
     real(wp), intent(out) :: sums(3)
     real(wp) :: y(n, dim), square(n), both(n)
@@ -412,7 +412,7 @@ contains
       end do
     end do
     do i = 1, n
-      both(i) = own(i) + pull(start(member(i)) + back(i) - 1)
+      both(i) = own(i) + pull(partner(i))
     end do
     do i = 1, n
       both(i) = merge(both(i)*volume(i)/sqrt(max(square(i), tiny(1.0_wp))), 0.0_wp, &
@@ -592,7 +592,7 @@ contains
       call family%bonds_of(k, bonds)
       do i = 1, bonds%n
         b = workspace%start(k) + i - 1
-        bound(k) = bound(k) + (own(b) + own(workspace%start(bonds%j(i)) + workspace%back(b) - 1)) &
+        bound(k) = bound(k) + (own(b) + own(workspace%partner(b))) &
           & *bonds%weight(i)
       end do
     end do

@@ -3,7 +3,7 @@
 !> next. The owner of the model owns the workspace (`pd_motion_system`); another model takes another
 !> one.
 module pd_force_workspace
-  use pd_base_kinds, only: wp, sp, i1, i2, i4, i8
+  use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
   implicit none (type, external)
@@ -72,7 +72,7 @@ module pd_force_workspace
   !> `bonds_of`.
   type :: generic_workspace_type
     integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
-    integer(i2), allocatable :: back(:)        !! the bond's number in the family of its other end
+    integer(i8), allocatable :: partner(:)     !! the same bond at its other end
     integer(i4), allocatable :: member(:)      !! slot of that
     real(wp), allocatable :: volume(:)         !! vc V_j, 0 where the bond is broken [m3]
     real(wp), allocatable :: x(:, :)           !! positions (n_slots, dim) [m]
@@ -134,7 +134,7 @@ contains
 
     bytes = 0_i8
     if (.not. allocated(workspace%start)) return
-    bytes = 22*size(workspace%pull, kind=i8) + 8*(size(workspace%start, kind=i8) &
+    bytes = 28*size(workspace%pull, kind=i8) + 8*(size(workspace%start, kind=i8) &
       & + size(workspace%x, kind=i8) + size(workspace%history, kind=i8) + size(workspace%of_point, kind=i8) &
       & + size(workspace%constants, kind=i8))
   end function bytes_of_generic

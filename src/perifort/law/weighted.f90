@@ -148,17 +148,22 @@ contains
 
     call all_factors(self, bonds, gb, gd)
     call scaled_constants(self, bonds, q, t, p)
-    theta = 0.0_wp
+    do i = 1, bonds%n
+      pull(i) = q*gb(i)*bonds%stretch(i)
+    end do
     if (abs(p) > 0.0_wp) then
+      theta = 0.0_wp
       do i = 1, bonds%n
-        theta = theta + gd(i)*bonds%stretch(i)*bonds%projection(i)*bonds%volume(i)
+        gd(i) = gd(i)*bonds%projection(i)
+        theta = theta + gd(i)*bonds%stretch(i)*bonds%volume(i)
       end do
-      theta = t*theta
+      theta = p*t*theta
+      do i = 1, bonds%n
+        pull(i) = pull(i) + theta*gd(i)/bonds%length(i)
+      end do
     end if
     do i = 1, bonds%n
-      pull(i) = 0.0_wp
-      if (bonds%volume(i) <= 0.0_wp) cycle
-      pull(i) = q*gb(i)*bonds%stretch(i) + p*theta*gd(i)*bonds%projection(i)/bonds%length(i)
+      pull(i) = merge(pull(i), 0.0_wp, bonds%volume(i) > 0.0_wp)
     end do
   end subroutine forces
 
