@@ -30,7 +30,7 @@ contains
       & new_unittest('closed cracks have the stiffness of the start', test_compression), &
       & new_unittest('work is what is stored and dissipated along any path', test_balance), &
       & new_unittest('a bond that breaks between commits loses no energy', test_release), &
-      & new_unittest('damage is 1 less the secant stiffness over that of the start', test_damage), &
+      & new_unittest('damage is 1 less the secant stiffness over the first one', test_damage), &
       & new_unittest('both ends of a bond have the same bits', test_symmetry), &
       & new_unittest('forces and energies leave the history as it is', test_trial), &
       & new_unittest('laws that cannot be had say why', test_refusal)]
@@ -110,8 +110,8 @@ contains
     end do
   end function work_between
 
-  !> Areas of the pulls from 0 to s_u, in all dimensions and with all influence functions that have a
-  !> critical stretch, against the energy of the law `bond_based`.
+  !> Areas of the pulls from 0 to s_u, in all dimensions and with all influence functions, against
+  !> the energy of the law `bond_based` at its critical stretch.
   subroutine test_area(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: influences(*) = [character(8) :: 'inverse', 'constant', 'linear', &
@@ -141,8 +141,8 @@ contains
     end do
   end subroutine test_area
 
-  !> Pulls on first loading against those of the linear law at the stretches 0 to s_0, and on the line
-  !> from the peak to s_u.
+  !> Pulls on first loading against those of the linear law up to the peak, and against the line from
+  !> the peak to s_u.
   subroutine test_curve(error)
     type(error_type), allocatable, intent(out) :: error
     type(weighted_law_type) :: linear
@@ -162,7 +162,7 @@ contains
         call linear%forces(bonds, expected)
         if (bonds%stretch(1) > s_0) expected = peak*max((s_u - bonds%stretch(:n))/(s_u - s_0), &
           & 0.0_wp)
-        call expect_close(error, pull/peak, expected/peak, 1.0e-13_wp, 'pull over that of the peak')
+        call expect_close(error, pull/peak, expected/peak, 1.0e-13_wp, 'pull over its peak')
       end do
     end associate
     bonds%stretch = 0.7_wp*s_c
@@ -171,8 +171,8 @@ contains
     call expect_close(error, pull(3), 0.0_wp, 0.0_wp, 'pull of a broken bond')
   end subroutine test_curve
 
-  !> After a stretch on the falling branch, pulls are proportional to the stretch up to there, and on
-  !> the curve of first loading beyond.
+  !> After a stretch on the falling branch, pulls are proportional to the stretch up to that one, and
+  !> on the curve of first loading beyond.
   subroutine test_unloading(error)
     type(error_type), allocatable, intent(out) :: error
     type(weighted_law_type) :: linear
@@ -227,8 +227,8 @@ contains
     call expect_close(error, bonds%history(1, :), 1.9_wp*s_c, 0.0_wp, 'greatest stretch')
   end subroutine test_compression
 
-  !> Random paths of all bonds, to compression and beyond s_u; the work is exact, so that the balance
-  !> closes to rounding. Before a commit the energy alone closes it.
+  !> Random paths of all bonds, to compression and beyond s_u. The work is exact, so that the balance
+  !> closes to rounding, before a commit and after it.
   subroutine test_balance(error)
     type(error_type), allocatable, intent(out) :: error
     type(weighted_law_type) :: linear
@@ -385,8 +385,8 @@ contains
     call expect_true(error, index(law%refusal(), 'needs critical_energy_release_rate') > 0, &
       & 'no energy')
     call two_laws(3, 'inverse', 1.5_wp, linear, law)
-    call expect_true(error, index(law%refusal(), 'below s_c = 0.02000') > 0 .or. &
-      & index(law%refusal(), 'below s_c = 0.02,') > 0, 'peak above s_c: '//law%refusal())
+    call expect_true(error, index(law%refusal(), 'below s_c = 0.02,') > 0, 'peak above s_c: '// &
+      & law%refusal())
   end subroutine test_refusal
 
 end module test_law_softening

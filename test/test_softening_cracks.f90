@@ -148,9 +148,9 @@ contains
     end do
   end subroutine observe_stretches
 
-  !> Load curves and dissipated energies at spacings of 1 to 1/2, horizons of 1 to 1/2: within 5 % of
-  !> each other. The energy is that of the ligament within 10 %: cracks are not straight, and sums
-  !> over the lattice stand for integrals.
+  !> Load curves and dissipated energies with spacings and horizons from 1 to 1/2, within 5 % of each
+  !> other. At this ratio a sum over the lattice counts 5.4 % less for a straight crack than the
+  !> integral of Gc (doc/theory.md, 8); the cracks are curved.
   subroutine test_spacings(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: points(*) = [32, 48, 64]
@@ -171,7 +171,7 @@ contains
         return
       end if
       lost(i) = set_up%system%dissipated
-      call expect_close(error, lost(i)/(Gc*ligament), 1.0_wp, 0.1_wp, 'dissipated over Gc A')
+      call expect_close(error, lost(i)/(Gc*ligament), 0.946_wp, 0.03_wp, 'dissipated over Gc A')
       call expect_close(error, curve(i)%energy, curve(i)%work, 0.005_wp*Gc*ligament, &
         & 'stored and dissipated energy')
       call expect_true(error, set_up%system%broken > 0_i8, 'no bond is lost')
@@ -180,7 +180,8 @@ contains
     peak = maxval(curve(3)%reaction)
     do i = 1, 2
       call expect_close(error, maxval(curve(i)%reaction)/peak, 1.0_wp, 0.05_wp, 'peak')
-      call expect_close(error, curve(i)%reaction/peak, curve(3)%reaction/peak, 0.05_wp, 'load curve')
+      call expect_close(error, curve(i)%reaction/peak, curve(3)%reaction/peak, 0.05_wp, &
+        & 'load curve')
     end do
     call expect_close(error, curve(3)%reaction(size(curve(3)%reaction))/peak, 0.0_wp, 0.01_wp, &
       & 'force at the end')

@@ -1,13 +1,13 @@
 !> Bonds that soften, `model = 'softening'`: bond-based, the pull of a bond in tension grows to its
-!> peak at the stretch s_0 (`peak_stretch`) and falls linearly to nothing at s_u, where the bond
-!> breaks. With kappa the greatest stretch that the bond has had
+!> peak at the stretch s_0 (`peak_stretch`) and falls linearly to zero at s_u, where the bond breaks
+!> (doc/theory.md, 8). With kappa the greatest stretch that the bond has had
 !>
-!>     pull = q gb Gb (1 - D) s in tension,  1 - D = s_0 (s_u - kappa)/(kappa (s_u - s_0)) from kappa = s_0 on,
+!>     pull = q gb Gb (1 - D) s,  1 - D = s_0 (s_u - kappa)/(kappa (s_u - s_0)) for kappa > s_0
 !>
-!> so that it unloads to the origin with the stiffness that is left. In compression it has all of its
-!> stiffness at any damage, as a crack that is closed. The area under the curve, s_0 s_u/2, is that of
-!> a linear bond that breaks at the critical stretch s_c of Gc, s_c^2/2: s_u = s_c^2/s_0 (doc/theory.md,
-!> 8). That is the critical stretch of this law, and of its material.
+!> in tension: it unloads to the origin with its secant stiffness. In compression it has its whole
+!> stiffness at any damage, as a closed crack does. The area under the curve, s_0 s_u/2, is that of a
+!> linear bond that breaks at the critical stretch s_c of Gc, s_c^2/2: s_u = s_c^2/s_0. That is the
+!> critical stretch of this law, and of its material.
 module pd_law_softening
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
@@ -70,8 +70,8 @@ contains
     end if
   end function left
 
-  !> What a bond dissipates until its greatest stretch is kappa, over q gb Gb |xi|/2. The work s_0^2 +
-  !> (p_0 + p)(kappa - s_0) of the pulls p_0 = s_0 and p = (1 - D) kappa, less p kappa that it stores.
+  !> What a bond has dissipated when its greatest stretch is kappa, over q gb Gb |xi|/2: the work
+  !> s_0^2 + (s_0 + p)(kappa - s_0) of the pull, p = (1 - D) kappa at last, less the stored p kappa.
   pure real(wp) function lost(kappa, s_0, s_u)
     real(wp), intent(in) :: kappa, s_0, s_u
     lost = s_0*s_u/(s_u - s_0)*(min(max(kappa, s_0), s_u) - s_0)
@@ -98,11 +98,10 @@ contains
     end do
   end subroutine forces
 
-  !> The work that the pulls have done since the history, and what was stored then: (1 - D) s^2 in
-  !> tension, s^2 in compression, and what the bond dissipates where it is stretched further than
-  !> ever, each with (q/2) gb Gb |xi| vc V_j. After `commit` nothing of the last is left: the energy is
-  !> the stored one. A bond that breaks between two commits thus releases what it would have
-  !> dissipated by itself.
+  !> The stored energy (1 - D) s^2 in tension and s^2 in compression, and what the bond dissipates
+  !> where it is stretched further than its history, each with (q/2) gb Gb |xi| vc V_j. So its change
+  !> is the work of the pulls, and after `commit` it is the stored energy alone. A bond that breaks
+  !> between two commits releases what it would have dissipated.
   pure real(wp) function energy(self, bonds)
     class(softening_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(in) :: bonds      !! of the point, with its history
@@ -124,8 +123,8 @@ contains
     energy = energy/2
   end function energy
 
-  !> Bring the greatest stretches of intact bonds up to date. Those that broke count with the energy
-  !> that they released.
+  !> Bring the greatest stretches of intact bonds up to date. The energy of those that broke has been
+  !> counted when they broke.
   pure subroutine commit(self, bonds, dissipated)
     class(softening_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(inout) :: bonds   !! of the point; its history is set
@@ -170,8 +169,8 @@ contains
     s_u = self%weighted_law_type%critical_stretch(Gc)**2/self%parameter('peak_stretch')
   end function critical_stretch
 
-  !> Why the law cannot be had: without a stretch s_u, with one that is not above s_0, or with bonds
-  !> that break in compression.
+  !> Why the law cannot be had: no stretch s_u, one that is not above s_0, or bonds that break in
+  !> compression.
   pure function refusal(self) result(reason)
     class(softening_law_type), intent(in) :: self  !! after `set_up`, with the critical stretch
     character(:), allocatable :: reason
