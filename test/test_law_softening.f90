@@ -141,8 +141,8 @@ contains
     end do
   end subroutine test_area
 
-  !> Pulls on first loading against those of the linear law up to the peak, and against the line from
-  !> the peak to s_u.
+  !> Pulls on first loading against those of the linear law up to the peak, and against the line
+  !> from the peak to s_u.
   subroutine test_curve(error)
     type(error_type), allocatable, intent(out) :: error
     type(weighted_law_type) :: linear
@@ -171,8 +171,8 @@ contains
     call expect_close(error, pull(3), 0.0_wp, 0.0_wp, 'pull of a broken bond')
   end subroutine test_curve
 
-  !> After a stretch on the falling branch, pulls are proportional to the stretch up to that one, and
-  !> on the curve of first loading beyond.
+  !> After a stretch on the falling branch, pulls are proportional to the stretch up to that one,
+  !> and on the curve of first loading beyond.
   subroutine test_unloading(error)
     type(error_type), allocatable, intent(out) :: error
     type(weighted_law_type) :: linear
@@ -227,8 +227,8 @@ contains
     call expect_close(error, bonds%history(1, :), 1.9_wp*s_c, 0.0_wp, 'greatest stretch')
   end subroutine test_compression
 
-  !> Random paths of all bonds, to compression and beyond s_u. The work is exact, so that the balance
-  !> closes to rounding, before a commit and after it.
+  !> Random paths of all bonds, to compression and beyond s_u. The work is exact, so that the
+  !> balance closes to rounding, before a commit and after it.
   subroutine test_balance(error)
     type(error_type), allocatable, intent(out) :: error
     type(weighted_law_type) :: linear

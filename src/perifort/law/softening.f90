@@ -5,9 +5,9 @@
 !>     pull = q gb Gb (1 - D) s,  1 - D = s_0 (s_u - kappa)/(kappa (s_u - s_0)) for kappa > s_0
 !>
 !> in tension: it unloads to the origin with its secant stiffness. In compression it has its whole
-!> stiffness at any damage, as a closed crack does. The area under the curve, s_0 s_u/2, is that of a
-!> linear bond that breaks at the critical stretch s_c of Gc, s_c^2/2: s_u = s_c^2/s_0. That is the
-!> critical stretch of this law, and of its material.
+!> stiffness at any damage, as a closed crack does. The area under the curve, s_0 s_u/2, is that of
+!> a linear bond that breaks at the critical stretch s_c of Gc, s_c^2/2: s_u = s_c^2/s_0. That is
+!> the critical stretch of this law, and of its material.
 module pd_law_softening
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
@@ -99,9 +99,9 @@ contains
   end subroutine forces
 
   !> The stored energy (1 - D) s^2 in tension and s^2 in compression, and what the bond dissipates
-  !> where it is stretched further than its history, each with (q/2) gb Gb |xi| vc V_j. So its change
-  !> is the work of the pulls, and after `commit` it is the stored energy alone. A bond that breaks
-  !> between two commits releases what it would have dissipated.
+  !> where it is stretched further than its history, each with (q/2) gb Gb |xi| vc V_j. So its
+  !> change is the work of the pulls, and after `commit` it is the stored energy alone. A bond that
+  !> breaks between two commits releases what it would have dissipated.
   pure real(wp) function energy(self, bonds)
     class(softening_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(in) :: bonds      !! of the point, with its history
@@ -123,8 +123,8 @@ contains
     energy = energy/2
   end function energy
 
-  !> Bring the greatest stretches of intact bonds up to date. The energy of those that broke has been
-  !> counted when they broke.
+  !> Bring the greatest stretches of intact bonds up to date. The energy of the others was counted
+  !> when they broke.
   pure subroutine commit(self, bonds, dissipated)
     class(softening_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(inout) :: bonds   !! of the point; its history is set
