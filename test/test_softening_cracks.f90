@@ -149,8 +149,8 @@ contains
   end subroutine observe_stretches
 
   !> Load curves and dissipated energies with spacings and horizons from 1 to 1/2, within 5 % of
-  !> each other. At this ratio a sum over the lattice counts 5.4 % less for a straight crack than the
-  !> integral of Gc (doc/theory.md, 8); the cracks are curved.
+  !> each other. At this ratio a sum over the lattice counts 5.4 % less for a straight crack than
+  !> the integral of Gc (doc/theory.md, 8); the cracks are curved.
   subroutine test_spacings(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: points(*) = [32, 48, 64]
