@@ -5,6 +5,7 @@ module force_subjects
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: body_type, grid_type, allocate_points, keep_points
+  use pd_law_laws, only: all_laws, law_item_type, law_table_type
   use pd_law_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
   use pd_family_family, only: family_type
@@ -15,7 +16,8 @@ module force_subjects
     & volume_linear_extended, &
     & volume_exact
   use pd_force_forces, only: internal_force
-  use pd_force_model, only: model_type, new_model, options_of
+  use pd_force_generic, only: begin_laws, generic_point_dilatation, refresh_bonds
+  use pd_force_model, only: model_type, new_model, options_of, p_of
   use pd_force_weights, only: build_weights
   use pd_force_workspace, only: workspace_type
   use pd_scene_content_types, only: crack_group
@@ -27,7 +29,9 @@ module force_subjects
 
   !> The kinds of families that must keep the contract. `tables`: lists where every cluster has
   !> tables, also those that no other shares.
-  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'tables', 'lattice', 'mixed']
+  !> `generic`: a lattice whose laws are computed on the generic pass.
+  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'tables', 'lattice', 'mixed', &
+    & 'generic']
 
   !> Of every body here [m]; a power of 2, so that positions are exact.
   real(wp), parameter :: spacing = 2.0_wp**(-10)
@@ -38,6 +42,8 @@ module force_subjects
     integer :: dim = 1
     real(wp) :: poissons_ratio = 0.2_wp
     logical :: bond_based = .false.
+    character(16) :: law = ''                !! '': by `bond_based`
+    character(16) :: influence = 'inverse'
     logical :: dilatant = .false.            !! 1D: energy of dilatation beside that of stretches
     logical :: plane_strain = .false.
     logical :: projected = .true.
@@ -108,6 +114,7 @@ contains
   subroutine build(subject)
     type(subject_type), intent(inout) :: subject
     type(material_type), allocatable :: materials(:)
+    type(law_item_type), allocatable :: laws(:)
     type(crack_group) :: crack
     real(wp), allocatable :: temperature_change(:)
     logical, allocatable :: keep(:)
@@ -154,6 +161,7 @@ contains
         if (subject%breaking) materials(i)%critical_stretch = 0.01_wp*i
         if (subject%breaking) materials(i)%break_in_compression = .true.
       end do
+      call make_laws(subject, materials, delta, laws)
       if (subject%hole) then
         allocate (keep(body%n_points), source=.true.)
         if (subject%dim > 1) then
@@ -176,10 +184,11 @@ contains
         end do
       end if
       call new_model(body, materials, subject%projected, spread(.false., 1, body%n_slots), &
-        & temperature_change, subject%model)
+        & temperature_change, subject%model, laws)
       subject%model%surface = subject%surface
       if (subject%surface) call surface_factors(body, subject%family, materials, subject%model%D, &
-        & subject%model%S)
+        & subject%model%S, laws)
+      call begin_subject(subject)
       call finish_family(subject)
       if (subject%crack .and. subject%dim == 2) then
         crack%from(:2) = [-1.0_wp, 4.0_wp]*spacing
@@ -191,8 +200,43 @@ contains
         crack%radius = 3.0_wp*spacing
         call cut_bonds([crack], body, subject%family, cut)
       end if
+      call refresh_bonds(subject%family, subject%workspace%generic)
     end associate
   end subroutine build
+
+  !> The bond laws of a subject; the materials get their constants.
+  subroutine make_laws(subject, materials, delta, laws)
+    type(subject_type), intent(in) :: subject
+    type(material_type), intent(inout) :: materials(:)
+    real(wp), intent(in) :: delta
+    type(law_item_type), allocatable, intent(out) :: laws(:)
+    type(law_table_type) :: table
+    integer :: i, n
+
+    table = all_laws()
+    n = table%number_of(merge('bond_based ', 'state_based', subject%bond_based))
+    if (subject%law /= '') n = table%number_of(subject%law)
+    allocate (laws(size(materials)))
+    do i = 1, size(materials)
+      allocate (laws(i)%law, source=table%items(n)%law)
+      associate (law => laws(i)%law)
+        law%influence = subject%influence
+        call law%set_up(materials(i), subject%dim, subject%plane_strain, delta, depth(subject%dim))
+        materials(i) = law%material
+      end associate
+    end do
+  end subroutine make_laws
+
+  !> What the laws make of the family. The model stays the one that is written point by point, also
+  !> where the generic pass computes it.
+  subroutine begin_subject(subject)
+    type(subject_type), intent(inout) :: subject
+
+    call begin_laws(subject%body, subject%family, subject%model, subject%workspace%generic)
+    if (subject%kind /= 'generic') return
+    subject%model%generic = .true.
+    call begin_laws(subject%body, subject%family, subject%model, subject%workspace%generic)
+  end subroutine begin_subject
 
   !> Move points off the lattice by up to a fifth of a spacing, and give them spacings of their own.
   subroutine scatter(body)
@@ -232,7 +276,7 @@ contains
     integer, intent(in) :: number
     type(subject_type), intent(out) :: subject
     logical, intent(out) :: there
-    integer, parameter :: variants = 16
+    integer, parameter :: variants = 20
     integer :: extra
 
     there = number <= 3*variants + merge(12, 2, kind == 'list' .or. kind == 'tables')
@@ -301,6 +345,28 @@ contains
       subject%projected = .false.
       subject%surface = .true.
       subject%breaking = .true.
+    case (16)
+      subject%law = 'lps'
+      subject%influence = 'constant'
+      subject%projected = .false.
+      subject%two_materials = .true.
+      subject%crack = .true.
+      subject%hole = .true.
+    case (17)
+      subject%influence = 'gaussian'
+      subject%surface = .true.
+      subject%thermal = .true.
+      subject%two_materials = .true.
+    case (18)
+      subject%influence = 'linear'
+      subject%bond_based = .true.
+      subject%breaking = .true.
+    case (19)
+      subject%law = 'lps'
+      subject%influence = 'inverse'
+      subject%projected = .false.
+      subject%poissons_ratio = 0.4_wp
+      subject%rule = volume_linear_extended
     case default
       subject%surface = .true.
       subject%thermal = .true.
@@ -328,11 +394,17 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), allocatable, intent(out) :: force(:, :), p(:)
     integer(i1), allocatable :: strained(:)
+    integer :: k
 
     allocate (force(size(u, 1), size(u, 2)), p(size(u, 1)), source=0.0_wp)
     allocate (strained(size(u, 1)), source=0_i1)
     call internal_force(subject%body, subject%family, subject%model, options_of(subject%model), &
       & subject%workspace, u, p, force, strained)
+    if (.not. subject%model%generic) return
+    do k = 1, size(u, 1)
+      p(k) = p_of(subject%model, k)*generic_point_dilatation(subject%family, subject%model, &
+        & subject%workspace%generic, u, k)
+    end do
   end subroutine fast_force
 
   !> A gradient with all components, also where the dimension has no use for them.
@@ -346,6 +418,8 @@ contains
   !> Two points of a plane one spacing apart along x, the horizon two spacings.
   subroutine build_pair(subject)
     type(subject_type), intent(inout) :: subject
+    type(material_type) :: materials(1)
+    type(law_item_type), allocatable :: laws(:)
 
     call allocate_points(subject%body, 2, 2)
     subject%body%x(1, :) = [0.5_wp, 0.5_wp]*spacing
@@ -358,11 +432,14 @@ contains
     subject%body%grids = [grid_type([0.0_wp, 0.0_wp, 0.0_wp], spacing)]
     call build_family(subject%kind, subject%body, volume_rule_type(subject%rule, 2.0_wp*spacing), &
       & .false., subject%key_bits, subject%least_shared, subject%family, subject%workspace)
-    call new_model(subject%body, [new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., &
-      & depth(2), &
-      & depth(1), 2*spacing, subject%bond_based)], subject%projected, &
+    materials = new_material(youngs_modulus, 0.2_wp, 7850.0_wp, 2, .false., depth(2), depth(1), &
+      & 2*spacing, subject%bond_based)
+    subject%dim = 2
+    call make_laws(subject, materials, 2*spacing, laws)
+    call new_model(subject%body, materials, subject%projected, &
       & spread(.false., 1, subject%body%n_slots), spread(0.0_wp, 1, subject%body%n_slots), &
-      & subject%model)
+      & subject%model, laws)
+    call begin_subject(subject)
     call finish_family(subject)
   end subroutine build_pair
 

@@ -463,7 +463,7 @@ contains
           slots = pack([(k, k=1, body%n_slots)], body%point > 0)
           damage = 0.0_wp
           call break_bonds(body, subject%family, subject%model, u, slots, damage, broken, &
-            & dissipated)
+            & dissipated, laws=subject%workspace%generic)
           call fast_force(subject, u, force, p)
           do c = 1, 3
             call gather(body, force(:, c), ordered(:, c))
@@ -569,7 +569,8 @@ contains
       call shake(body, some_gradient(0.02_wp), 0.08_wp*spacing, 9, u)
       slots = pack([(k, k=1, body%n_slots)], body%point > 0)
       call damage_of(body, subject%family, damage)
-      call break_bonds(body, subject%family, subject%model, u, slots, damage, broken, dissipated)
+      call break_bonds(body, subject%family, subject%model, u, slots, damage, broken, dissipated, &
+        & laws=subject%workspace%generic)
       call expect_true(error, 10*broken > subject%family%n_bonds/2, 'too few bonds broke')
     end associate
     call expect_theory(error, subject, 'a block full of holes, with broken bonds')

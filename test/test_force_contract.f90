@@ -11,7 +11,7 @@ module test_force_contract
   use pd_family_volume, only: volume_none
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
   use pd_force_forces, only: energy_pass, internal_force, up_to_marks
-  use pd_force_model, only: force_options_type, model_type, options_of
+  use pd_force_model, only: force_options_type, model_type, options_of, p_of
   use pd_force_polynomial, only: fast_limit, fast_ranges, narrow, wide, single
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use comparisons, only: expect_close, max_abs
@@ -54,7 +54,7 @@ contains
     real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), theta(:), w(:), w_ref(:)
     real(wp), parameter :: strains(*) = [1.0e-9_wp, 1.0e-4_wp, 2.0e-3_wp, 0.03_wp, 0.5_wp]
     real(wp) :: largest
-    integer :: kind, number, i
+    integer :: kind, number, i, k
     logical :: there
 
     do kind = 1, size(kinds)
@@ -80,7 +80,7 @@ contains
             & number))
           if (subject%model%dilatation) then
             call reference_dilatation(subject%family, subject%model, u, theta)
-            theta = theta*subject%model%materials(subject%model%material)%p
+            theta = theta*[(p_of(subject%model, k), k=1, size(theta))]
             call expect_close(error, p, theta, &
               & tolerance(kinds(kind), 1.0e-12_wp, 1.0e-6_wp)*max_abs(theta), 'dilatation, &
               & '//name_of(subject, number))
@@ -185,7 +185,7 @@ contains
               & //text_of(degrees(a)))
             if (subject%model%dilatation) then
               call reference_dilatation(subject%family, subject%model, u, theta)
-              theta = theta*subject%model%materials(subject%model%material)%p
+              theta = theta*[(p_of(subject%model, k), k=1, size(theta))]
               call expect_true(error, all(abs(p - theta) <= 1.0e-11_wp*max_abs(theta)), &
                 & 'dilatation of a turned body, '//name_of(subject, number))
             end if
@@ -520,7 +520,7 @@ contains
         call mark(subject, u, strained)
         call strained_slots(strained, slots)
         call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
-          & dissipated)
+          & dissipated, laws=subject%workspace%generic)
         call expect_true(error, broken > 0_i8, 'no bond broke, '//name_of(subject, 0))
         call expect_true(error, broken < subject%family%n_bonds/2, 'every bond broke')
         call expect(error, dissipated, before - total_energy(subject, u), &
@@ -535,7 +535,7 @@ contains
         call mark(subject, u, strained)
         call strained_slots(strained, slots)
         call break_bonds(subject%body, subject%family, subject%model, u, slots, damage, broken, &
-          & dissipated)
+          & dissipated, laws=subject%workspace%generic)
         call expect(error, real(broken, wp), 0.0_wp, 0.0_wp, 'broken a second time')
         if (allocated(error)) return
       end do

@@ -49,7 +49,7 @@ contains
     if (present(part)) now = part
     if (model%generic) then
       if (now /= after_marks) &
-        & call generic_pulls(family, model, workspace%generic, u, strained)
+        & call generic_pulls(family, model, options, workspace%generic, u, strained)
       if (now /= up_to_marks) call generic_force(family, workspace%generic, u, force)
     else if (options%dilatation) then
       if (now /= after_marks) &

@@ -14,7 +14,8 @@ module pd_force_generic
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_surface, only: bond_factor
   use pd_force_general, only: mark_slot
-  use pd_force_model, only: early, has_scales, model_type
+  use pd_force_model, only: early, force_options_type, has_scales, model_type, options_of
+  use pd_force_reference, only: point_damage
   use pd_force_workspace, only: generic_workspace_type
   use pd_law_law, only: allocate_law_bonds, law_bonds_type
   implicit none (type, external)
@@ -22,11 +23,13 @@ module pd_force_generic
   public :: begin_laws, generic_pulls, generic_force, renew_pulls, generic_energy, generic_bound
   public :: commit_laws, generic_point_energy, generic_point_dilatation, generic_point_damage
   public :: generic_energy_product, keep_laws, new_law_bonds, refresh_bonds, refresh_slot
+  public :: has_plasticity
 
 contains
 
-  !> What the laws take from the whole family, before cracks are cut: scales of the points on the fast
-  !> loops, or constants of the points and room for the pulls and histories of the generic pass.
+  !> What the laws take from the whole family, before cracks are cut: scales of the points on the
+  !> fast loops, or constants of the points and room for the pulls and histories of the generic
+  !> pass.
   subroutine begin_laws(body, family, model, workspace)
     type(body_type), intent(in) :: body       !! arranged in the slots of the family
     class(family_type), intent(in) :: family  !! whole
@@ -218,8 +221,9 @@ contains
   end subroutine refresh_slot
 
   !> The bonds of slot `k` at displacements `u` as its law sees them, with the committed history.
-  pure subroutine look(model, workspace, u, k, seen)
+  pure subroutine look(model, options, workspace, u, k, seen)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(generic_workspace_type), intent(in) :: workspace
     real(wp), intent(in), contiguous :: u(:, :)
     integer, intent(in) :: k
@@ -233,8 +237,9 @@ contains
     seen%n = n
     seen%volume(:n) = workspace%volume(first:last)
     call deform(size(u, 1), size(u, 2), n, workspace%member(first:last), workspace%x, u, k, &
-      & model%projected, seen%length, seen%stretch, seen%projection)
-    if (model%thermal) seen%stretch(:n) = seen%stretch(:n) - (model%expansion(k) &
+      & options%projected, seen%length, seen%stretch, seen%projection)
+    if (.not. options%projected) seen%projection(:n) = 1.0_wp
+    if (options%thermal) seen%stretch(:n) = seen%stretch(:n) - (model%expansion(k) &
       & + model%expansion(workspace%member(first:last)))/2
     if (model%surface) call correct(model, workspace, k, seen)
     if (size(seen%history, 1) > 0) seen%history(:, :n) = workspace%history(:, first:last)
@@ -300,9 +305,10 @@ contains
 
   !> The pulls of all bonds at displacements `u`. Where bonds can break, `strained` becomes 1 for
   !> slots with an intact bond (nearly) beyond its limit, else 0.
-  subroutine generic_pulls(family, model, workspace, u, strained)
+  subroutine generic_pulls(family, model, options, workspace, u, strained)
     class(family_type), intent(in) :: family     !! who interacts with whom
     type(model_type), intent(in) :: model        !! with its laws
+    type(force_options_type), intent(in) :: options  !! whether with thermal strain and Lambda
     type(generic_workspace_type), intent(inout) :: workspace  !! gets the pulls
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     integer(i1), intent(inout), contiguous :: strained(:)
@@ -311,27 +317,29 @@ contains
     integer :: k
 
     call check_room(family, workspace)
-    !$omp parallel default(none) shared(family, model, workspace, u, strained) private(seen, k)
+    !$omp parallel default(none) shared(family, model, options, workspace, u, strained) &
+    !$omp private(seen, k)
     call new_law_bonds(family, model, seen)
     !$omp do schedule(dynamic, 64)
     do k = 1, family%n_slots
       if (size(strained) > 0) strained(k) = 0_i1
       if (workspace%start(k + 1) == workspace%start(k)) cycle
-      call pulls_of(model, workspace, u, k, seen)
+      call pulls_of(model, options, workspace, u, k, seen)
       if (model%breaking .and. size(strained) > 0) call mark(model, k, seen, strained)
     end do
     !$omp end parallel
   end subroutine generic_pulls
 
   !> The pulls of one slot.
-  subroutine pulls_of(model, workspace, u, k, seen)
+  subroutine pulls_of(model, options, workspace, u, k, seen)
     type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
     type(generic_workspace_type), intent(inout) :: workspace
     real(wp), intent(in), contiguous :: u(:, :)
     integer, intent(in) :: k
     type(law_bonds_type), intent(inout) :: seen
 
-    call look(model, workspace, u, k, seen)
+    call look(model, options, workspace, u, k, seen)
     associate (first => workspace%start(k), last => workspace%start(k + 1) - 1)
       call model%laws(model%material(k))%law%forces(seen, workspace%pull(first:last))
     end associate
@@ -364,7 +372,7 @@ contains
     if (size(slots) == 0) return
     call new_law_bonds(family, model, seen)
     do m = 1, size(slots)
-      call pulls_of(model, workspace, u, int(slots(m)), seen)
+      call pulls_of(model, options_of(model), workspace, u, int(slots(m)), seen)
     end do
   end subroutine renew_pulls
 
@@ -455,7 +463,7 @@ contains
     do k = 1, family%n_slots
       energy(k) = 0.0_wp
       if (workspace%start(k + 1) == workspace%start(k)) cycle
-      call look(model, workspace, u, k, seen)
+      call look(model, options_of(model), workspace, u, k, seen)
       energy(k) = model%laws(model%material(k))%law%energy(seen)
     end do
     !$omp end parallel
@@ -471,7 +479,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, workspace, u, k, seen)
+    call look(model, options_of(model), workspace, u, k, seen)
     energy = model%laws(model%material(k))%law%energy(seen)
   end function generic_point_energy
 
@@ -498,9 +506,9 @@ contains
       end if
       n = int(workspace%start(k + 1) - workspace%start(k))
       call new_law_bonds(family, model, seen)
-      call look(model, workspace, other, k, seen)
+      call look(model, options_of(model), workspace, other, k, seen)
       stretch_of_other = seen%stretch(:n)
-      call look(model, workspace, u, k, seen)
+      call look(model, options_of(model), workspace, u, k, seen)
       stretch = seen%stretch(:n)
       ! Q(a, b) = Q((a + b)/2) - Q((a - b)/2) of a quadratic form Q
       seen%stretch(:n) = (stretch + stretch_of_other)/2
@@ -520,7 +528,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, workspace, u, k, seen)
+    call look(model, options_of(model), workspace, u, k, seen)
     theta = model%laws(model%material(k))%law%dilatation(seen)
   end function generic_point_dilatation
 
@@ -536,7 +544,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, workspace, u, k, seen)
+    call look(model, options_of(model), workspace, u, k, seen)
     damage = damage_seen(model, k, bonds, seen)
   end function generic_point_damage
 
@@ -547,16 +555,17 @@ contains
     type(law_bonds_type), intent(in) :: seen
     real(wp) :: lost(seen%n)
 
-    lost = 0.0_wp
-    associate (law => model%laws(model%material(k))%law)
-      if (law%softens) call law%bond_damage(seen, lost)
-    end associate
+    if (.not. model%laws(model%material(k))%law%softens) then
+      damage = point_damage(bonds)
+      return
+    end if
+    call model%laws(model%material(k))%law%bond_damage(seen, lost)
     where (.not. bonds%intact(:seen%n)) lost = 1.0_wp
     damage = 0.0_wp
     if (seen%n > 0) damage = sum(lost*bonds%weight(:seen%n))/sum(bonds%weight(:seen%n))
   end function damage_seen
 
-  !> M_k of every slot: the sum of the bounds that both ends give each bond, times vc V_j. Twice of it
+  !> M_k of every slot: the sum of the bounds that both ends give each bond, times vc V_j. Twice it
   !> bounds the absolute row sum of the stiffness (doc/theory.md, 6).
   subroutine generic_bound(family, model, workspace, bound)
     class(family_type), intent(in) :: family     !! broken bonds count as if they were intact
@@ -580,7 +589,7 @@ contains
     do k = 1, family%n_slots
       if (workspace%start(k + 1) == workspace%start(k)) cycle
       call family%bonds_of(k, bonds)
-      call look(model, workspace, undeformed, k, seen)
+      call look(model, options_of(model), workspace, undeformed, k, seen)
       seen%volume(:bonds%n) = bonds%weight(:bonds%n)
       call model%laws(model%material(k))%law%stiffness(seen, &
         & own(workspace%start(k):workspace%start(k + 1) - 1))
@@ -601,7 +610,7 @@ contains
 
   !> Bring the history of all points and bonds to the present state, after an accepted step, and
   !> local damage with it where a law softens.
-  subroutine commit_laws(body, family, model, workspace, u, damage, dissipated)
+  subroutine commit_laws(body, family, model, workspace, u, damage, dissipated, plastic)
     type(body_type), intent(in) :: body          !! its volumes
     class(family_type), intent(in) :: family     !! as its bonds are now
     type(model_type), intent(in) :: model        !! with its laws
@@ -610,12 +619,14 @@ contains
     real(wp), intent(inout), contiguous :: damage(:)
       !! (n_slots) brought up to date, of size 0 if nothing can be damaged [-]
     real(wp), intent(out) :: dissipated          !! what the laws dissipated since the last call [J]
+    real(wp), intent(out) :: plastic             !! the part of it by plastic laws [J]
     type(bonds_type) :: bonds
     type(law_bonds_type) :: seen
     real(wp), allocatable :: density(:)
     integer :: k
 
     dissipated = 0.0_wp
+    plastic = 0.0_wp
     call check_room(family, workspace)
     if (size(workspace%history, 1) + size(workspace%of_point, 1) == 0) return
     allocate (density(family%n_slots), source=0.0_wp)
@@ -630,7 +641,7 @@ contains
         & last => workspace%start(k + 1) - 1)
         if (law%bond_history + law%point_history == 0) cycle
         call family%bonds_of(k, bonds)
-        call look(model, workspace, u, k, seen)
+        call look(model, options_of(model), workspace, u, k, seen)
         call law%commit(seen, density(k))
         if (size(seen%history, 1) > 0) workspace%history(:, first:last) = seen%history(:, :seen%n)
         workspace%of_point(:, k) = seen%of_point
@@ -639,7 +650,24 @@ contains
     end do
     !$omp end parallel
     dissipated = inner(body%order, density, body%volume)
+    if (.not. has_plasticity(model)) return
+    do k = 1, family%n_slots
+      if (.not. model%laws(model%material(k))%law%plastic) density(k) = 0.0_wp
+    end do
+    plastic = inner(body%order, density, body%volume)
   end subroutine commit_laws
+
+  !> Whether some law dissipates plastic energy.
+  pure logical function has_plasticity(model)
+    type(model_type), intent(in) :: model  !! the model
+    integer :: i
+
+    has_plasticity = .false.
+    if (.not. allocated(model%laws)) return
+    do i = 1, size(model%laws)
+      has_plasticity = has_plasticity .or. model%laws(i)%law%plastic
+    end do
+  end function has_plasticity
 
   !> Keep the history, or put it back. The bonds of the family were kept before.
   subroutine keep_laws(archive, family, workspace)

@@ -33,7 +33,7 @@ contains
     call archive%keep('broken bonds', system%broken)
     call archive%keep('dissipated energy', system%dissipated)
     call keep_laws(archive, system%family, system%workspace%generic)
-    call archive%keep('dissipation of laws', system%law_dissipation)
+    call archive%keep('plastic energy', system%plastic_energy)
     call archive%keep('external work', system%external_work)
     call archive%keep('dissipation due', system%dissipation_due)
     call archive%keep('work due', system%work_due)

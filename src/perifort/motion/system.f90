@@ -46,7 +46,7 @@ module pd_motion_system
     integer(i1), allocatable :: strained(:)     !! marks of the last pass
     integer(i8) :: broken = 0_i8                !! bonds broken during the run
     real(wp) :: dissipated = 0.0_wp             !! energy lost by breaking, laws and terms [J]
-    real(wp) :: law_dissipation = 0.0_wp        !! the part of it by laws with a history [J]
+    real(wp) :: plastic_energy = 0.0_wp         !! the part of it by plastic bond laws [J]
     real(wp) :: external_work = 0.0_wp          !! of loads and imposed motion [J]
     real(wp) :: dissipation_due = 0.0_wp        !! parts of both that fall into the step to come,
     real(wp) :: work_due = 0.0_wp               !! of bonds that broke after the last forces [J]
@@ -506,11 +506,11 @@ contains
   !> Commit the histories of the bond laws.
   subroutine commit(system)
     type(system_type), intent(inout) :: system
-    real(wp) :: dissipated
+    real(wp) :: dissipated, plastic
 
     call commit_laws(system%body, system%family, system%model, system%workspace%generic, &
-      & system%state%u, system%state%damage, dissipated)
-    system%law_dissipation = system%law_dissipation + dissipated
+      & system%state%u, system%state%damage, dissipated, plastic)
+    system%plastic_energy = system%plastic_energy + plastic
     system%dissipated = system%dissipated + dissipated
   end subroutine commit
 

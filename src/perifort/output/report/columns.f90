@@ -3,6 +3,8 @@
 module pd_output_report_columns
   use pd_base_kinds, only: wp
   use pd_base_reduce, only: largest_over
+  use pd_force_generic, only: has_plasticity
+  use pd_law_laws, only: all_laws, law_table_type
   use pd_motion_observer, only: instant_type
   use pd_motion_system, only: energies_type, system_type
   use pd_output_fields_field, only: moment_type
@@ -47,8 +49,9 @@ module pd_output_report_columns
 contains
 
   !> The table of columns. A column joins with a line here, and a function that gives its value.
-  type(history_table_type) function history_table(relaxation) result(table)
+  type(history_table_type) function history_table(relaxation, plastic) result(table)
     logical, intent(in) :: relaxation
+    logical, intent(in) :: plastic      !! some bond law is plastic
 
     allocate (table%entries(0))
     call put(table, 'step', '1', step)
@@ -56,6 +59,7 @@ contains
     call put(table, 'kinetic_energy', 'J', kinetic_energy)
     call put(table, 'strain_energy', 'J', strain_energy)
     call put(table, 'dissipated_energy', 'J', dissipated_energy)
+    if (plastic) call put(table, 'plastic_energy', 'J', plastic_energy)
     call put(table, 'external_work', 'J', external_work)
     call put(table, 'broken_bonds', '1', broken_bonds)
     call put(table, 'maximum_damage', '1', maximum_damage)
@@ -86,7 +90,7 @@ contains
     type(history_table_type) :: table
     integer :: i
 
-    table = history_table(relaxation)
+    table = history_table(relaxation, has_plasticity(system%model))
     columns = table%entries%column
     do i = 1, size(system%motions)
       columns = [columns, reactions_of(system%motions(i)%name, system%body%dim)]
@@ -103,12 +107,27 @@ contains
     type(history_table_type) :: table
     integer :: i
 
-    table = history_table(scene%time%method == 'relaxation')
+    table = history_table(scene%time%method == 'relaxation', names_plasticity(scene))
     columns = table%entries%column
     do i = 1, size(scene%boundaries)
       columns = [columns, reactions_of(trim(scene%boundaries(i)%name), scene%header%dimension)]
     end do
   end function columns_of_scene
+
+  !> Whether a scene names a plastic bond law.
+  logical function names_plasticity(scene)
+    type(scene_type), intent(in) :: scene
+    type(law_table_type) :: laws
+    integer :: i, n
+
+    laws = all_laws()
+    if (allocated(scene%laws%items)) laws = scene%laws
+    names_plasticity = .false.
+    do i = 1, size(scene%materials)
+      n = laws%number_of(scene%materials(i)%model)
+      if (n > 0) names_plasticity = names_plasticity .or. laws%items(n)%law%plastic
+    end do
+  end function names_plasticity
 
   !> Columns of the reaction force of a boundary, none without a name.
   pure function reactions_of(name, dim) result(columns)
@@ -166,6 +185,11 @@ contains
     type(row_source_type), intent(in) :: now
     dissipated_energy = now%system%dissipated
   end function dissipated_energy
+
+  pure real(wp) function plastic_energy(now)
+    type(row_source_type), intent(in) :: now
+    plastic_energy = now%system%plastic_energy
+  end function plastic_energy
 
   pure real(wp) function external_work(now)
     type(row_source_type), intent(in) :: now

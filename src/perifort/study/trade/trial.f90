@@ -7,6 +7,7 @@ module pd_study_trade_trial
   use pd_base_numbers, only: median
   use pd_base_text, only: to_text
   use pd_set_up_prepare, only: prepare, set_up_type
+  use pd_force_generic, only: has_plasticity
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_set_up_conditions, only: region_mask
   use pd_output_fields_check, only: check_available
@@ -151,7 +152,8 @@ contains
     watcher%measure = measure
     watcher%quick = around < 0.0_wp
     watcher%relaxation = set_up%plan%relaxes
-    watcher%columns = history_table(watcher%relaxation)
+    watcher%columns = history_table(watcher%relaxation, &
+      & has_plasticity(set_up%system%model))
     watcher%every = history_interval(scene, set_up%plan, set_up%system%family%n_bonds)
     call find_probes(scene, table, set_up%system%body, watcher%probes, error)
     if (allocated(error) .or. watcher%quick) return
