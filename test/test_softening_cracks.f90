@@ -385,7 +385,7 @@ contains
       & 'must be above peak_stretch')
     call expect_refused(error, peak//energy//'break_in_compression = .true.'//nl, '', &
       & 'soften in tension alone')
-    call expect_refused(error, peak//energy//'scatter = 10.0'//nl, '', 'does not scatter')
+    call expect_refused(error, peak//energy//'scatter = 10.0'//nl, '', "has no 'scatter'")
     call expect_refused(error, peak//energy, '&no_fail'//nl//"shape = 'box'"//nl// &
       & 'lower(1) = 0.04'//nl//'/'//nl, 'they soften before they break')
   end subroutine test_refused

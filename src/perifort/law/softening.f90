@@ -169,8 +169,8 @@ contains
     s_u = self%weighted_law_type%critical_stretch(Gc)**2/self%parameter('peak_stretch')
   end function critical_stretch
 
-  !> Why the law cannot be had: no stretch s_u, one that is not above s_0, bonds that break in
-  !> compression, or a scatter, which would change where bonds break and not how they soften.
+  !> Why the law cannot be had: no stretch s_u, one that is not above s_0, or bonds that break in
+  !> compression.
   pure function refusal(self) result(reason)
     class(softening_law_type), intent(in) :: self  !! after `set_up`, with the critical stretch
     character(:), allocatable :: reason
@@ -189,8 +189,6 @@ contains
         & 'with the same energy'
     else if (self%material%break_in_compression) then
       reason = 'bonds soften in tension alone: take break_in_compression = .false.'
-    else if (self%material%scatter > 0.0_wp) then
-      reason = 'the strength of bonds that soften does not scatter: their peak is one for all'
     end if
   end function refusal
 
