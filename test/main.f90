@@ -21,6 +21,7 @@ program main
   use test_body_layers, only: collect_body_layers
   use test_law_contract, only: collect_law_contract
   use test_law_material, only: collect_law_material
+  use test_law_softening, only: collect_law_softening
   use test_law_strength, only: collect_law_strength
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
@@ -84,6 +85,7 @@ program main
   use test_scene_content_template, only: collect_scene_content_template
   use test_scene_format_values, only: collect_scene_format_values
   use test_scene_content_write, only: collect_scene_content_write
+  use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_study_limits_limits, only: collect_study_limits_limits
   use test_study_trade_closed_form, only: collect_study_trade_closed_form
@@ -111,6 +113,7 @@ program main
   call register('body_layers', collect_body_layers)
   call register('law_contract', collect_law_contract)
   call register('law_material', collect_law_material)
+  call register('law_softening', collect_law_softening)
   call register('law_strength', collect_law_strength)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
@@ -174,6 +177,7 @@ program main
   call register('scene_content_template', collect_scene_content_template)
   call register('scene_format_values', collect_scene_format_values)
   call register('scene_content_write', collect_scene_content_write)
+  call register('softening_cracks', collect_softening_cracks)
   call register('study_bench_bench', collect_study_bench_bench)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)

@@ -156,6 +156,7 @@ contains
     type(system_type), intent(in) :: system  !! with its model
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: why
+    integer :: i
 
     if (.not. (system%model%generic .or. system%model%weighted)) return
     if (scene%time%method == 'relaxation' .and. &
@@ -175,6 +176,14 @@ contains
         & "the scene cannot have limit = 'spectral'", 'its bond laws may change their '// &
         & "stiffness: use limit = 'equation'")
     end if
+    if (allocated(error) .or. size(scene%no_fail) == 0) return
+    do i = 1, size(system%model%laws)
+      if (.not. system%model%laws(i)%law%softens) cycle
+      call scene_fault(error, scene, 'no_fail', 1, '', "bonds with model = '"// &
+        & trim(scene%materials(i)%model)//"' cannot have zones in which they do not fail", &
+        & 'they soften before they break: give what must hold a material with another law')
+      return
+    end do
   end subroutine check_laws
 
 end module pd_set_up_prepare
