@@ -23,6 +23,7 @@ program main
   use test_law_material, only: collect_law_material
   use test_law_softening, only: collect_law_softening
   use test_law_strength, only: collect_law_strength
+  use test_law_plastic, only: collect_law_plastic
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
@@ -52,6 +53,7 @@ program main
   use test_motion_equilibrium, only: collect_motion_equilibrium
   use test_motion_heating, only: collect_motion_heating
   use test_motion_newton, only: collect_motion_newton
+  use test_motion_plastic, only: collect_motion_plastic
   use test_motion_static_relaxation, only: collect_motion_static_relaxation
   use test_motion_explicit_spectrum, only: collect_motion_explicit_spectrum
   use test_motion_system, only: collect_motion_system
@@ -115,6 +117,7 @@ program main
   call register('law_material', collect_law_material)
   call register('law_softening', collect_law_softening)
   call register('law_strength', collect_law_strength)
+  call register('law_plastic', collect_law_plastic)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)
@@ -144,6 +147,7 @@ program main
   call register('motion_equilibrium', collect_motion_equilibrium)
   call register('motion_heating', collect_motion_heating)
   call register('motion_newton', collect_motion_newton)
+  call register('motion_plastic', collect_motion_plastic)
   call register('motion_static_relaxation', collect_motion_static_relaxation)
   call register('motion_explicit_spectrum', collect_motion_explicit_spectrum)
   call register('motion_system', collect_motion_system)

@@ -32,6 +32,7 @@ contains
       & new_unittest('every integrator, cut after every step', test_integrators), &
       & new_unittest('on two threads', test_two_threads), &
       & new_unittest('a block in 3D', test_block), &
+      & new_unittest('a law with a history', test_plastic), &
       & new_unittest('a list, bonds that break late', test_list), &
       & new_unittest('temperatures that vary in time', test_heated), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
@@ -355,6 +356,43 @@ contains
     call run_in_pieces(block, 'pieces', 1, pieces, error)
     call expect_same_results(error, 'whole', 'pieces', 3)
   end subroutine test_block
+
+  !> An elastic-plastic block whose bonds break after they have flowed, explicit and in load steps.
+  subroutine test_plastic(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: block
+    type(fault_type), allocatable :: fault
+    integer :: pieces, way
+
+    do way = 1, 2
+      if (allocated(error)) return
+      if (way == 1) call plate(block)
+      if (way == 2) call slow_plate(block)
+      block%header%dimension = 3
+      block%bodies(1)%lower = 0.0_wp
+      block%bodies(1)%upper = [6.0_wp, 7.0_wp, 4.0_wp]*spacing
+      block%bodies(1)%points = [6, 7, 4]
+      deallocate (block%cracks)
+      allocate (block%cracks(0))
+      block%probes(1)%point = 0.0_wp
+      associate (material => block%materials(1))
+        material%model = 'lps_plastic'
+        material%influence = 'linear'
+        allocate (material%parameters(2))
+        material%parameters%name = ['yield_stress', 'hardening   ']
+        material%parameters%value = [1.0e-4_wp, 1.0e-2_wp]*youngs_modulus
+        material%critical_stretch = 0.002_wp
+      end associate
+      block%time%steps = 9
+      block%relaxation%load_steps = 2
+      call run(block, 'whole', fault, threads=2)
+      call accept(error, fault)
+      call expect_broken(error, 'whole')
+      if (allocated(error)) return
+      call run_in_pieces(block, 'pieces', 1, pieces, error)
+      call expect_same_results(error, 'whole', 'pieces', merge(3, 3, way == 1))
+    end do
+  end subroutine test_plastic
 
   subroutine test_list(error)
     type(error_type), allocatable, intent(out) :: error
