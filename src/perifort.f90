@@ -24,6 +24,9 @@ module perifort
     & number_of_points, point_near, positions_of, velocities_of, volumes_of
   use pd_force_term, only: force_term_type, term_list_type, term_view_type, has_tangent, &
     & no_stiffness, no_tangent
+  use pd_law_law, only: bond_law_type, law_bonds_type, parameter_type
+  use pd_law_laws, only: all_laws, law_table_type
+  use pd_law_weighted, only: weighted_law_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_report_begin, only: run_options_type
@@ -62,6 +65,9 @@ module perifort
     & velocities_of, force_densities_of, damage_of, find_energies
   ! own fields of the output
   public :: field_table_type, all_fields, output_field_type, moment_type
+  ! own bond laws
+  public :: bond_law_type, law_bonds_type, law_table_type, parameter_type, all_laws, &
+    & weighted_law_type
   ! own terms of the force
   public :: force_term_type, term_list_type, term_view_type, has_tangent, no_stiffness, no_tangent
 

@@ -221,6 +221,11 @@ contains
       allocate (laws(i)%law, source=table%items(n)%law)
       associate (law => laws(i)%law)
         law%influence = subject%influence
+        ! values with which laws yield or soften at strains of 1e-3
+        if (allocated(law%parameters)) law%parameters%value = &
+          & merge(1.0e-3_wp*youngs_modulus, 1.0e-3_wp, law%parameters%unit == 'Pa')
+        if (law%softens) materials(i)%critical_stretch = min(4.0e-3_wp, &
+          & materials(i)%critical_stretch)
         call law%set_up(materials(i), subject%dim, subject%plane_strain, delta, depth(subject%dim))
         materials(i) = law%material
       end associate

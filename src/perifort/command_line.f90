@@ -19,7 +19,8 @@ module pd_command_line
   integer, parameter :: restart_option = 4  !! its place in `option_names`
   character(word_length), parameter :: option_names(20) = [character(word_length) :: &
     & '--output', '--threads', '--overwrite', '--restart', '--max-minutes', '--quiet', '--points', &
-    & '--dimension', '--model', '--family', '--breaking', '--precision', '--surface', '--generic', '--seconds', &
+    & '--dimension', '--model', '--family', '--breaking', '--precision', '--surface', '--generic', &
+    & '--seconds', &
     & '--csv', '--error', '--time', '--set', '--help']
 
   !> A command line, understood and checked.

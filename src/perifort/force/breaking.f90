@@ -8,6 +8,7 @@ module pd_force_breaking
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_law_material, only: never
   use pd_force_generic, only: generic_energy_product, generic_point_damage, generic_point_energy, &
     & refresh_slot
   use pd_force_model, only: model_type, bond_limit
@@ -16,7 +17,7 @@ module pd_force_breaking
   use pd_force_workspace, only: generic_workspace_type
   implicit none (type, external)
   private
-  public :: strained_slots, break_bonds, damage_of
+  public :: strained_slots, break_bonds, damage_of, find_weakest
 
 contains
 
@@ -57,9 +58,9 @@ contains
     real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
     integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
     real(wp), intent(out) :: dissipated   !! energy lost at fixed u [J]
-    real(wp), intent(in), contiguous, optional :: others(:, :, :)  !! other displacements, read at `slots` and
-                                                       !! at the ends of their bonds alone
-                                                       !! (n_slots, dim, sets) [m]
+    real(wp), intent(in), contiguous, optional :: others(:, :, :)
+      !! (n_slots, dim, sets) other displacements, read at `slots` and at the ends of their bonds
+      !! alone [m]
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
     type(generic_workspace_type), intent(inout), optional :: laws
       !! of the generic pass, where the model is generic; knows the broken bonds on return
@@ -165,6 +166,31 @@ contains
     first(n + 1) = size(slots) + 1
     first = first(:n + 1)
   end subroutine group_slots
+
+  !> Where the strength of bonds scatters: the smallest critical stretch of each slot's bonds, and of
+  !> all, which tell the loops where to look.
+  subroutine find_weakest(family, model)
+    class(family_type), intent(in) :: family   !! whole
+    type(model_type), intent(inout) :: model   !! gets `weakest` and a new `least_critical`
+    type(bonds_type) :: bonds
+    real(wp) :: lower, upper
+    integer :: k, i
+
+    if (.not. allocated(model%number)) return
+    allocate (model%weakest(family%n_slots), source=never)
+    !$omp parallel default(none) shared(family, model) private(bonds, lower, upper, k, i)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 64)
+    do k = 1, family%n_slots
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        call bond_limit(model, k, int(bonds%j(i)), lower, upper)
+        model%weakest(k) = min(model%weakest(k), upper)
+      end do
+    end do
+    !$omp end parallel
+    model%least_critical = minval(model%weakest)
+  end subroutine find_weakest
 
   !> Whether the `i`-th bond of slot `k` breaks now.
   pure subroutine decide(model, u, k, bonds, i, breaks)

@@ -186,6 +186,9 @@ contains
       !! (n_slots) 1 for slot `k` on return, unless it is in a no-fail zone or does not break so
 
     if (model%critical(k) < 0.0_wp) return
+    if (allocated(model%weakest)) then
+      if (abs(s) <= model%weakest(k)*early) return
+    end if
     if (s < 0.0_wp) then
       if (.not. model%compression) return
       if (model%compressed(k) == 0_i1) return

@@ -2,10 +2,11 @@
 !> scene has. Chosen once before the loop, so that a step costs only what the scene uses.
 module pd_force_model
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i1, i2
+  use pd_base_kinds, only: wp, i1, i2, i8
   use pd_body_body, only: body_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never
+  use pd_law_strength, only: strength_factor
   use pd_law_weighted, only: weighted_law_type
   implicit none (type, external)
   private
@@ -51,6 +52,8 @@ module pd_force_model
     real(wp), allocatable :: critical(:)     !! s_c of each slot, `never` or `no_fail`
     real(wp) :: least_critical = never       !! smallest s_c of all
     integer(i1), allocatable :: compressed(:) !! 1 where bonds break in compression too
+    integer(i8), allocatable :: number(:)    !! of each slot's point among all, if strength scatters
+    real(wp), allocatable :: weakest(:)      !! smallest s_c of the bonds of each slot, then
   end type model_type
 
 contains
@@ -91,6 +94,7 @@ contains
     model%critical = materials(body%material)%critical_stretch
     model%least_critical = minval(model%critical, mask=body%point > 0)
     where (zone) model%critical = no_fail
+    if (any(used .and. materials%scatter > 0.0_wp)) model%number = body%point + body%order%before
     model%compression = any(used .and. materials%break_in_compression)
     if (model%compression) then
       allocate (model%compressed(body%n_slots))
@@ -126,8 +130,8 @@ contains
     model%dilatation = .false.  ! the laws have it
   end subroutine choose_pass
 
-  !> Factors of the stretch and of the dilatation of a bond of slot `k`, by its length (doc/theory.md,
-  !> 10).
+  !> Factors of the stretch and of the dilatation of a bond of slot `k`, by its length
+  !> (doc/theory.md, 10).
   pure subroutine bond_factors_of(model, k, length, gb, gd)
     type(model_type), intent(in) :: model  !! with weighted laws
     integer, intent(in) :: k               !! slot
@@ -210,10 +214,29 @@ contains
 
     upper = min(model%critical(k), model%critical(j))
     if (upper < 0.0_wp) upper = never
+    if (allocated(model%number) .and. upper < never) upper = upper*scatter_of(model, k, j)
     lower = -never
     if (model%compression) then
       if (model%compressed(k) == 1_i1 .and. model%compressed(j) == 1_i1) lower = -upper
     end if
   end subroutine bond_limit
+
+  !> The factor of the critical stretch of the bond k-j, by the material whose critical stretch it
+  !> has; of two alike the first one.
+  pure real(wp) function scatter_of(model, k, j) result(factor)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, j
+    integer :: m
+
+    m = model%material(k)
+    if (model%critical(j) < model%critical(k)) then
+      m = model%material(j)
+    else if (.not. model%critical(k) < model%critical(j)) then
+      m = min(m, int(model%material(j)))
+    end if
+    factor = 1.0_wp
+    if (model%materials(m)%scatter > 0.0_wp) factor = strength_factor(model%materials(m)%scatter, &
+      & model%materials(m)%seed, model%number(k), model%number(j))
+  end function scatter_of
 
 end module pd_force_model

@@ -38,8 +38,8 @@ contains
       & call use_double(family)
     call prepare_blocks(family, model, workspace)
     ! without surface factors, members farther away than a block's own do not count
-    if (.not. (model%surface .or. allocated(model%scale))) family%class_of = merge(int(model%material, i4), 0_i4, &
-      & family%alive == 1_i1)
+    if (.not. (model%surface .or. allocated(model%scale))) family%class_of = &
+      & merge(int(model%material, i4), 0_i4, family%alive == 1_i1)
     call find_kinds(family, workspace, first, uses)
     order = most_used_first(uses)
     allocate (table(size(uses)), first_of_table(size(uses)), table_of(0:size(uses)))

@@ -135,8 +135,8 @@ contains
     bytes = 0_i8
     if (.not. allocated(workspace%start)) return
     bytes = 28*size(workspace%pull, kind=i8) + 8*(size(workspace%start, kind=i8) &
-      & + size(workspace%x, kind=i8) + size(workspace%history, kind=i8) + size(workspace%of_point, kind=i8) &
-      & + size(workspace%constants, kind=i8))
+      & + size(workspace%x, kind=i8) + size(workspace%history, kind=i8) &
+      & + size(workspace%of_point, kind=i8) + size(workspace%constants, kind=i8))
   end function bytes_of_generic
 
   !> How many tables there are, to follow the family's own description; empty where nobody counts

@@ -1,9 +1,9 @@
-!> What a bond does. A law says how a bond's stretch becomes a force, how much energy that stores and
-!> what is left of it for good. It knows nothing of points, families and loops: it is given the bonds
-!> of one point at a time, as arrays.
+!> What a bond does. A law says how a bond's stretch becomes a force, how much energy that stores,
+!> and what is left of it for good. It knows nothing of points, families and loops: it is given the
+!> bonds of one point at a time, as arrays.
 !>
-!> A law extends `bond_law_type` in a file of its own and is a line of the table in `pd_law_laws`, or
-!> is added to that table by a program. It is weighted or general:
+!> A law extends `bond_law_type` in a file of its own and is a line of the table in `pd_law_laws`,
+!> or is added to that table by a program. It is weighted or general:
 !>
 !> - The force of a **weighted** law is that of the chapter with other weights (doc/theory.md, 2 and
 !>   10): every bond has a factor of its length, every point a scale. It runs on the fast loops. It
@@ -55,7 +55,7 @@ module pd_law_law
     type(parameter_type), allocatable :: parameters(:)   !! keys of its own
     logical :: weighted = .false.                !! it runs on the fast loops
     logical :: bond_based = .false.              !! it holds for one Poisson's ratio
-    logical :: corrected = .true.                !! it takes surface factors, where the scene has them
+    logical :: corrected = .true.                !! it takes surface factors, if there are any
     logical :: plastic = .false.                 !! what it dissipates is plastic energy
     logical :: softens = .false.                 !! `bond_damage` is not 0 for some intact bonds
     integer :: bond_history = 0                  !! reals of history of a bond
@@ -68,10 +68,10 @@ module pd_law_law
     real(wp) :: depth = 1.0_wp                   !! thickness in 2D [m], area in 1D [m2]
   contains
     procedure, non_overridable :: set_up
-    procedure(find_constants_interface), deferred :: find_constants
     procedure(forces_interface), deferred :: forces
     procedure(energy_interface), deferred :: energy
     procedure(stiffness_interface), deferred :: stiffness
+    procedure :: find_constants => no_constants
     procedure :: omega
     procedure :: begin => begin_nothing
     procedure :: commit => commit_nothing
@@ -84,13 +84,6 @@ module pd_law_law
   end type bond_law_type
 
   abstract interface
-    !> Set what follows from moduli, dimension and horizon, in `material` and in the law.
-    subroutine find_constants_interface(self)
-      import :: bond_law_type
-      implicit none (type, external)
-      class(bond_law_type), intent(inout) :: self  !! with its moduli, dimension and horizon
-    end subroutine find_constants_interface
-
     !> The point's own part of each bond's pair force density; the other end gives the rest.
     !> Positive values pull. It must depend on what it is given alone, and leave broken bonds at 0.
     pure subroutine forces_interface(self, bonds, pull)
@@ -109,10 +102,9 @@ module pd_law_law
       type(law_bonds_type), intent(in) :: bonds  !! of the point, with its history
     end function energy_interface
 
-    !> A bound of the stiffness of the point's own part of each bond, in any state: the sum, over all
-    !> bonds of the point, of |d pull/d(|y|)| times their volumes, over the bond's own volume where it
-    !> depends on others. With c the stiffness of a bond by itself, and a theta its part of a
-    !> dilatation theta = sum_l w_l e_l V_l, that is c + a sum_l w_l V_l [N/m7].
+    !> A bound of the stiffness of the point's own part of each bond, in any state: with c the
+    !> largest |d pull/d|y|| by the bond's own length, and a theta its part of a dilatation
+    !> theta = sum_l w_l e_l vc V_l of extensions e, that is c + |a| sum_l |w_l| vc V_l.
     pure subroutine stiffness_interface(self, bonds, bound)
       import :: bond_law_type, law_bonds_type, wp
       implicit none (type, external)
@@ -140,6 +132,14 @@ contains
     self%depth = depth
     call self%find_constants()
   end subroutine set_up
+
+  !> Set what follows from moduli, dimension and horizon, in `material` and in the law. By default
+  !> nothing does: `material` has the moduli and the constants of the chapter's laws.
+  subroutine no_constants(self)
+    class(bond_law_type), intent(inout) :: self  !! with its moduli, dimension and horizon
+    associate (unused => self)
+    end associate
+  end subroutine no_constants
 
   !> The influence function omega of a bond. A law with a function of its own overrides it.
   pure real(wp) function omega(self, ratio)

@@ -1,10 +1,12 @@
-!> The linear peridynamic solid, `model = 'lps'`: the ordinary state-based law in the form in which
-!> most programs have it (doc/theory.md, 10). With m_k = sum omega |xi|^2 vc V_j over the whole family
+!> The linear peridynamic solid, `model = 'lps'`: the ordinary state-based law in the form that most
+!> programs have (doc/theory.md, 10). With m_k = sum omega |xi|^2 vc V_j over the whole family and
+!> e = |y| - |xi|, in 3D
 !>
-!>     theta_k = (3/m_k) sum omega |xi| e vc V_j,   pull = (3 kappa - 5 mu) omega |xi| theta_k/m_k + 15 mu omega e/m_k
+!>     theta_k = (3/m_k) sum omega |xi| e vc V_j
+!>     pull    = (3 kappa - 5 mu) omega |xi| theta_k/m_k + 15 mu omega e/m_k
 !>
-!> in 3D, e = |y| - |xi|; in 2D 2/m_k, 2 kappa - 4 mu and 8 mu. It is a weighted law whose points are
-!> scaled by what m of a full family is over m_k, so that it needs no surface factors.
+!> and in 2D with 2/m_k, 2 kappa - 4 mu and 8 mu. It is a weighted law whose points are scaled by m
+!> of a full family over m_k, so that it needs no surface factors.
 module pd_law_lps
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi

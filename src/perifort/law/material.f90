@@ -26,6 +26,8 @@ module pd_law_material
     real(wp) :: uniaxial_energy = 0.0_wp     !! W/zeta^2 at uniaxial strain zeta (theory.md, 4) [Pa]
     real(wp) :: critical_stretch = never     !! s_c [-]
     logical :: break_in_compression = .false.
+    real(wp) :: scatter = 0.0_wp             !! Weibull modulus of the bonds' s_c, 0: none [-]
+    integer :: seed = 1                      !! of the random numbers of that
     real(wp) :: expansion = 0.0_wp           !! alpha, (1+nu) alpha in plane strain [1/K]
   end type material_type
 

@@ -1,7 +1,8 @@
 !> The chapter's laws, `state_based` and `bond_based`, with any influence function, and what other
 !> weighted laws extend (doc/theory.md, 2 and 10):
 !>
-!>     theta_k = t_k sum gd Gd s Lambda vc V_j,      pull = q_k gb Gb s + 2 a t_k theta_k gd Gd Lambda/|xi|
+!>     theta_k = t_k sum gd Gd s Lambda vc V_j
+!>     pull    = q_k gb Gb s + 2 a t_k theta_k gd Gd Lambda/|xi|
 !>
 !> with gb and gd of the bond's length, and q_k and t_k those of the material times the scale of the
 !> point.
@@ -214,8 +215,8 @@ contains
     theta = t*theta
   end function dilatation
 
-  !> The chapter's formula for its own influence function; with another one, the stretch at which the
-  !> bonds through a plane, stretched alike and no others, hold Gc (doc/theory.md, 8 and 10).
+  !> The chapter's formula for its own influence function; with another one, the stretch at which
+  !> the bonds through a plane, stretched alike and no others, hold Gc (doc/theory.md, 8 and 10).
   pure real(wp) function critical_stretch(self, Gc) result(s_c)
     class(weighted_law_type), intent(in) :: self  !! after `set_up`
     real(wp), intent(in) :: Gc                    !! critical energy release rate [J/m2]

@@ -59,13 +59,15 @@ contains
             return
           end if
           m%break_in_compression = group%break_in_compression
+          if (is_set(group%scatter)) m%scatter = group%scatter
+          m%seed = group%seed
           m%expansion = group%thermal_expansion
           if (plane_strain) m%expansion = (1 + m%poissons_ratio)*m%expansion
         end associate
         reason = law%refusal()
         if (len(reason) > 0) then
-          call scene_fault(error, scene, 'material', i, 'model', "the scene cannot have model = '"// &
-            & trim(group%model)//"'", reason)
+          call scene_fault(error, scene, 'material', i, 'model', &
+            & "the scene cannot have model = '"//trim(group%model)//"'", reason)
           return
         end if
         materials(i) = law%material

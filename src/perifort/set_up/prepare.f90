@@ -15,7 +15,7 @@ module pd_set_up_prepare
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_rule_number
-  use pd_force_breaking, only: damage_of
+  use pd_force_breaking, only: damage_of, find_weakest
   use pd_force_generic, only: begin_laws, refresh_bonds
   use pd_force_model, only: new_model
   use pd_force_term, only: term_list_type
@@ -120,6 +120,7 @@ contains
       system%model%surface = scene%horizon%surface_correction == 'energy'
       if (system%model%surface) call surface_factors(system%body, system%family, materials, &
         & system%model%D, system%model%S, laws)
+      call find_weakest(system%family, system%model)
       call begin_laws(system%body, system%family, system%model, system%workspace%generic)
       call finish_family(system)
       call timer%stop('surface correction')
@@ -155,13 +156,14 @@ contains
     type(system_type), intent(in) :: system  !! with its model
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: why
+    integer :: i
 
     if (.not. (system%model%generic .or. system%model%weighted)) return
     if (scene%time%method == 'relaxation' .and. &
       & scene%relaxation%density_matrix /= 'frame_invariant') then
       call scene_fault(error, scene, 'relaxation', 1, 'density_matrix', "density_matrix = '"// &
-        & trim(scene%relaxation%density_matrix)//"' holds for the chapter's laws with influence "// &
-        & "= 'inverse'", "this scene has another law: use 'frame_invariant'")
+        & trim(scene%relaxation%density_matrix)//"' holds for the chapter's laws with "// &
+        & "influence = 'inverse'", "this scene has another law: use 'frame_invariant'")
       return
     end if
     if (.not. system%model%generic) return
@@ -171,9 +173,17 @@ contains
         & "the scene cannot have precision = 'mixed'", why)
     else if (scene%time%method == 'explicit' .and. scene%time%limit == 'spectral') then
       call scene_fault(error, scene, 'time', 1, 'limit', &
-        & "the scene cannot have limit = 'spectral'", 'its bond laws may change their stiffness: '// &
-        & "use limit = 'equation'")
+        & "the scene cannot have limit = 'spectral'", 'its bond laws may change their '// &
+        & "stiffness: use limit = 'equation'")
     end if
+    if (allocated(error) .or. size(scene%no_fail) == 0) return
+    do i = 1, size(system%model%laws)
+      if (.not. system%model%laws(i)%law%softens) cycle
+      call scene_fault(error, scene, 'no_fail', 1, '', "bonds with model = '"// &
+        & trim(scene%materials(i)%model)//"' cannot have zones in which they do not fail", &
+        & 'they soften before they break: give what must hold a material with another law')
+      return
+    end do
   end subroutine check_laws
 
 end module pd_set_up_prepare

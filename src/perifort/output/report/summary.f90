@@ -132,9 +132,11 @@ contains
       text = text//laws_of(model)
       if (model%generic) then
         text = text//line('forces', 'generic pass: each law gets all bonds of a point at a time')
-        text = text//line('', with_unit(8.0_wp*size(system%workspace%generic%history, kind=i8), &
-          & 'B', 3)//' of history of bonds, '//to_text(size(system%workspace%generic%history, 1))// &
-          & ' reals for each direction of a bond')
+        associate (history => system%workspace%generic%history)
+          text = text//line('', with_unit(8.0_wp*size(history, kind=i8), 'B', 3)// &
+            & ' of history of bonds, '//counted(size(history, 1), 'real')// &
+            & ' for each direction of a bond')
+        end associate
       else if (model%dilatation) then
         text = text//line('forces', 'state-based: two passes over the bonds, for the '// &
           & 'dilatations and for the forces')

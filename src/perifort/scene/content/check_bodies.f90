@@ -256,6 +256,15 @@ contains
         call rule_fault(error, 'material', number, 'critical_energy_release_rate', &
           & "'critical_stretch' and 'critical_energy_release_rate' are both given", &
           & 'give one of them; each follows from the other', source)
+      else if (is_set(material%scatter) .and. .not. (is_set(material%critical_stretch) .or. &
+        & is_set(material%critical_energy_release_rate))) then
+        call rule_fault(error, 'material', number, 'scatter', &
+          & "'scatter' without a strength that could scatter", &
+          & "give 'critical_stretch' or 'critical_energy_release_rate', too", source)
+      else if (is_set(material%scatter) .and. item%law%softens) then
+        call rule_fault(error, 'material', number, 'scatter', "model = '"// &
+          & trim(material%model)//"' has no 'scatter'", &
+          & 'its bonds lose their strength little by little', source)
       else if (.not. is_set(material%density) .and. scene%time%method == 'explicit') then
         call rule_fault(error, 'material', number, '', &
           & "group &material lacks the key 'density'", &

@@ -23,6 +23,8 @@ module pd_scene_groups_material
     real(wp) :: density = unset                            !! rho [kg/m3]
     real(wp) :: critical_stretch = unset                   !! s_c [-]
     real(wp) :: critical_energy_release_rate = unset       !! Gc [J/m2]
+    real(wp) :: scatter = unset                            !! Weibull modulus [-]
+    integer :: seed = 1                                    !! of the scatter
     logical :: break_in_compression = .false.
     real(wp) :: thermal_expansion = 0.0_wp                 !! alpha [1/K]
     type(parameter_type), allocatable :: parameters(:)     !! keys of single laws
@@ -44,8 +46,8 @@ contains
     call keys%key('name', group%name, 'name of the material', word=.true.)
     call keys%key('model', group%model, 'law of the bonds: '//join(laws%names(), ', ')// &
       & "; bond_based and softening hold for one Poisson's ratio only", word=.true.)
-    call keys%key('influence', group%influence, 'influence function omega(|xi|): delta/|xi|, 1, '// &
-      & '1 - |xi|/delta or exp(-(|xi|/delta)^2)', allowed=influence_names, &
+    call keys%key('influence', group%influence, 'influence function omega(|xi|): delta/|xi|, '// &
+      & '1, 1 - |xi|/delta or exp(-(|xi|/delta)^2)', allowed=influence_names, &
       & default="lps, lps_plastic: 'constant'; else 'inverse'")
     call keys%key('youngs_modulus', group%youngs_modulus, 'Pa', "Young's modulus E", &
       & required=.true., above=0.0_wp)
@@ -60,6 +62,9 @@ contains
       & 'breaks', above=0.0_wp, default='none: bonds never break')
     call keys%key('critical_energy_release_rate', group%critical_energy_release_rate, 'J/m2', &
       & 'energy release rate Gc, instead of critical_stretch', above=0.0_wp)
+    call keys%key('scatter', group%scatter, '-', 'Weibull modulus of the critical stretches '// &
+      & 'of bonds, whose mean is the given one', above=0.0_wp, default='none: all are equal')
+    call keys%key('seed', group%seed, '', 'of the random numbers of scatter', at_least=0)
     call keys%key('break_in_compression', group%break_in_compression, 'bonds break at the '// &
       & 'critical stretch in compression too')
     call keys%key('thermal_expansion', group%thermal_expansion, '1/K', &
