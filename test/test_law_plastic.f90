@@ -304,8 +304,8 @@ contains
   end subroutine test_yield
 
   !> A random path with and without hardening. After every step the equivalent stress, from the
-  !> forces, is at most yield stress + slope times the plastic strain: exactly that where the plastic
-  !> strain has grown; where it hasn't, the forces have changed by those of the elastic law.
+  !> forces, is at most yield stress + slope times the plastic strain: exactly that where the
+  !> plastic strain has grown; where it hasn't, the forces have changed by those of the elastic law.
   subroutine test_return(error)
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
@@ -361,7 +361,7 @@ contains
   end subroutine test_return
 
   !> Stresses of J2 plasticity with linear isotropic hardening by radial return (Simo and Hughes,
-  !> Computational Inelasticity, box 3.2), brought to a strain.
+  !> Computational Inelasticity, chapter 3), brought to a strain.
   subroutine classical(strain, hardening, plastic, equivalent, stress)
     real(wp), intent(in) :: strain(3, 3), hardening
     real(wp), intent(inout) :: plastic(3, 3), equivalent

@@ -172,8 +172,8 @@ contains
   !> measured there: to 2 % of the yield stress, and to 5 % in what it hardens by. It is a tension:
   !> 3 kappa theta, the sum of the normal stresses, is the stress along x, to the lateral stresses
   !> of a few per cent that the skins exert. Unloading has the stiffness of loading to 1 %. The
-  !> balance of energies has the error of the trapezoidal rule for the work over a load step, in which
-  !> lengths change by 1e-3 of themselves.
+  !> balance of energies has the error of the trapezoidal rule for the work over a load step, in
+  !> which lengths change by 1e-3 of themselves.
   subroutine test_bar(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: hardening = youngs_modulus/10
@@ -228,11 +228,11 @@ contains
       & 'it does not yield backwards')
   end subroutine test_bar
 
-  !> The ends of a square bar are turned against each other, free to warp. The moment is 0.1406 mu a^4
-  !> times the twist before it yields (Timoshenko and Goodier, Theory of Elasticity, 109) and
-  !> tau a^3/3, tau = yield stress/sqrt 3, when all of it does (Hill, The Mathematical Theory of
-  !> Plasticity, IV.6). The skins make both larger: by 7 and by 12 %; 15 % is asked for. Beyond that
-  !> the moment does not grow, and it falls as steeply as it rose.
+  !> The ends of a square bar are turned against each other, free to warp. The moment is
+  !> 0.1406 mu a^4 times the twist before it yields (Timoshenko and Goodier, Theory of Elasticity)
+  !> and tau a^3/3, tau = yield stress/sqrt 3, when all of it does (Nadai's sand heap: twice the
+  !> volume under a roof of slope tau). The skins make both larger: by 7 and by 12 %; 15 % is asked
+  !> for. Beyond that the moment does not grow, and it falls as steeply as it rose.
   subroutine test_torsion(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: course(*) = [0.2_wp, 0.5_wp, 0.8_wp, 1.0_wp, 0.8_wp]
@@ -313,9 +313,9 @@ contains
     end associate
   end subroutine test_hit
 
-  !> A body in any state, after flow and a commit and after more of it: the sums of the forces and of
-  !> their moments are 0, since both ends of a bond pull alike. Forces at a state do not depend on
-  !> what was tried before, until a step is accepted.
+  !> A body in any state, after flow and a commit and after more of it: the sums of the forces and
+  !> of their moments are 0, since both ends of a bond pull alike. Forces at a state do not depend
+  !> on what was tried before, until a step is accepted.
   subroutine test_balance(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

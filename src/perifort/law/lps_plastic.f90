@@ -1,25 +1,27 @@
 !> The elastic-plastic linear peridynamic solid in 3D, `model = 'lps_plastic'`: that of Mitchell
-!> ("A nonlocal, ordinary, state-based plasticity model for peridynamics", SAND2011-3166), with linear
-!> isotropic hardening (doc/theory.md, 10).
+!> ("A nonlocal, ordinary, state-based plasticity model for peridynamics", SAND2011-3166), with
+!> linear isotropic hardening (doc/theory.md, 10).
 !>
 !> The extension e = s |xi| of a bond is elastic but for its plastic part e_p. With v = Lambda |xi|,
-!> the product <a, b> = sum omega a b vc V_j over the intact bonds of a point, m = <|xi|, |xi|> of its
-!> whole family and alpha = 15 mu/m, the energy is that of `lps` with e - e_p in its deviatoric part:
+!> the product <a, b> = sum omega a b vc V_j over the intact bonds of a point, m = <|xi|, |xi|> of
+!> its whole family and alpha = 15 mu/m, the energy is that of `lps` with e - e_p in its deviatoric
+!> part:
 !>
-!>     W = kappa theta^2/2 + (alpha/2) (<x, x> - <v, x>^2/m),   theta = (3/m) <v, e>,   x = e - e_p
+!>     W = kappa theta^2/2 + (alpha/2) (<x, x> - <v, x>^2/m),  theta = (3/m) <v, e>,  x = e - e_p
 !>
 !> The part d of x that is orthogonal to v yields: its equivalent stress
 !>
 !>     sigma_eq = 15 mu sqrt(<d, d>/(5 m))
 !>
-!> which is von Mises' for a full family in a continuum, stays below yield stress + hardening ebar.
-!> Flow is along d, so that it changes no volume. The return to the yield surface is radial and exact:
+!> which is von Mises' for a full family in a continuum, stays at or below
+!> yield stress + hardening ebar. Flow is along d, so that it changes no volume. The return to the
+!> yield surface is radial and exact:
 !>
 !>     d ebar = (sigma_eq - yield stress - hardening ebar)/(3 mu + hardening)
 !>
-!> A whole family has <v, v> = m, and its deviatoric force alpha omega d is t_d of Mitchell. The rest of
-!> x, along v, carries force where bonds are broken: there the law is still `lps` before it yields,
-!> and an isotropic expansion never yields.
+!> A whole family has <v, v> = m, and its deviatoric force alpha omega d is t_d of Mitchell. The
+!> rest of x, along v, carries force where bonds are broken: there the law is still `lps` before it
+!> yields, and an isotropic expansion never yields.
 module pd_law_lps_plastic
   use pd_base_kinds, only: wp
   use pd_law_law, only: law_bonds_type, parameter_type
@@ -111,9 +113,9 @@ contains
       & *sum(now%weight*now%deviator**2) + now%part**2*free(now)*now%intact)
   end function energy
 
-  !> Let the plastic flow stay. The force on e - e_p does work on what flows; it is taken as the mean
-  !> of the forces before and after, like the work of all forces (7.27), so that work, energy and
-  !> dissipation agree to rounding. As flow is orthogonal to v, that is
+  !> Let the plastic flow stay. The force on e - e_p does work on what flows; it is taken as the
+  !> mean of the forces before and after, as in the work of loads by the trapezoidal rule, so that
+  !> work, energy and dissipation agree to rounding. As flow is orthogonal to v, that is
   !> (alpha/2) <d of the last commit + d after flow, flow>.
   pure subroutine commit(self, bonds, dissipated)
     class(lps_plastic_law_type), intent(in) :: self  !! the law
