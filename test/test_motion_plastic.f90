@@ -3,8 +3,8 @@
 !>
 !> Bonds have the influence function 1 - |xi|/delta, with which a lattice of three spacings to the
 !> horizon has the moduli and the yield stress to 1 %. Skins are stiffer, as in any linear
-!> peridynamic solid (doc/theory.md, 10): forces and moments of a bar of 8 points by 8 are larger
-!> by 6 to 18 %, which the elastic bar shows, too. So stress is taken on the axis.
+!> peridynamic solid without a correction: forces and moments of a bar of 8 points by 8 are larger
+!> by 7 to 17 %, which the elastic bar shows, too. So stress is taken on the axis.
 module test_motion_plastic
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type

@@ -131,7 +131,7 @@ contains
   end subroutine choose_pass
 
   !> Factors of the stretch and of the dilatation of a bond of slot `k`, by its length
-  !> (doc/theory.md, 10).
+  !> (doc/theory.md, 15).
   pure subroutine bond_factors_of(model, k, length, gb, gd)
     type(model_type), intent(in) :: model  !! with weighted laws
     integer, intent(in) :: k               !! slot

@@ -1,4 +1,4 @@
-!> Influence functions omega(|xi|/delta): how much a bond counts by its length (doc/theory.md, 10).
+!> Influence functions omega(|xi|/delta): how much a bond counts by its length (doc/theory.md, 15).
 module pd_law_influence
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp

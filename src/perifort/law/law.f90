@@ -6,7 +6,7 @@
 !> or is added to that table by a program. It is weighted or general:
 !>
 !> - The force of a **weighted** law is that of the chapter with other weights (doc/theory.md, 2 and
-!>   10): every bond has a factor of its length, every point a scale. It runs on the fast loops. It
+!>   15): every bond has a factor of its length, every point a scale. It runs on the fast loops. It
 !>   extends `weighted_law_type` (`pd_law_weighted`), which has all procedures that a law needs.
 !> - A **general** law has any force and a history. It runs on the generic pass.
 !>

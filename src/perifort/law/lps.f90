@@ -1,5 +1,5 @@
 !> The linear peridynamic solid, `model = 'lps'`: the ordinary state-based law in the form that most
-!> programs have (doc/theory.md, 10). With m_k = sum omega |xi|^2 vc V_j over the whole family and
+!> programs have (doc/theory.md, 15). With m_k = sum omega |xi|^2 vc V_j over the whole family and
 !> e = |y| - |xi|, in 3D
 !>
 !>     theta_k = (3/m_k) sum omega |xi| e vc V_j

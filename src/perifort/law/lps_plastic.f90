@@ -1,6 +1,6 @@
 !> The elastic-plastic linear peridynamic solid in 3D, `model = 'lps_plastic'`: that of Mitchell
 !> ("A nonlocal, ordinary, state-based plasticity model for peridynamics", SAND2011-3166), with
-!> linear isotropic hardening (doc/theory.md, 10).
+!> linear isotropic hardening (doc/theory.md, 15).
 !>
 !> The extension e = s |xi| of a bond is elastic but for its plastic part e_p. With v = Lambda |xi|,
 !> the product <a, b> = sum omega a b vc V_j over the intact bonds of a point, m = <|xi|, |xi|> of

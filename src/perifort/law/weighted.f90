@@ -1,5 +1,5 @@
 !> The chapter's laws, `state_based` and `bond_based`, with any influence function, and what other
-!> weighted laws extend (doc/theory.md, 2 and 10):
+!> weighted laws extend (doc/theory.md, 2 and 15):
 !>
 !>     theta_k = t_k sum gd Gd s Lambda vc V_j
 !>     pull    = q_k gb Gb s + 2 a t_k theta_k gd Gd Lambda/|xi|
@@ -216,7 +216,7 @@ contains
   end function dilatation
 
   !> The chapter's formula for its own influence function; with another one, the stretch at which
-  !> the bonds through a plane, stretched alike and no others, hold Gc (doc/theory.md, 8 and 10).
+  !> the bonds through a plane, stretched alike and no others, hold Gc (doc/theory.md, 8 and 15).
   pure real(wp) function critical_stretch(self, Gc) result(s_c)
     class(weighted_law_type), intent(in) :: self  !! after `set_up`
     real(wp), intent(in) :: Gc                    !! critical energy release rate [J/m2]
