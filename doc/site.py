@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDER = ["user-guide", "input-reference", "library", "theory", "trade", "extremes", "performance", "reliability",
-         "architecture", "kernels", "glossary"]
+         "own-law", "architecture", "kernels", "glossary"]
 CONFIG = """project: perifort
 summary: {summary}
 src_dir: {src}

@@ -4,6 +4,7 @@ module pd_set_up_memory
   use pd_base_error, only: error_type
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
+  use pd_law_laws, only: all_laws, law_table_type
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
   use pd_body_generate, only: horizon_of
@@ -32,7 +33,7 @@ contains
   !> known before they are read; 0 without lattice bodies. The constants are fitted to the largest
   !> resident sets of runs of 2e5 points in each dimension, with horizons of 3 to 6 spacings
   !> (doc/performance.md, memory).
-  pure real(wp) function predicted_memory(scene) result(bytes)
+  real(wp) function predicted_memory(scene) result(bytes)
     type(scene_type), intent(in) :: scene  !! a checked scene
     real(wp), parameter :: program = 20.0e6_wp                          !! without points
     real(wp), parameter :: per_point(3) = [165.0_wp, 280.0_wp, 500.0_wp]  !! in 1D, 2D, 3D
@@ -42,10 +43,11 @@ contains
     real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded
     real(wp), parameter :: per_solver = 80.0_wp, per_rule = 24.0_wp     !! a component
     real(wp), parameter :: block = 8.0_wp                               !! slots with one table
+    real(wp), parameter :: per_generic_bond = 32.0_wp, per_history = 8.0_wp
     real(wp), parameter :: pi = acos(-1.0_wp)
     real(wp) :: points, ratio, members, kinds
-    integer :: dim
-    logical :: breaking
+    integer :: dim, history
+    logical :: breaking, generic
 
     bytes = 0.0_wp
     dim = scene%header%dimension
@@ -69,6 +71,8 @@ contains
       bytes = bytes + kinds*members*block*per_weight
       if (breaking) bytes = bytes + points*per_bit*members
     end if
+    call look_at_laws(scene, generic, history)
+    if (generic) bytes = bytes + points*members*(per_generic_bond + per_history*history)
     if (scene%time%method == 'relaxation') then
       bytes = bytes + points*dim*per_solver
     else if (index(scene%time%integrator, 'adams') == 1 .or. &
@@ -76,6 +80,29 @@ contains
       bytes = bytes + points*dim*per_rule
     end if
   end function predicted_memory
+
+  !> Whether the generic pass computes the laws of a scene, and the most reals of history of a bond.
+  subroutine look_at_laws(scene, generic, history)
+    type(scene_type), intent(in) :: scene
+    logical, intent(out) :: generic
+    integer, intent(out) :: history
+    type(law_table_type) :: laws
+    integer :: i, n
+
+    laws = all_laws()
+    if (allocated(scene%laws%items)) laws = scene%laws
+    generic = .false.
+    history = 0
+    do i = 1, size(scene%materials)
+      associate (one => scene%materials(i), first => scene%materials(1))
+        n = laws%number_of(one%model)
+        if (n == 0) cycle
+        generic = generic .or. .not. laws%items(n)%law%weighted .or. one%influence &
+          & /= first%influence .or. (one%model == 'lps') .neqv. (first%model == 'lps')
+        history = max(history, laws%items(n)%law%bond_history)
+      end associate
+    end do
+  end subroutine look_at_laws
 
   !> Number of points of each body's lattice, 0 for clouds.
   pure function numbers_of_points(scene) result(numbers)
