@@ -32,6 +32,7 @@ contains
       & new_unittest('counts that are proposed are accepted', test_proposed), &
       & new_unittest('names that must exist', test_references), &
       & new_unittest('names that must differ', test_unique), &
+      & new_unittest('bond laws and their keys', test_laws), &
       & new_unittest('the bond-based ratio', test_bond_based), &
       & new_unittest('the range of the ratio', test_ratio), &
       & new_unittest('shapes', test_shapes), &
@@ -150,6 +151,25 @@ contains
     call expect_fault(error, base//"&region name = 'p' shape = 'box' lower = 0 /"//line// &
       & "&region name = 'p' shape = 'box' lower = 0 /", "the name 'p'|&region|a/b.nml:6")
   end subroutine test_unique
+
+  !> Bond laws by their names, and keys that belong to some of them.
+  subroutine test_laws(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: start = '&material youngs_modulus = 1 density = 1 '// &
+      & 'poissons_ratio = 0.25'//line
+
+    call expect_fault(error, scene_3d//start//"model = 'state_basd' /"//cube//go, &
+      & "unknown value 'state_basd' of key 'model'|did you mean 'state_based'?|"// &
+      & 'allowed: state_based, bond_based, lps|a/b.nml:3')
+    call expect_fault(error, scene_3d//start//'yield_stress = 1 /'//cube//go, &
+      & "'yield_stress' is no key of model = 'state_based'|model = 'lps_plastic'|a/b.nml:3")
+    call expect_fault(error, scene_3d//start//"model = 'lps_plastic' /"//cube//go, &
+      & "&material lacks the key 'yield_stress'|[Pa]|a/b.nml:2")
+    call expect_fault(error, scene_3d//start//'scatter = 5 /'//cube//go, &
+      & "'scatter' without a strength|critical_stretch|a/b.nml:3")
+    call expect_fault(error, scene_3d//start//"model = 'softening' peak_stretch = 1e-3 "// &
+      & 'critical_stretch = 1e-2 scatter = 5 /'//cube//go, "model = 'softening' has no 'scatter'")
+  end subroutine test_laws
 
   subroutine test_bond_based(error)
     type(error_type), allocatable, intent(out) :: error

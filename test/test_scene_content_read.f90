@@ -265,9 +265,9 @@ contains
   subroutine test_choices(error)
     type(error_type), allocatable, intent(out) :: error
 
-    call expect_fault(error, "&material model = 'state_basd' /", &
-      & "unknown value 'state_basd' of key 'model'|did you mean 'state_based'?|"// &
-      & 'allowed: state_based, bond_based|a/b.nml:1')
+    call expect_fault(error, "&material influence = 'gausian' /", &
+      & "unknown value 'gausian' of key 'influence'|did you mean 'gaussian'?|"// &
+      & 'allowed: inverse, constant, linear, gaussian|a/b.nml:1')
     call expect_fault(error, "&output fields = 'damage', 'Damage' /", "'damage' is given twice")
     call expect_fault(error, "&boundary side = 'left' /", "unknown value 'left'|x_min, x_max")
   end subroutine test_choices

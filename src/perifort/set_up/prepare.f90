@@ -104,10 +104,10 @@ contains
       if (allocated(error)) return
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
         & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
-      call check_laws(scene, system, error)
-      if (allocated(error)) return
       if (system%model%thermal) call heating_of_scene(scene, heated_by, system%model%expansion, &
         & system%heating)
+      call check_laws(scene, system, error)
+      if (allocated(error)) return
       call motions_of_scene(scene, system%body, system%motions, error)
       if (allocated(error)) return
       call loads_of_scene(scene, system%body, loads, error)
@@ -176,9 +176,17 @@ contains
         & "the scene cannot have limit = 'spectral'", 'its bond laws may change their '// &
         & "stiffness: use limit = 'equation'")
     end if
-    if (allocated(error) .or. size(scene%no_fail) == 0) return
+    if (allocated(error)) return
     do i = 1, size(system%model%laws)
-      if (.not. system%model%laws(i)%law%softens) cycle
+      associate (law => system%model%laws(i)%law)
+        if (law%bond_history + law%point_history == 0) cycle
+        if (allocated(system%heating%curves)) call scene_fault(error, scene, 'material', i, &
+          & 'model', "model = '"//trim(scene%materials(i)%model)//"' cannot have a temperature "// &
+          & 'that varies in time, or grows over load steps', &
+          & 'the work of heat is known for laws without a history only')
+        if (allocated(error)) return
+        if (size(scene%no_fail) == 0 .or. .not. law%softens) cycle
+      end associate
       call scene_fault(error, scene, 'no_fail', 1, '', "bonds with model = '"// &
         & trim(scene%materials(i)%model)//"' cannot have zones in which they do not fail", &
         & 'they soften before they break: give what must hold a material with another law')
