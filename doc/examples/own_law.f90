@@ -1,8 +1,8 @@
 !> A material in one file: a bond law with a history, used by a program without a change of the
 !> library. doc/own-law.md goes through it.
 !>
-!> Bonds are elastic up to a stretch of `slip_stretch` and slip beyond it, with a hardening: with the
-!> slip z of a bond, its pull is q (s - z), and it slips where |s - (1 + h) z| would exceed
+!> Bonds are elastic up to a stretch of `slip_stretch` and slip beyond it, with a hardening h: with
+!> the slip z of a bond, its pull is q (s - z), and it slips where |s - (1 + h) z| would exceed
 !> `slip_stretch`. A bar of such bonds has the stress E eps up to that strain, and then the slope
 !> E h/(1 + h).
 module slipping

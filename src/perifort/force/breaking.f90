@@ -167,8 +167,8 @@ contains
     first = first(:n + 1)
   end subroutine group_slots
 
-  !> Where the strength of bonds scatters: the smallest critical stretch of each slot's bonds, and of
-  !> all, which tell the loops where to look.
+  !> Where the strength of bonds scatters: the smallest critical stretch of each slot's bonds, and
+  !> of all, which tell the loops where to look.
   subroutine find_weakest(family, model)
     class(family_type), intent(in) :: family   !! whole
     type(model_type), intent(inout) :: model   !! gets `weakest` and a new `least_critical`

@@ -1,6 +1,6 @@
-!> Scatter of strength: a factor for the critical stretch of each bond, Weibull distributed, from the
-!> numbers of its two points. It is the same from both ends, for any order of points and number of
-!> threads (doc/theory.md, 8).
+!> Scatter of strength: a factor for the critical stretch of each bond, Weibull distributed, from
+!> the numbers of its two points. It is the same from both ends, for any order of points and number
+!> of threads (doc/theory.md, 8).
 module pd_law_strength
   use pd_base_kinds, only: wp, i8
   use pd_base_lookup, only: mix

@@ -78,7 +78,8 @@ contains
         n = bonds%xi(i, :)/bonds%length(i)
         bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j)) &
           & *surface_factor(model, model%S, n, k, j) &
-          & *law_factor(model, k, bonds%length(i), .false.) + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j) &
+          & *law_factor(model, k, bonds%length(i), .false.) &
+          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j) &
           & *law_factor(model, k, bonds%length(i), .true.))*bonds%weight(i)/bonds%length(i)
       end do
     end do

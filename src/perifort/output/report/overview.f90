@@ -66,8 +66,7 @@ contains
       & line('Gc', with_unit(energy_of(m%critical_stretch, law), 'J/m2', 4)// &
       & ', from the critical stretch at this horizon')
     if (m%scatter > 0.0_wp) text = text//line('scatter', 'Weibull modulus '// &
-      & to_text(m%scatter, 4)//', seed '//to_text(m%seed)//': the critical stretch of a bond is '// &
-      & to_text(m%critical_stretch, 4)//' in the mean')
+      & to_text(m%scatter, 4)//', seed '//to_text(m%seed)//', about the mean critical stretch')
   end function material_lines
 
   !> The critical energy release rate of a critical stretch, which grows with a power of it; 0 for a
