@@ -15,7 +15,7 @@ module test_motion_plastic
   use pd_motion_system, only: account, energies_of, energies_type, evaluate, system_type
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: at_point, box_scene, diary_type, expect, expect_true, prepare_run, ready, &
     & shake, youngs_modulus
@@ -356,7 +356,7 @@ contains
         call expect_close(error, moment, 0.0_wp, 1.0e-13_wp*sizes*side, 'net moment')
         call account(system, real(i, wp), at_rest=.true.)
         call evaluate(system, 0.0_wp, breaking=.false.)
-        call expect_close(error, system%state%force, force, 1.0e-11_wp*maxval(abs(force)), &
+        call expect_close(error, system%state%force, force, 1.0e-11_wp*max_abs(force), &
           & 'forces after the commit')
       end do
       call expect_true(error, system%plastic_energy > 0.0_wp, 'nothing flows')

@@ -1,6 +1,6 @@
 !> A bond law of a program's own, with a history: nothing of perifort is used here but `perifort`.
 module test_own_law
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use perifort, only: all_laws, answer_type, bond_law_type, fault_type => error_type, &
     & law_bonds_type, law_table_type, preview_scene, read_scene_text, run_options_type, run_scene, &
     & scene_type, wp
@@ -228,10 +228,10 @@ contains
     if (.not. allocated(error)) call run_it(bar('conjugate_gradient', 'list'), names, list, error)
     if (allocated(error)) return
     do i = 1, 2
-      call expect_close(error, other(:, i), one(:, i), 1.0e-6_wp*maxval(abs(one(:, i))), &
+      call expect_close(error, other(:, i), one(:, i), 1.0e-6_wp*max_abs(one(:, i)), &
         & 'dynamic relaxation')
       if (allocated(error)) return
-      call expect_close(error, list(:, i), one(:, i), 1.0e-6_wp*maxval(abs(one(:, i))), 'list')
+      call expect_close(error, list(:, i), one(:, i), 1.0e-6_wp*max_abs(one(:, i)), 'list')
       if (allocated(error)) return
     end do
   end subroutine test_solvers
@@ -250,7 +250,7 @@ contains
         & 'dissipated_energy', 'external_work'], columns, error)
       if (allocated(error)) return
       energy = columns(1, 1)
-      off(i) = maxval(abs(columns(:, 1) + columns(:, 2) + columns(:, 3) - columns(:, 4) - energy))
+      off(i) = max_abs(columns(:, 1) + columns(:, 2) + columns(:, 3) - columns(:, 4) - energy)
       call check(error, off(i) <= 0.01_wp*energy .and. energy > 0.0_wp, 'balance of energy')
       if (allocated(error)) return
       call check(error, columns(size(columns, 1), 3) > 0.05_wp*energy, 'slip dissipates')

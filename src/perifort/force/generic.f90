@@ -394,7 +394,8 @@ contains
       last = workspace%start(k + 1) - 1
       call add_pulls(size(u, 1), family%dim, int(last - first) + 1, workspace%member(first:last), &
         & workspace%partner(first:last), workspace%volume(first:last), &
-        & workspace%pull(first:last), workspace%pull, workspace%x, u, k, sums)
+        & workspace%pull(first:last), size(workspace%pull, kind=i8), workspace%pull, workspace%x, &
+        & u, k, sums)
       do c = 1, family%dim
         force(k, c) = sums(c)
       end do
@@ -403,11 +404,13 @@ contains
   end subroutine generic_force
 
   !> The sum over the `n` bonds of slot `k`. A bond crushed to a point has no direction.
-  pure subroutine add_pulls(n_slots, dim, n, member, partner, volume, own, pull, x, u, k, sums)
+  pure subroutine add_pulls(n_slots, dim, n, member, partner, volume, own, n_bonds, pull, x, u, k, &
+    & sums)
     integer, intent(in) :: n_slots, dim, n, k
     integer(i4), intent(in) :: member(n)
     integer(i8), intent(in) :: partner(n)
-    real(wp), intent(in) :: volume(n), own(n), pull(*), x(n_slots, dim), u(n_slots, dim)
+    integer(i8), intent(in) :: n_bonds
+    real(wp), intent(in) :: volume(n), own(n), pull(n_bonds), x(n_slots, dim), u(n_slots, dim)
     real(wp), intent(out) :: sums(3)
     real(wp) :: y(n, dim), square(n), both(n)
     integer :: i, c
