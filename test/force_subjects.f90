@@ -5,6 +5,7 @@ module force_subjects
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: body_type, grid_type, allocate_points, keep_points
+  use pd_law_law, only: law_name_length
   use pd_law_laws, only: all_laws, law_item_type, law_table_type
   use pd_law_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
@@ -42,8 +43,8 @@ module force_subjects
     integer :: dim = 1
     real(wp) :: poissons_ratio = 0.2_wp
     logical :: bond_based = .false.
-    character(16) :: law = ''                !! '': by `bond_based`
-    character(16) :: influence = 'inverse'
+    character(law_name_length) :: law = ''   !! '': by `bond_based`
+    character(law_name_length) :: influence = 'inverse'
     logical :: dilatant = .false.            !! 1D: energy of dilatation beside that of stretches
     logical :: plane_strain = .false.
     logical :: projected = .true.

@@ -565,7 +565,8 @@ contains
     call model%laws(model%material(k))%law%bond_damage(seen, lost)
     where (.not. bonds%intact(:seen%n)) lost = 1.0_wp
     damage = 0.0_wp
-    if (seen%n > 0) damage = sum(lost*bonds%weight(:seen%n))/sum(bonds%weight(:seen%n))
+    if (seen%n > 0) damage = min(1.0_wp, sum(lost*bonds%weight(:seen%n)) &
+      & /sum(bonds%weight(:seen%n)))
   end function damage_seen
 
   !> M_k of every slot: the sum of the bounds that both ends give each bond, times vc V_j. Twice it

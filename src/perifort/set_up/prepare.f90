@@ -117,7 +117,8 @@ contains
       call timer%stop('conditions')
 
       call timer%start('surface correction')
-      system%model%surface = scene%horizon%surface_correction == 'energy'
+      system%model%surface = scene%horizon%surface_correction == 'energy' .and. &
+        & any([(laws(i)%law%corrected, i=1, size(laws))])
       if (system%model%surface) call surface_factors(system%body, system%family, materials, &
         & system%model%D, system%model%S, laws)
       call find_weakest(system%family, system%model)

@@ -144,8 +144,12 @@ contains
       else
         text = text//line('forces', 'bond-based: one pass over the bonds, no dilatation')
       end if
-      text = text//line('surfaces', trim(merge('corrected by energy', &
-        & 'not corrected      ', model%surface)))
+      if (scene%horizon%surface_correction == 'energy' .and. .not. model%surface) then
+        text = text//line('surfaces', 'not corrected: the bond law needs no correction')
+      else
+        text = text//line('surfaces', trim(merge('corrected by energy', 'not corrected      ', &
+          & model%surface)))
+      end if
       if (model%breaking) then
         text = text//line('fracture', 'bonds can break'// &
           & trim(merge(' in tension and in compression', repeat(' ', 30), model%compression)))
