@@ -57,6 +57,7 @@ contains
     real(wp), allocatable :: positions(:, :)
     type(kept_type), allocatable :: kept
     type(field_table_type) :: table
+    type(error_type), allocatable :: ignored
     character(:), allocatable :: command
     integer :: f, c
 
@@ -83,7 +84,10 @@ contains
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
       if (.not. recorder%results%goes_on()) call put_points(scene, body, recorder, error)
-      if (allocated(error)) return
+      if (allocated(error)) then
+        call recorder%results%close(ignored)
+        return
+      end if
       call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet, &
         & first_step=int(merge(system%memory%load_step, restart%about%step, plan%relaxes), &
         & i8), load=plan%relaxes)

@@ -9,7 +9,8 @@
 !>     call results%close(error)
 !>
 !> Nothing of an earlier run is touched before the first output is complete. After an error call
-!> `close` none the less: it leaves the files as they were at the last complete output.
+!> `close` none the less: it leaves the files as they were at the last complete output. Where there
+!> are none, the folder is removed again if `create` made it.
 !>
 !> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
 !> are the fields of the last output, and `answer` gives both.
@@ -22,7 +23,8 @@ module pd_output_results_results
   use pd_output_results_description, only: check_description
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
-  use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_file
+  use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_empty, &
+    & remove_file
   use pd_output_results_history, only: csv_type, history_type
   use pd_output_results_iterations, only: iterations_type
   use pd_output_results_sink, only: sink_type
@@ -58,6 +60,7 @@ module pd_output_results_results
     logical :: resumed = .false.         !! they are those of a run that goes on
     logical :: failed = .false.
     logical :: in_files = .true.         !! there is a folder to write to
+    integer :: made_folder = 0           !! part of its path that was made, as of `make_directory`
     real(wp), allocatable :: positions(:, :)       !! what stays in memory: points, ...
     type(values_type), allocatable :: latest(:)    !! fields of the output under way, ...
     type(values_type), allocatable :: complete(:)  !! and of the last complete one
@@ -126,7 +129,7 @@ contains
       if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
       if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
       if (allocated(error)) return
-      call make_directory(directory, error)
+      call make_directory(directory, error, self%made_folder)
       if (allocated(error)) return
     end if
 
@@ -155,6 +158,7 @@ contains
         & planned_outputs, columns, planned_rows, single, scene_text, command, version, error)
       if (allocated(error)) then
         call explain_need(self, 'the layout', self%vtkhdf%layout_bytes(), error)
+        call remove_empty(self%directory, self%made_folder)
         return
       end if
     end if
@@ -593,6 +597,8 @@ contains
     if (self%failed .or. allocated(error) .or. .not. self%started) then
       if (self%use_vtkhdf) call self%vtkhdf%abandon()
       if (self%csv%is_open()) call self%csv%close(ignored)
+      ! a folder made for these results goes if nothing has come to be in it
+      call remove_empty(self%directory, self%made_folder)
       return
     end if
     if (self%use_vtkhdf) then
