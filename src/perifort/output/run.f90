@@ -115,7 +115,7 @@ contains
       if (allocated(error)) return
       call keep_checkpoints(scene, options, plan, start, self%directory, self%stem, &
         & self%restart, recorder)
-      call recorder%timer%start('time stepping')
+      call recorder%timer%start(recorder%phase())
     end associate
   end subroutine open_output
 
@@ -141,7 +141,7 @@ contains
         if (allocated(recorder%rescued)) error%message = error%message//newline//'  '// &
           & recorder%rescued
       end if
-      call recorder%timer%stop('time stepping')
+      call recorder%timer%stop(recorder%phase())
       call recorder%progress%finish()
       call recorder%energy_balance(system, balance, share)
       if (.not. allocated(error)) call warn_of_balance(system, recorder, balance, share)

@@ -59,6 +59,7 @@ module pd_output_report_recorder
     procedure :: keep_state
     procedure :: warn
     procedure :: energy_balance
+    procedure :: phase
   end type recorder_type
 
 contains
@@ -109,7 +110,7 @@ contains
     observer%more_rows = merge(1, 0, row .and. .not. row_due)
     observer%more_outputs = merge(1, 0, output .and. .not. output_due)
     if (.not. (row .or. output .or. keeping)) return
-    call observer%timer%stop('time stepping')
+    call observer%timer%stop(observer%phase())
     call velocities_now(system, instant%time, instant%kick, v)
     if (row) then
       call observer%timer%start('energies and history')
@@ -132,7 +133,7 @@ contains
       if (allocated(error)) return
     end if
     if (keeping) call observer%keep_state(system, finished=.false.)
-    call observer%timer%start('time stepping')
+    call observer%timer%start(observer%phase())
     if (stopping) call fail(error, reason_to_stop(observer%most_seconds, observer%wish)//' at '// &
       & place_of(instant, observer%schedule%relaxation)// &
       & ': this state is the last output'//way_on(observer), status_interrupted)
@@ -151,6 +152,13 @@ contains
       & 'equilibrium in load step '//to_text(instant%load_step)//': dynamic relaxation '// &
       & 'continues from the present state')
   end subroutine note_giving_way
+
+  !> Name of the motion in the table of times.
+  pure function phase(self) result(name)
+    class(recorder_type), intent(in) :: self  !! with its schedule
+    character(:), allocatable :: name
+    name = trim(merge('iterations   ', 'time stepping', self%schedule%relaxation))
+  end function phase
 
   !> Whether the run has had the time that it was given.
   logical function time_is_over(recorder)
