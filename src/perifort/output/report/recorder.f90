@@ -105,7 +105,8 @@ contains
       & .or. allocated(observer%wish))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
     keeping = keeping .and. observer%checkpoint%in_files
-    row = row_due .or. stopping .or. instant%last
+    ! the history has no row of a load step that has not converged
+    row = row_due .or. ((stopping .or. instant%last) .and. instant%settled)
     output = output_due .or. stopping .or. instant%last
     observer%more_rows = merge(1, 0, row .and. .not. row_due)
     observer%more_outputs = merge(1, 0, output .and. .not. output_due)
