@@ -49,7 +49,7 @@ module pd_output_report_recorder
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
-    integer :: more_outputs = 0              !! which goes on would not have
+    integer :: more_outputs = 0              !! which continues would not have
     real(wp) :: most_seconds = 0.0_wp        !! wall time until the run stops by itself, if > 0 [s]
     character(:), allocatable :: command     !! continues the run; '' = not possible
     character(:), allocatable :: wish        !! why another observer asks to stop in order
@@ -125,9 +125,9 @@ contains
       call write_output(observer, system, instant, v, error)
       ! a restarted run does not have the output that is written because the run stops
       if (output_due .or. instant%last) then
-        call tell(observer, 'contact', contact_warning(system, instant%time))
+        call warn_if_any(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
-          & call tell(observer, 'strain', strain_warning(system, instant%time))
+          & call warn_if_any(observer, 'strain', strain_warning(system, instant%time))
       end if
       call observer%results%put_warnings(observer%warnings%text())
       call observer%timer%stop('output')
@@ -190,7 +190,7 @@ contains
       call velocities_now(system, instant%time, instant%kick, v)
       call write_output(recorder, system, instant, v, error)
       if (allocated(error)) return
-      call tell(recorder, 'contact', contact_warning(system, instant%time))
+      call warn_if_any(recorder, 'contact', contact_warning(system, instant%time))
       call recorder%results%put_warnings(recorder%warnings%text())
     end if
     recorder%rescued = state//' is the last output'
@@ -235,11 +235,11 @@ contains
   end subroutine keep_state
 
   !> Note a warning unless it is ''.
-  subroutine tell(recorder, subject, text)
+  subroutine warn_if_any(recorder, subject, text)
     class(recorder_type), intent(inout) :: recorder
     character(*), intent(in) :: subject, text
     if (len(text) > 0) call recorder%warn(subject, text)
-  end subroutine tell
+  end subroutine warn_if_any
 
   !> Note a warning; the first of a subject is printed at once.
   subroutine warn(recorder, subject, text)
@@ -262,7 +262,7 @@ contains
 
     associate (balance => recorder%balance)
       call energies_of(system, v, balance%energies)
-      call system%watch%look(instant%step, balance%energies%kinetic, balance%energies%strain, &
+      call system%watch%check(instant%step, balance%energies%kinetic, balance%energies%strain, &
         & system%dissipated, system%external_work)
       if (recorder%rows == 0) call balance%begin(system)
       now%system => system
@@ -276,7 +276,7 @@ contains
     if (.not. recorder%turned) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0
-      call tell(recorder, 'rotation', warning)
+      call warn_if_any(recorder, 'rotation', warning)
     end if
     if (.not. allocated(error)) call check_strain_energy(system, recorder%balance%energies, &
       & instant%time, error)
