@@ -2,6 +2,7 @@
 module test_command_line
   use pd_base_error, only: pd_error => error_type, status_usage
   use pd_base_shell, only: quoted
+  use pd_base_text, only: newline
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, command_names, parse_command_line, &
     & restart_command
@@ -412,7 +413,14 @@ contains
     if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--ouput', 'b'], "did you mean '--output'?")
     if (allocated(error)) return
-    call refused(error, [character(w) :: 'run', 'a', '--frob'], 'known: --output, --threads')
+    call refused(error, [character(w) :: 'run', 'a', '--frob'], 'known: --output, --threads, '// &
+      & '--overwrite, --restart, --max-minutes, --quiet, --set, --help'//newline)
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'version', '--frob'], 'known: --help'//newline)
+    if (allocated(error)) return
+    call refused(error, [character(w) :: 'check', 'a', '--point=3'], "'--point'"//newline)
+    if (allocated(error)) return
+    call refused(error, [character(w) :: '--frob', 'run', 'a'], '--csv, --error, --time')
     if (allocated(error)) return
     call refused(error, [character(w) :: 'help', 'chek'], "did you mean 'check'?")
     if (allocated(error)) return

@@ -46,7 +46,8 @@ contains
       & new_unittest('results cannot leave their folder', test_inside), &
       & new_unittest('an impossible scene leaves no files', test_impossible), &
       & new_unittest('checking a scene leaves no files', test_check), &
-      & new_unittest('quiet prints nothing', test_quiet)]
+      & new_unittest('quiet prints nothing', test_quiet), &
+      & new_unittest('the summary of a relaxation counts iterations', test_iterations)]
   end subroutine collect_driver
 
   !> A plate of 6 x 5 points that flies at 3 and -2 m/s: 12 steps of 1 us, a row every third, an
@@ -713,6 +714,20 @@ contains
     if (allocated(error)) return
     call check(error, fault%status, status_input, 'exit status')
     call expect_true(error, .not. directory_exists(here//'/impossible'), 'a folder is left behind')
+    if (allocated(error)) return
+    ! found only when the results have been opened: nothing holds the body against its load
+    call box_scene([10, 5], spacing, 1.0_wp/3.0_wp, scene)
+    scene%file = 'plate.nml'
+    scene%time%method = 'relaxation'
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%side = 'x_max'
+    scene%loads%pressure = -1.0e5_wp
+    call run(scene, 'impossible', fault)
+    call expect_true(error, allocated(fault), 'a load that nothing holds')
+    if (allocated(error)) return
+    call check(error, fault%status, status_input, 'exit status of the relaxation')
+    call expect_true(error, .not. directory_exists(here//'/impossible'), 'an empty folder is left')
   end subroutine test_impossible
 
   subroutine test_check(error)
@@ -738,35 +753,88 @@ contains
   !> The program itself, for what it prints: with --quiet not a byte, without it a summary.
   subroutine test_quiet(error)
     type(error_type), allocatable, intent(out) :: error
-    character(*), parameter :: scene_file = here//'/quiet.nml', printed = here//'/printed.txt'
-    character(*), parameter :: silent(2) = [character(7) :: '--quiet', '']
     type(scene_type) :: scene
+    type(line_type), allocatable :: lines(:)
+
+    call flight('quiet', scene)
+    call printed_by_program(scene, 'quiet', '--quiet', lines, error)
+    if (allocated(error)) return
+    call expect_true(error, size(lines) == 0, 'something is printed with --quiet')
+    call printed_by_program(scene, 'quiet', '', lines, error)
+    if (allocated(error)) return
+    call expect_true(error, size(lines) > 0, 'nothing is printed without --quiet')
+    call expect_true(error, any_line(lines, ' ns per bond and step, ') .and. &
+      & any_line(lines, 'time stepping '), 'the summary does not speak of steps')
+    call expect_true(error, file_exists(here//'/quiet/quiet.vtkhdf'), 'no results')
+  end subroutine test_quiet
+
+  !> The summary of a relaxation counts iterations, not steps in time.
+  subroutine test_iterations(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(line_type), allocatable :: lines(:)
+
+    call box_scene([20], spacing, 0.25_wp, scene)
+    scene%file = 'iterations.nml'
+    scene%time%method = 'relaxation'
+    deallocate (scene%loads)
+    allocate (scene%loads(2))
+    scene%loads(1)%side = 'x_min'
+    scene%loads(2)%side = 'x_max'
+    scene%loads%pressure = -1.0e5_wp
+    call printed_by_program(scene, 'iterations', '', lines, error)
+    if (allocated(error)) return
+    call expect_true(error, any_line(lines, ' ns per bond and iteration, ') .and. &
+      & any_line(lines, ' iterations/s') .and. any_line(lines, 'iterations '), 'iterations')
+    call expect_true(error, .not. (any_line(lines, 'time stepping') .or. &
+      & any_line(lines, 'bond and step')), 'the summary speaks of steps in time')
+  end subroutine test_iterations
+
+  !> What the program prints while it runs a scene; the test is skipped if it is not known.
+  subroutine printed_by_program(scene, name, options, lines, error)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: name     !! of its file and folder
+    character(*), intent(in) :: options  !! of the command line
+    type(line_type), allocatable, intent(out) :: lines(:)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), parameter :: printed = here//'/printed.txt'
     type(fault_type), allocatable :: fault
     type(sink_type) :: sink
     character(1000) :: program
-    integer :: i, status
+    integer :: status
 
     call get_environment_variable('PERIFORT', program, status=status)
     if (status /= 0) then
       call skip_test(error, 'PERIFORT does not name the program')
       return
     end if
-    call flight('quiet', scene)
     call make_directory(here, fault)
-    if (.not. allocated(fault)) call sink%open(scene_file, fault)
+    if (.not. allocated(fault)) call sink%open(here//'/'//name//'.nml', fault)
     if (.not. allocated(fault)) call sink%put(scene_text(scene), fault)
     if (.not. allocated(fault)) call sink%close(fault)
     call accept(error, fault)
-    do i = 1, 2
-      if (allocated(error)) return
-      call remove_file(printed)
-      call execute_command_line('"'//trim(program)//'" run '//scene_file//' --overwrite '// &
-        & '--output '//here//'/quiet '//trim(silent(i))//' >'//printed//' 2>&1', exitstat=status)
-      call check(error, status, 0, 'exit status')
-      call expect_true(error, (file_bytes(printed) == 0_i8) .eqv. i == 1, &
-        & 'what is printed with "'//trim(silent(i))//'"')
+    if (allocated(error)) return
+    call remove_file(printed)
+    call execute_command_line('"'//trim(program)//'" run '//here//'/'//name//'.nml --overwrite '// &
+      & '--output '//here//'/'//name//' '//options//' >'//printed//' 2>&1', exitstat=status)
+    call check(error, status, 0, 'exit status')
+    if (file_bytes(printed) == 0_i8) then
+      allocate (lines(0))
+    else
+      call lines_of(printed, lines, error)
+    end if
+  end subroutine printed_by_program
+
+  !> Whether some line has these words.
+  logical function any_line(lines, words)
+    type(line_type), intent(in) :: lines(:)
+    character(*), intent(in) :: words
+    integer :: i
+
+    any_line = .false.
+    do i = 1, size(lines)
+      any_line = any_line .or. index(lines(i)%text, words) > 0
     end do
-    call expect_true(error, file_exists(here//'/quiet/quiet.vtkhdf'), 'no results')
-  end subroutine test_quiet
+  end function any_line
 
 end module test_driver

@@ -101,8 +101,8 @@ contains
 
     do n = 0, 100
       call watch%supplied(0.0_wp)
-      call watch%look(n, 1.3_wp*cos(0.3_wp*n)**2, sin(0.3_wp*n)**2, 0.0_wp, 0.0_wp)
-      call watch%look_at_kinetic(2.0_wp)
+      call watch%check(n, 1.3_wp*cos(0.3_wp*n)**2, sin(0.3_wp*n)**2, 0.0_wp, 0.0_wp)
+      call watch%check_kinetic(2.0_wp)
     end do
     call check(error, watch%sound)
   end subroutine test_exchange
@@ -113,14 +113,14 @@ contains
     type(watch_type) :: watch
     integer :: n
 
-    call watch%look(0, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(0, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
     do n = 1, 1000
       call watch%supplied(1.0_wp*n**2)
-      call watch%look_at_kinetic(0.7_wp*n**2)
-      call watch%look(n, 0.7_wp*n**2, 0.2_wp*n**2, 0.1_wp*n**2, 1.0_wp*n**2)
+      call watch%check_kinetic(0.7_wp*n**2)
+      call watch%check(n, 0.7_wp*n**2, 0.2_wp*n**2, 0.1_wp*n**2, 1.0_wp*n**2)
     end do
     call watch%supplied(0.0_wp)
-    call watch%look(1001, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(1001, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp)
     call watch%supplied(0.0_wp)
     call check(error, watch%sound)
   end subroutine test_supplied
@@ -130,12 +130,12 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(watch_type) :: watch
 
-    call watch%look(0, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
-    call watch%look_at_kinetic(0.0_wp)
+    call watch%check(0, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check_kinetic(0.0_wp)
     call watch%supplied(0.0_wp)
-    call watch%look(1, 0.125_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(1, 0.125_wp, 0.0_wp, 0.0_wp, 0.0_wp)
     call watch%supplied(1.0_wp)
-    call watch%look_at_kinetic(0.5_wp)
+    call watch%check_kinetic(0.5_wp)
     call check(error, watch%sound)
   end subroutine test_begin
 
@@ -146,12 +146,12 @@ contains
     type(watch_type) :: watch
     real(wp) :: energy, supply
 
-    call watch%look(0, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(0, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
     call watch%supplied(1.0_wp)
-    call watch%look_at_kinetic(299.0_wp)
+    call watch%check_kinetic(299.0_wp)
     call check(error, watch%sound)
     if (allocated(error)) return
-    call watch%look_at_kinetic(301.0_wp)
+    call watch%check_kinetic(301.0_wp)
     call check(error, .not. watch%sound)
     if (allocated(error)) return
     call watch%found(energy, supply)
@@ -159,8 +159,8 @@ contains
     if (allocated(error)) return
 
     watch = watch_type()
-    call watch%look(0, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
-    call watch%look(7, 100.0_wp, 100.0_wp, 1.0_wp, 0.0_wp)
+    call watch%check(0, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(7, 100.0_wp, 100.0_wp, 1.0_wp, 0.0_wp)
     call watch%supplied(0.0_wp)
     call check(error, .not. watch%sound)
   end subroutine test_nowhere
@@ -176,8 +176,8 @@ contains
       return
     end if
     none = ieee_value(none, ieee_quiet_nan)
-    call watch%look(0, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
-    call watch%look(1, none, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(0, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(1, none, 0.0_wp, 0.0_wp, 0.0_wp)
     call watch%supplied(0.0_wp)
     call check(error, .not. watch%sound)
   end subroutine test_no_number
@@ -193,7 +193,7 @@ contains
 
     found = 0
     do n = 0, 1700, 25
-      call watch%look(n, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+      call watch%check(n, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp)
       if (.not. watch%keeps(n)) cycle
       found = found + 1
       call check(error, n, expected(min(8, found)))
@@ -201,13 +201,13 @@ contains
     end do
     call check(error, found, 8)
     if (allocated(error)) return
-    call check(error, watch%look_is_due(3700) .and. .not. watch%look_is_due(3699))
+    call check(error, watch%check_is_due(3700) .and. .not. watch%check_is_due(3699))
     if (allocated(error)) return
-    call watch%look(2500, 1.2_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(2500, 1.2_wp, 0.0_wp, 0.0_wp, 0.0_wp)
     kept = watch%keeps(2500)
     call check(error, .not. kept)
     if (allocated(error)) return
-    call watch%look(2600, 1.05_wp, 0.0_wp, 0.0_wp, 0.0_wp)
+    call watch%check(2600, 1.05_wp, 0.0_wp, 0.0_wp, 0.0_wp)
     kept = watch%keeps(2600)
     call check(error, kept)
   end subroutine test_kept
@@ -226,15 +226,15 @@ contains
     kinetic_looks = 0
     do n = 0, 2999
       call watch%supplied(0.0_wp)
-      if (watch%look_is_due(n)) then
+      if (watch%check_is_due(n)) then
         looks = looks + 1
-        call watch%look(n, 0.5_wp, 0.5_wp, 0.0_wp, 0.0_wp)
+        call watch%check(n, 0.5_wp, 0.5_wp, 0.0_wp, 0.0_wp)
       end if
       ! too much of it at 400 and 410
       kinetic = merge(1.2_wp, 0.5_wp, n >= 400 .and. n < 420)
       if (watch%kinetic_is_due(n, 50.0_wp)) then
         kinetic_looks = kinetic_looks + 1
-        call watch%look_at_kinetic(kinetic)
+        call watch%check_kinetic(kinetic)
       end if
       if (watch%keeps(n)) kept = kept + 1
     end do

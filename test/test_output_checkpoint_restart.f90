@@ -37,6 +37,7 @@ contains
       & new_unittest('temperatures that vary in time', test_heated), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
+      & new_unittest('no row of a load step that has not converged', test_no_row), &
       & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
       & new_unittest('results beyond the checkpoint are removed', test_beyond), &
       & new_unittest('a finished run is prolonged', test_longer), &
@@ -531,6 +532,34 @@ contains
         & here//'/pieces/warnings.txt')
     end do
   end subroutine test_ways_to_rest
+
+  !> A relaxation that stops amid its load step has its state as an output, but no row of it: the
+  !> file has the names and the start.
+  subroutine test_no_row(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer(i1), allocatable :: bytes(:)
+    integer(i1), parameter :: end_of_line = 10_i1
+    integer :: piece
+
+    call slow_plate(scene)
+    do piece = 1, 3
+      call run(scene, 'no_row', fault, restart=piece > 1, minutes=1.0e-12_wp)
+      call expect_true(error, allocated(fault), 'one iteration was enough')
+      if (allocated(error)) return
+      call check(error, fault%status, status_interrupted)
+      if (allocated(error)) return
+      call expect_true(error, piece == 1 .or. index(fault%message, 'of load step 1, which is '// &
+        & 'not in equilibrium yet') > 0, fault%message)
+      call read_bytes(here//'/no_row/history.csv', bytes)
+      call check(error, count(bytes == end_of_line), 2, 'lines of the history')
+      if (allocated(error)) return
+      call expect_true(error, file_exists(here//'/no_row/plate_000001.vtu') .eqv. piece > 1, &
+        & 'the state at the stop is an output')
+      if (allocated(error)) return
+    end do
+  end subroutine test_no_row
 
   !> Checkpoints are written by time amid a load step, too: a relaxation whose iterations are used
   !> up goes on from there when it is given more, to the end of one that had them from the start.

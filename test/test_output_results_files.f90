@@ -3,7 +3,7 @@ module test_output_results_files
   use pd_base_error, only: failure_type => error_type
   use pd_base_kinds, only: i8
   use pd_output_results_files, only: cut_file, directory_exists, file_bytes, file_exists, &
-    & in_directory, make_directory, remove_file, rename_file
+    & in_directory, make_directory, remove_empty, remove_file, rename_file
   use pd_output_results_sink, only: sink_type
   use testdrive, only: check, error_type, new_unittest, unittest_type
   implicit none (type, external)
@@ -19,6 +19,7 @@ contains
 
     testsuite = [ &
       & new_unittest('folders', folders), &
+      & new_unittest('empty_folders', empty_folders), &
       & new_unittest('a_file_in_the_way', a_file_in_the_way), &
       & new_unittest('rename_replaces', rename_replaces), &
       & new_unittest('cut', cut), &
@@ -50,6 +51,43 @@ contains
     call make_directory(here//'/one/two/three/', failure)
     call check(error,.not. allocated(failure), 'a folder that is there is refused')
   end subroutine folders
+
+  !> Only folders that are empty and were made are removed, from the lowest up.
+  subroutine empty_folders(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(failure_type), allocatable :: failure
+    integer :: made
+
+    call make_directory(here//'/there', failure)
+    if (.not. allocated(failure)) call make_directory(here//'/there/x/y/', failure, made)
+    call check(error,.not. allocated(failure), 'folders are not made')
+    if (allocated(error)) return
+    call check(error, made, len(here//'/there/x'))
+    if (allocated(error)) return
+    call remove_empty(here//'/there/x/y/', made)
+    call check(error, directory_exists(here//'/there') .and. &
+      & .not. directory_exists(here//'/there/x'), 'more or less than what was made is removed')
+    if (allocated(error)) return
+    call make_directory(here//'/there', failure, made)
+    call check(error, made, 0)
+    if (allocated(error)) return
+    call remove_empty(here//'/there', made)
+    call check(error, directory_exists(here//'/there'), 'a folder that was there is removed')
+    if (allocated(error)) return
+    call make_directory(here//'/there/x/y', failure, made)
+    if (.not. allocated(failure)) call write_file(here//'/there/x/file', 'x', failure)
+    call check(error,.not. allocated(failure))
+    if (allocated(error)) return
+    call remove_empty(here//'/there/x/y', made)
+    call check(error, directory_exists(here//'/there/x') .and. &
+      & .not. directory_exists(here//'/there/x/y'), 'a folder with a file in it')
+    if (allocated(error)) return
+    call remove_file(here//'/there/x/file')
+    call remove_empty(here//'/there/x', made)
+    call check(error,.not. directory_exists(here//'/there/x'))
+    if (allocated(error)) return
+    call remove_file(here//'/there')
+  end subroutine empty_folders
 
   subroutine a_file_in_the_way(error)
     type(error_type), allocatable, intent(out) :: error

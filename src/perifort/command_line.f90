@@ -123,8 +123,7 @@ contains
           if (option_names(at) == name) option = at
         end do
         if (option == 0) then
-          call usage(error, line, "unknown option '"//name//"'"//suggestion(name, option_names) &
-            & //newline//'  known: '//join(option_names, ', '))
+          call unknown_option(line, name, error)
           return
         end if
         if (seen(option) .and. name /= '--set') then
@@ -165,6 +164,22 @@ contains
 
     call check_whole(line, seen, error)
   end subroutine parse_command_line
+
+  !> The error of an unknown option. The known ones are those of the command, or all of them while
+  !> no command has been given.
+  subroutine unknown_option(line, name, error)
+    type(command_line_type), intent(in) :: line
+    character(*), intent(in) :: name
+    type(error_type), allocatable, intent(out) :: error
+    character(word_length), allocatable :: known(:)
+    integer :: i
+
+    known = option_names
+    if (len(line%command) > 0) known = pack(option_names, &
+      & [(belongs(trim(option_names(i)), line%command), i=1, size(option_names))])
+    call usage(error, line, "unknown option '"//name//"'"//suggestion(name, known)//newline// &
+      & '  known: '//join(known, ', '))
+  end subroutine unknown_option
 
   !> Whatever can only be judged when all words are known.
   subroutine check_whole(line, seen, error)

@@ -151,7 +151,7 @@ contains
     !$omp end parallel
   end function joins_labels
 
-  !> Look through the cells around point `k`: the number of its neighbours, and as many of them as
+  !> Search the cells around point `k`: the number of its neighbours, and as many of them as
   !> `found` has room for.
   pure subroutine visit(x, half_reach, cells, k, number, found)
     real(wp), intent(in) :: x(:, :)

@@ -9,7 +9,7 @@ module pd_family_classes
   private
   public :: find_classes
 
-  integer, parameter :: chunk = 65536  !! slots that are looked at before they are numbered
+  integer, parameter :: chunk = 65536  !! slots that are compared before they are numbered
 
 contains
 

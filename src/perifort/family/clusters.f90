@@ -180,7 +180,7 @@ contains
   !> Find for each member of a cluster another one with no lane in common: `partner` gets its place,
   !> 0 for members that stay single, and -1 for those that have become another's partner. Members
   !> with many lanes choose first, and take one that waits, again with as many lanes as fit. Those
-  !> with the same lanes wait in one stack, so that a member looks at 255 stacks at most.
+  !> with the same lanes wait in one stack, so that at most 255 stacks are searched for a member.
   pure subroutine choose_partners(bits, partner)
     integer(i1), intent(in) :: bits(:)
     integer(i4), intent(out) :: partner(:)
@@ -216,7 +216,7 @@ contains
     end do
   end subroutine choose_partners
 
-  !> Look through the cells around cluster `c`: the number of its members, and as many of them as
+  !> Search the cells around cluster `c`: the number of its members, and as many of them as
   !> there is room for.
   pure subroutine visit(x, half_reach, most, rows, c, found, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)

@@ -138,7 +138,7 @@ contains
   !> Number of the points of a body through which a crack runs.
   pure integer function points_on(group, body) result(number)
     type(crack_group), intent(in) :: group   !! the crack
-    type(body_type), intent(in) :: body      !! whose points are looked at, in slots
+    type(body_type), intent(in) :: body      !! whose points are checked, in slots
     type(crack_type) :: crack
     real(wp) :: r(3)
     integer :: k

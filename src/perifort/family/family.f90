@@ -1,4 +1,5 @@
-!> Families say who interacts with whom. The abstract type that lattice and list families extend.
+!> Families: the points with which each point interacts. The abstract type that lattice and list
+!> families extend.
 !>
 !> Everything outside the hot loops works on `bonds_of`, which lists the bonds of one slot.
 module pd_family_family

@@ -72,7 +72,7 @@ contains
       real(wp), intent(in) :: x(:)
       integer :: other
 
-      ! to look at the bonds is cheaper than to look at many boxes
+      ! checking the bonds is cheaper than checking many boxes
       near_another = size(low, 2) > most_boxes
       do other = 1, min(size(low, 2), most_boxes)
         if (near_another) return

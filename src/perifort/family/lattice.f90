@@ -56,8 +56,8 @@ module pd_family_lattice
 
 contains
 
-  !> Whether lattice families can serve a body in point order: every point on a grid, grids that no
-  !> bond joins, and grids filled reasonably. Otherwise `reason` says why not.
+  !> Whether lattice families are possible for a body in point order: every point on a grid, grids
+  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not.
   subroutine lattice_suits(body, rule, suits, reason)
     type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
     type(volume_rule_type), intent(in) :: rule        !! how far families reach

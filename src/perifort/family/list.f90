@@ -113,7 +113,7 @@ contains
     family%most_packs = most_packs
   end subroutine count_bonds
 
-  !> Keep the covered part of each cell: it is too dear to compute in every step.
+  !> Keep the covered part of each cell: computing it in every step is too expensive.
   subroutine store_fractions(family)
     type(list_family_type), intent(inout) :: family
     real(wp) :: xi(family%dim)

@@ -19,7 +19,7 @@ module pd_family_slabs
   end type slabs_type
 
   integer, parameter :: enough = 16       !! slabs that make another axis than the slowest needless
-  integer, parameter :: most_pairs = 64  !! more slabs of a colour than this serve nothing
+  integer, parameter :: most_pairs = 64  !! more slabs of a colour are of no use
   integer, parameter :: least_blocks = 16 !! blocks of a slab, on average
 
 contains

@@ -28,7 +28,7 @@ contains
 
   !> Add the warnings about points, families and cracks of a scene.
   subroutine warn_of_points(scene, body, family, warnings)
-    type(scene_type), intent(in) :: scene            !! whose bodies and cracks are looked at
+    type(scene_type), intent(in) :: scene            !! whose bodies and cracks are checked
     type(body_type), intent(in) :: body  !! its points, arranged in the slots of the family
     class(family_type), intent(in) :: family         !! cracks may be cut
     type(warnings_type), intent(inout) :: warnings   !! added to
@@ -46,12 +46,12 @@ contains
   end subroutine warn_of_points
 
   !> Warn if a body of a 2D or 3D scene has one layer of points only and no neighbour across it: no
-  !> bond tells of its contraction, and it deforms as if that were prevented.
+  !> bond resists its contraction, and it deforms as if that were prevented.
   subroutine warn_of_thickness(body, family, number, name, warnings)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     integer, intent(in) :: number        !! of the body
-    character(*), intent(in) :: name     !! of the body, as told
+    character(*), intent(in) :: name     !! of the body, as in messages
     type(warnings_type), intent(inout) :: warnings
     type(bonds_type) :: bonds
     logical, allocatable :: mine(:)
@@ -87,7 +87,7 @@ contains
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     integer, intent(in) :: number        !! of the body
-    character(*), intent(in) :: name     !! of the body, as told
+    character(*), intent(in) :: name     !! of the body, as in messages
     type(warnings_type), intent(inout) :: warnings
     real(wp) :: spacing
 
@@ -106,7 +106,7 @@ contains
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     integer, intent(in) :: number        !! of the body
-    character(*), intent(in) :: name     !! of the body, as told
+    character(*), intent(in) :: name     !! of the body, as in messages
     type(warnings_type), intent(inout) :: warnings
     real(wp), parameter :: ball(3) = [2.0_wp, pi, 4*pi/3]  ! volume of the unit ball
     type(bonds_type) :: bonds
@@ -159,7 +159,7 @@ contains
       & ') across its plane', tell=.false.)
   end subroutine warn_of_crack
 
-  !> A body as it is told of: by its name, or by its number.
+  !> A body in messages: its name, or its number.
   pure function name_of(scene, number) result(name)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: number

@@ -53,7 +53,7 @@ contains
     class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
     type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
     real(wp), intent(in), contiguous :: u(:, :)  !! displacements (n_slots, dim) [m]
-    integer(i4), allocatable, intent(inout) :: slots(:)  !! where to look, ascending;
+    integer(i4), allocatable, intent(inout) :: slots(:)  !! to be checked, ascending;
                                                          !! then those that lost a bond
     real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
     integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
@@ -168,7 +168,7 @@ contains
   end subroutine group_slots
 
   !> Where the strength of bonds scatters: the smallest critical stretch of each slot's bonds, and
-  !> of all, which tell the loops where to look.
+  !> of all, by which the loops choose the bonds to check.
   subroutine find_weakest(family, model)
     class(family_type), intent(in) :: family   !! whole
     type(model_type), intent(inout) :: model   !! gets `weakest` and a new `least_critical`

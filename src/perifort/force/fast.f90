@@ -88,7 +88,7 @@ contains
     end select
   end subroutine fast_dilatation
 
-  !> The same for forces. With a dilatation its pass has looked at the strain, `missed` is false and
+  !> The same for forces. With a dilatation its pass has checked the strain, `missed` is false and
   !> `left` untouched.
   subroutine fast_force(dim, range, kind, n, m, weight, stretch, shift, geometry, first, u, p, &
     & limit, force, left, missed)

@@ -1,4 +1,4 @@
-!> The internal forces and energies of a whole body, whatever its family: the class is looked at
+!> The internal forces and energies of a whole body, whatever its family: the class is selected
 !> once per pass.
 module pd_force_forces
   use pd_base_error, only: internal_fault
@@ -31,7 +31,7 @@ contains
   !> whoever calls.
   subroutine internal_force(body, family, model, options, workspace, u, p, force, strained, part)
     type(body_type), intent(in) :: body                 !! what the process owns of it
-    class(family_type), intent(in) :: family            !! who interacts with whom
+    class(family_type), intent(in) :: family            !! the bonds of each point
     type(model_type), intent(in) :: model               !! parameters of the slots
     type(force_options_type), intent(in) :: options     !! what the forces take in
     type(workspace_type), intent(inout) :: workspace    !! of this family and model
@@ -107,7 +107,7 @@ contains
 
   !> Strain energy density of all slots [J/m3].
   subroutine energy_pass(family, model, workspace, u, energy)
-    class(family_type), intent(in) :: family          !! who interacts with whom
+    class(family_type), intent(in) :: family          !! the bonds of each point
     type(model_type), intent(in) :: model             !! parameters of the slots
     type(workspace_type), intent(inout) :: workspace  !! of this family and model
     real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]

@@ -55,7 +55,7 @@ contains
     integer, intent(in) :: n               !! offsets whose bonds are taken, the first of the block
     type(weights_type), intent(in) :: weights  !! of the block: shifts, geometry and dilatation
     real(wp), intent(in) :: stretch(:, :)
-      !! (lanes, n) (q_k + q_j) Gb vc V |xi|, less for bonds that were served [N/m2]
+      !! (lanes, n) (q_k + q_j) Gb vc V |xi|, less for bonds computed already [N/m2]
     integer(i8), intent(in) :: first       !! slot of the block's first lane
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     real(wp), intent(in), contiguous :: p(:)

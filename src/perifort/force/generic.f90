@@ -221,7 +221,7 @@ contains
   end subroutine refresh_slot
 
   !> The bonds of slot `k` at displacements `u` as its law sees them, with the committed history.
-  pure subroutine look(model, options, workspace, u, k, seen)
+  pure subroutine gather_bonds(model, options, workspace, u, k, seen)
     type(model_type), intent(in) :: model
     type(force_options_type), intent(in) :: options
     type(generic_workspace_type), intent(in) :: workspace
@@ -245,7 +245,7 @@ contains
     if (size(seen%history, 1) > 0) seen%history(:, :n) = workspace%history(:, first:last)
     seen%of_point = workspace%of_point(:, k)
     seen%constants = workspace%constants(:, k)
-  end subroutine look
+  end subroutine gather_bonds
 
   !> Lengths, stretches without cancellation (doc/theory.md, 2) and, if `projected`, Lambda.
   pure subroutine deform(n_slots, dim, n, member, x, u, k, projected, length, stretch, projection)
@@ -306,7 +306,7 @@ contains
   !> The pulls of all bonds at displacements `u`. Where bonds can break, `strained` becomes 1 for
   !> slots with an intact bond (nearly) beyond its limit, else 0.
   subroutine generic_pulls(family, model, options, workspace, u, strained)
-    class(family_type), intent(in) :: family     !! who interacts with whom
+    class(family_type), intent(in) :: family     !! the bonds of each point
     type(model_type), intent(in) :: model        !! with its laws
     type(force_options_type), intent(in) :: options  !! whether with thermal strain and Lambda
     type(generic_workspace_type), intent(inout) :: workspace  !! gets the pulls
@@ -339,7 +339,7 @@ contains
     integer, intent(in) :: k
     type(law_bonds_type), intent(inout) :: seen
 
-    call look(model, options, workspace, u, k, seen)
+    call gather_bonds(model, options, workspace, u, k, seen)
     associate (first => workspace%start(k), last => workspace%start(k + 1) - 1)
       call model%laws(model%material(k))%law%forces(seen, workspace%pull(first:last))
     end associate
@@ -378,7 +378,7 @@ contains
 
   !> Force density from the pulls of both ends of each bond, along the deformed bond (7.3, 7.4).
   subroutine generic_force(family, workspace, u, force)
-    class(family_type), intent(in) :: family     !! who interacts with whom
+    class(family_type), intent(in) :: family     !! the bonds of each point
     type(generic_workspace_type), intent(in) :: workspace  !! with the pulls at `u`
     real(wp), intent(in), contiguous :: u(:, :)  !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
@@ -466,7 +466,7 @@ contains
     do k = 1, family%n_slots
       energy(k) = 0.0_wp
       if (workspace%start(k + 1) == workspace%start(k)) cycle
-      call look(model, options_of(model), workspace, u, k, seen)
+      call gather_bonds(model, options_of(model), workspace, u, k, seen)
       energy(k) = model%laws(model%material(k))%law%energy(seen)
     end do
     !$omp end parallel
@@ -482,7 +482,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, options_of(model), workspace, u, k, seen)
+    call gather_bonds(model, options_of(model), workspace, u, k, seen)
     energy = model%laws(model%material(k))%law%energy(seen)
   end function generic_point_energy
 
@@ -509,9 +509,9 @@ contains
       end if
       n = int(workspace%start(k + 1) - workspace%start(k))
       call new_law_bonds(family, model, seen)
-      call look(model, options_of(model), workspace, other, k, seen)
+      call gather_bonds(model, options_of(model), workspace, other, k, seen)
       stretch_of_other = seen%stretch(:n)
-      call look(model, options_of(model), workspace, u, k, seen)
+      call gather_bonds(model, options_of(model), workspace, u, k, seen)
       stretch = seen%stretch(:n)
       ! Q(a, b) = Q((a + b)/2) - Q((a - b)/2) of a quadratic form Q
       seen%stretch(:n) = (stretch + stretch_of_other)/2
@@ -531,7 +531,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, options_of(model), workspace, u, k, seen)
+    call gather_bonds(model, options_of(model), workspace, u, k, seen)
     theta = model%laws(model%material(k))%law%dilatation(seen)
   end function generic_point_dilatation
 
@@ -547,7 +547,7 @@ contains
     type(law_bonds_type) :: seen
 
     call new_law_bonds(family, model, seen)
-    call look(model, options_of(model), workspace, u, k, seen)
+    call gather_bonds(model, options_of(model), workspace, u, k, seen)
     damage = damage_seen(model, k, bonds, seen)
   end function generic_point_damage
 
@@ -593,7 +593,7 @@ contains
     do k = 1, family%n_slots
       if (workspace%start(k + 1) == workspace%start(k)) cycle
       call family%bonds_of(k, bonds)
-      call look(model, options_of(model), workspace, undeformed, k, seen)
+      call gather_bonds(model, options_of(model), workspace, undeformed, k, seen)
       seen%volume(:bonds%n) = bonds%weight(:bonds%n)
       call model%laws(model%material(k))%law%stiffness(seen, &
         & own(workspace%start(k):workspace%start(k + 1) - 1))
@@ -645,7 +645,7 @@ contains
         & last => workspace%start(k + 1) - 1)
         if (law%bond_history + law%point_history == 0) cycle
         call family%bonds_of(k, bonds)
-        call look(model, options_of(model), workspace, u, k, seen)
+        call gather_bonds(model, options_of(model), workspace, u, k, seen)
         call law%commit(seen, density(k))
         if (size(seen%history, 1) > 0) workspace%history(:, first:last) = seen%history(:, :seen%n)
         workspace%of_point(:, k) = seen%of_point

@@ -3,7 +3,7 @@
 !> offsets. Broken bonds, large strains and terms that few scenes have cost only the blocks that
 !> have them.
 !>
-!> Bonds that are strained beyond what the fast formulas serve (`pd_force_fast`) are left to the
+!> Bonds that are strained beyond the range of the fast formulas (`pd_force_fast`) are left to the
 !> general formulas, each by its own strain, so that no bond is added twice or undone.
 !>
 !> In 3D and 2D each bond is computed once, from the end whose slot comes first, and added to both
@@ -39,13 +39,13 @@ module pd_force_lattice
 contains
 
   !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps
-  !> in `served` of the workspace which fast formulas serve each block.
+  !> in `formulas_used` of the workspace which fast formulas each block has used.
   subroutine lattice_dilatation(family, model, options, workspace, u, p, strained)
     type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
     type(force_options_type), intent(in) :: options  !! what the forces take in
     type(lattice_workspace_type), intent(inout) :: workspace
-      !! with weights of this model; `served` and what is in single precision are set
+      !! with weights of this model; `formulas_used` and what is in single precision are set
     real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: p(:)
       !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
@@ -79,11 +79,12 @@ contains
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
           if (shared_weights(family, workspace, b, both)) then
             call dilatation_of_block(family, model, options, workspace%singles, both, limit, b, &
-              & workspace%table(workspace%weights(b)), scratch, u, p, workspace%served(b), strained)
+              & workspace%table(workspace%weights(b)), scratch, u, p, &
+              & workspace%formulas_used(b), strained)
           else
             call weights_now(family, model, workspace, b, own)
             call dilatation_of_block(family, model, options, workspace%singles, both, limit, b, &
-              & own, scratch, u, p, workspace%served(b), strained)
+              & own, scratch, u, p, workspace%formulas_used(b), strained)
           end if
         end do
       end do
@@ -146,12 +147,12 @@ contains
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
           if (shared_weights(family, workspace, b, both)) then
             call force_of_block(family, model, options, workspace%singles, both, limit, b, &
-              & workspace%table(workspace%weights(b)), scratch, u, p, workspace%served(b), force, &
-              & strained)
+              & workspace%table(workspace%weights(b)), scratch, u, p, &
+              & workspace%formulas_used(b), force, strained)
           else
             call weights_now(family, model, workspace, b, own)
             call force_of_block(family, model, options, workspace%singles, both, limit, b, own, &
-              & scratch, u, p, workspace%served(b), force, strained)
+              & scratch, u, p, workspace%formulas_used(b), force, strained)
           end if
         end do
       end do
@@ -192,8 +193,8 @@ contains
     !$omp end parallel
   end subroutine lattice_energy
 
-  !> The strains up to which the fast formulas serve: those that are tried first and, where these
-  !> are left, the second; 0: none.
+  !> The strains up to which the fast formulas are valid: those that are tried first and, for bonds
+  !> beyond them, the second; 0: none.
   pure function fast_limits(family, model, options) result(limit)
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
@@ -206,7 +207,7 @@ contains
       return
     end if
     limit(1) = fast_limit(model, options, narrow)
-    ! where bonds break at strains so small that the first serve them all, there is no second
+    ! where bonds break at strains so small that the first are valid for all, there is no second
     limit(2) = fast_limit(model, options, wide)
     if (limit(2) <= limit(1)) limit(2) = 0.0_wp
   end function fast_limits
@@ -274,7 +275,7 @@ contains
   end function shared_weights
 
   !> p of one block; where loops add to both ends of a bond, theta of its bonds added to `p`.
-  !> `range` gets the range of the fast formulas that served it, or 0.
+  !> `range` gets the range of the fast formulas that it has used, or 0.
   subroutine dilatation_of_block(family, model, options, singles, both, limit, b, weights, &
     & scratch, u, p, range, strained)
     type(lattice_family_type), intent(in) :: family
@@ -291,7 +292,7 @@ contains
     integer(i1), intent(out) :: range
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first, last
-    integer :: n, l, served, kind
+    integer :: n, l, formulas, kind
     logical :: missed
 
     kind = dilatation_of(options)
@@ -299,7 +300,7 @@ contains
     last = first + family%block_length - 1
     n = weights%n
     if (both) n = weights%n_forward
-    served = narrow
+    formulas = narrow
     missed = limit(1) <= 0.0_wp
     if (family%mixed) then
       call mixed_dilatation(family, singles, kind, n, limit(1), weights, first, p, &
@@ -309,7 +310,7 @@ contains
         call fast_dilatation(dim, narrow, kind, n, m, w%dilatation, w%shift, w%geometry, first, &
           & u, limit(1), p, left(:, :, 1), missed)
         if (missed .and. limit(2) > 0.0_wp) then
-          served = wide
+          formulas = wide
           if (both) then
             call fast_dilatation(dim, wide, kind, n, m, left(:, :, 1), w%shift, w%geometry, first, &
               & u, limit(2), p, left(:, :, 2), missed)
@@ -320,7 +321,7 @@ contains
         end if
       end associate
     end if
-    range = int(merge(0, served, missed), i1)
+    range = int(merge(0, formulas, missed), i1)
     if (missed) then
       if (.not. both) p(first:last) = 0.0_wp
       if (family%mixed) then
@@ -332,7 +333,7 @@ contains
             & first + l, u, p, strained)
         end do
       else if (both .and. limit(1) > 0.0_wp) then
-        call general_dilatation(model, options, both, n, weights, scratch%left(:, :, served), &
+        call general_dilatation(model, options, both, n, weights, scratch%left(:, :, formulas), &
           & first, u, p, strained)
       else
         call general_dilatation(model, options, both, n, weights, weights%dilatation, first, u, p, &
@@ -346,7 +347,7 @@ contains
   end subroutine dilatation_of_block
 
   !> Forces of one block's bonds, added to `force`. With a dilatation, `range` of the fast formulas
-  !> serves it, if that is not 0.
+  !> is used, if that is not 0.
   subroutine force_of_block(family, model, options, singles, both, limit, b, weights, scratch, u, &
     & p, range, force, strained)
     type(lattice_family_type), intent(in) :: family
@@ -363,7 +364,7 @@ contains
     integer(i1), intent(in) :: range
     integer(i1), intent(inout), contiguous :: strained(:)
     integer(i8) :: first
-    integer :: n, l, served, kind
+    integer :: n, l, formulas, kind
     logical :: fast, missed
 
     kind = dilatation_of(options)
@@ -371,10 +372,10 @@ contains
     n = weights%n
     if (both) n = weights%n_forward
     fast = limit(1) > 0.0_wp
-    served = narrow
+    formulas = narrow
     if (options%dilatation) then
       fast = range > 0_i1
-      served = int(range)
+      formulas = int(range)
     end if
     missed = .not. fast
     if (fast .and. family%mixed) then
@@ -382,10 +383,10 @@ contains
         & scratch%single_left, missed)
     else if (fast) then
       associate (dim => family%dim, m => family%n_slots, w => weights, left => scratch%left)
-        call fast_force(dim, served, kind, n, m, w%dilatation, w%stretch, w%shift, w%geometry, &
+        call fast_force(dim, formulas, kind, n, m, w%dilatation, w%stretch, w%shift, w%geometry, &
           & first, u, p, limit(1), force, left(:, :, 1), missed)
         if (missed .and. limit(2) > 0.0_wp) then
-          served = wide
+          formulas = wide
           if (both) then
             call fast_force(dim, wide, kind, n, m, w%dilatation, left(:, :, 1), w%shift, &
               & w%geometry, first, u, p, limit(2), force, left(:, :, 2), missed)
@@ -406,7 +407,7 @@ contains
           & u, p, force, strained)
       end do
     else if (both .and. fast) then
-      call general_force(model, options, both, n, weights, scratch%left(:, :, served), first, u, &
+      call general_force(model, options, both, n, weights, scratch%left(:, :, formulas), first, u, &
         & p, force, strained)
     else
       call general_force(model, options, both, n, weights, weights%stretch, first, u, p, force, &

@@ -1,6 +1,6 @@
 !> The passes over the bonds of list families, cluster by cluster. Each takes the loop that just
 !> does: for points that are alike or with stored weights, for small strain or larger one; what no
-!> loop serves (strains beyond 5 % or near breaking, temperature) is done by general formulas.
+!> loop is valid for (strains beyond 5 % or near breaking, temperature) is done by general formulas.
 module pd_force_list
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i8
@@ -24,7 +24,7 @@ module pd_force_list
   !> the wide one, beyond.
   integer(i1), parameter :: little = 0_i1, more = 1_i1, beyond = 2_i1
 
-  !> The loops of a pass, and the strains that they serve.
+  !> The loops of a pass, and the strains for which they are valid.
   type :: loops_type
     procedure(pass_loop), pointer, nopass :: plain => null()   !! for clusters without tables,
     procedure(pass_loop), pointer, nopass :: stored => null()  !! with weights,
@@ -140,7 +140,7 @@ contains
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
-      ! the pass before has looked at the strain
+      ! the pass before has checked the strain
       strain = merge(workspace%large(c), little, options%dilatation)
       call sum_up(family, model, options, workspace, loops, work, strain, sums)
       if (strain == beyond) then
@@ -219,11 +219,11 @@ contains
     call new_task(family, model, loops%task)
     loops%narrow = fast_limit(model, options, narrow)
     loops%wide = fast_limit(model, options, wide)
-    ! where bonds break early, it serves no more than the narrow one
+    ! where bonds break early, it is valid no further than the narrow one
     if (loops%wide <= loops%narrow) loops%wide = 0.0_wp
   end subroutine new_loops
 
-  !> Sums of a cluster by the loops that serve its strain, which is at least `strain`; on return
+  !> Sums of a cluster by the loops valid for its strain, which is at least `strain`; on return
   !> `strain` says which did, or that none does.
   subroutine sum_up(family, model, options, workspace, loops, work, strain, sums)
     type(list_family_type), intent(in) :: family

@@ -109,7 +109,7 @@ contains
     case (volume_exact)
       task%volume = stored_fraction
     case default
-      ! a rule that the loops do not know must not look like an answer
+      ! a rule that the loops do not know must not give a result
       task%volume = one_spacing
       task%slope = ieee_value(1.0_wp, ieee_quiet_nan)
     end select

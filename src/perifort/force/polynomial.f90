@@ -57,14 +57,14 @@ module pd_force_polynomial
 
 contains
 
-  !> Whether the fast formulas know every term that is asked for, so that they serve small strains:
-  !> forces and energies both ask here.
+  !> Whether the fast formulas know every term that is asked for, so that they are valid for small
+  !> strains: forces and energies both ask here.
   pure logical function fast_terms(options)
     type(force_options_type), intent(in) :: options  !! what a force or an energy takes in
     fast_terms = .not. options%thermal
   end function fast_terms
 
-  !> Bonds with |e| below this are served by the fast formulas of a `range`; 0: none. Where bonds
+  !> Bonds with |e| below this are computed by the fast formulas of a `range`; 0: none. Where bonds
   !> can break it is no more than the |e| at which the first one might.
   pure real(wp) function fast_limit(model, options, range) result(limit)
     type(model_type), intent(in) :: model            !! with the smallest critical stretch

@@ -349,7 +349,7 @@ contains
     end do
   end subroutine begin_list
 
-  !> All terms go on to the instant of the view.
+  !> All terms advance to the instant of the view.
   subroutine advance_list(self, view)
     class(term_list_type), intent(inout) :: self
       !! the list, with the histories of its terms up to date on return

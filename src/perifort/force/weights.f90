@@ -64,7 +64,7 @@ contains
     end do
     workspace%table = table(:made)
     call compare_surroundings(family, first_of_table, workspace)
-    deallocate (family%class_of)  ! it has done its work
+    deallocate (family%class_of)  ! no longer needed
   end subroutine build_weights
 
   !> Room for what is kept of each block, if there is none: blocks make their weights in every pass
@@ -80,7 +80,7 @@ contains
       return
     end if
     allocate (workspace%weights(size(family%block)), source=0_i4)
-    allocate (workspace%served(size(family%block)), source=0_i1)
+    allocate (workspace%formulas_used(size(family%block)), source=0_i1)
     if (family%mixed) call allocate_singles(family, model, workspace%singles)
   end subroutine prepare_blocks
 

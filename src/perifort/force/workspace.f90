@@ -44,8 +44,8 @@ module pd_force_workspace
     integer(i8) :: room = 256_i8*1024_i8**2    !! that tables may always take [bytes]
     integer(i4), allocatable :: weights(:)     !! which table each block has; 0: none
     type(weights_type), allocatable :: table(:)
-    integer(i1), allocatable :: served(:)      !! range of the fast formulas that served each block
-                                               !! in the last dilatation pass, 0: none
+    integer(i1), allocatable :: formulas_used(:)  !! range of the fast formulas of each block in the
+                                                  !! last dilatation pass, 0: none
     type(singles_type) :: singles              !! in mixed precision
   end type lattice_workspace_type
 

@@ -141,7 +141,7 @@ contains
     if (archive%reading .and. .not. allocated(self%slots)) call internal_fault('an empty load')
   end subroutine keep_nothing
 
-  !> The report of a scene tells of its loads.
+  !> The report of a scene lists its loads.
   function describe_load(self) result(text)
     class(load_type), intent(in) :: self  !! the load
     character(:), allocatable :: text

@@ -1,5 +1,5 @@
-!> What of a system in motion must be kept, so that it can go on after a restart with the same bits,
-!> and a checksum of what must be there before that: all else follows from the scene.
+!> What of a system in motion must be kept, so that it can continue after a restart with the same
+!> bits, and a checksum of what must be there before that: all else follows from the scene.
 module pd_motion_keep
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use pd_base_archive, only: archive_type

@@ -38,7 +38,7 @@ module pd_motion_newton
     real(wp) :: norm = 0.0_wp                 !! curvature if the preconditioner were the stiffness
     logical :: deformed = .false.             !! the tangent at `origin`, else at no displacement
     type(ritz_type) :: ritz
-    ! made anew wherever it goes on
+    ! made anew wherever the solve continues
     real(wp), allocatable :: inverse(:, :)    !! the preconditioner: 1/mass, 0 where held [m4/N]
     real(wp), allocatable :: product(:, :)    !! stiffness times direction [N/m3]
     real(wp), allocatable :: moved(:, :)      !! displacements of a difference [m]
@@ -50,10 +50,10 @@ module pd_motion_newton
     integer :: iterations = 0         !! of all solves
     real(wp) :: softness = 0.0_wp     !! the largest that solves with this kind of stiffness met
     real(wp) :: change = 0.0_wp       !! of displacement in the last iteration, over displacement
-    type(sums_type) :: sums           !! of the last look at the true forces
+    type(sums_type) :: sums           !! of the true forces when last evaluated
     ! the solve
     type(sums_type) :: linear         !! as its equations have it
-    real(wp) :: next_look = 0.0_wp    !! squared residual at which the true forces are evaluated
+    real(wp) :: next_check = 0.0_wp    !! squared residual at which the true forces are evaluated
     real(wp) :: hopeless = 0.0_wp     !! squared residual that no solvable equations reach
     ! between solves
     real(wp) :: before = 0.0_wp       !! squared residual where the solve began
@@ -94,7 +94,7 @@ contains
     call archive%keep('change', newton%change)
     call keep_sums(archive, newton%sums)
     call keep_sums(archive, newton%linear)
-    call archive%keep('next look', newton%next_look)
+    call archive%keep('next look', newton%next_check)
     call archive%keep('hopeless', newton%hopeless)
     call archive%keep('before', newton%before)
     call archive%keep('least', newton%least)

@@ -1,5 +1,5 @@
-!> Who looks at a motion while it runs: integrators and relaxation call an observer once per step,
-!> and know nothing of files and terminals.
+!> Observers of a motion: integrators and relaxation call one once per step, and know nothing of
+!> files and terminals.
 module pd_motion_observer
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
@@ -36,7 +36,7 @@ module pd_motion_observer
     subroutine observe_interface(observer, system, instant, error)
       import :: observer_type, system_type, instant_type, error_type
       implicit none (type, external)
-      class(observer_type), intent(inout) :: observer  !! the one who looks
+      class(observer_type), intent(inout) :: observer  !! the observer
       type(system_type), intent(inout) :: system       !! with its forces; its state must stay
       type(instant_type), intent(in) :: instant        !! which one it is
       type(error_type), allocatable, intent(out) :: error
@@ -45,7 +45,7 @@ module pd_motion_observer
 
 contains
 
-  !> Add to what the user is to be told at this instant.
+  !> Add to the warnings for the user at this instant.
   pure subroutine add_note(instant, text)
     type(instant_type), intent(inout) :: instant  !! with this text behind what it had to tell
     character(*), intent(in) :: text   !! '' adds nothing

@@ -1,6 +1,6 @@
 !> The output of one run, from what is there of earlier ones to the last word: the driver's partner.
 !>
-!>     call output%look_back(scene, options, error)   ! earlier results, a checkpoint to go on from
+!>     call output%look_back(scene, options, error)   ! earlier results, a checkpoint to start from
 !>     call output%foresee(scene, options, set_up, error)      ! probes, schedule, warnings
 !>     call output%open(scene, options, set_up, error)
 !>     ...                                            ! the motion, seen by output%recorder
@@ -30,8 +30,8 @@ module pd_output_run
   private
   public :: run_output_type
 
-  real(wp), parameter :: doubtful_balance = 0.1_wp      !! of the energy in play
-  real(wp), parameter :: doubtful_dissipation = 0.05_wp !! of the dissipated energy
+  real(wp), parameter :: large_balance = 0.1_wp      !! error, of the energy in play
+  real(wp), parameter :: large_dissipation = 0.05_wp !! error, of the dissipated energy
 
   type :: run_output_type
     type(recorder_type) :: recorder           !! sees the motion
@@ -115,7 +115,7 @@ contains
       if (allocated(error)) return
       call keep_checkpoints(scene, options, plan, start, self%directory, self%stem, &
         & self%restart, recorder)
-      call recorder%timer%start('time stepping')
+      call recorder%timer%start(recorder%phase())
     end associate
   end subroutine open_output
 
@@ -141,7 +141,7 @@ contains
         if (allocated(recorder%rescued)) error%message = error%message//newline//'  '// &
           & recorder%rescued
       end if
-      call recorder%timer%stop('time stepping')
+      call recorder%timer%stop(recorder%phase())
       call recorder%progress%finish()
       call recorder%energy_balance(system, balance, share)
       if (.not. allocated(error)) call warn_of_balance(system, recorder, balance, share)
@@ -174,11 +174,11 @@ contains
     real(wp), intent(in) :: balance  !! energy that nothing explains [J]
     real(wp), intent(in) :: share    !! its size over the energy in play [-], < 0 without a balance
 
-    if (share > doubtful_balance) then
+    if (share > large_balance) then
       call recorder%warn('balance', 'the energy balance is off by '//to_text(100*share, 2)// &
         & ' % of the energy: the answer is not reliable; a smaller step may help')
     else if (share >= 0.0_wp .and. abs(system%dissipated) > 0.0_wp .and. &
-      & abs(balance) > doubtful_dissipation*abs(system%dissipated)) then
+      & abs(balance) > large_dissipation*abs(system%dissipated)) then
       call recorder%warn('dissipation', 'the energy balance is off by '// &
         & to_text(100*abs(balance/system%dissipated), 2)// &
         & ' % of the dissipated energy, which is known no better; a smaller step helps')

@@ -2,7 +2,7 @@
 !> Verlet, Adams-Bashforth, Adams-Moulton and Runge-Kutta.
 !>
 !> Every integrator is the same loop: at t_n the forces are brought up to date (which imposes the
-!> constraints and breaks bonds, once per step), the observer looks, and `advance` goes to t_{n+1}.
+!> constraints and breaks bonds, once per step), the observer is called, `advance` goes to t_{n+1}.
 module pd_motion_explicit_integrators
   use pd_base_kinds, only: wp
   use pd_base_order, only: block_points, slots_of_block
@@ -21,7 +21,7 @@ module pd_motion_explicit_integrators
   private
   public :: run_explicit, begin_memory
 
-  !> The state at the beginning of a step, for integrators that look back at it.
+  !> The state at the beginning of a step, for integrators that need it later.
   type :: start_type
     real(wp), allocatable :: u(:, :), v(:, :), a(:, :)
   end type start_type
@@ -76,7 +76,7 @@ contains
         if (allocated(error)) return
       end if
       if (n == steps) exit
-      call look(system, instant, bound, good)
+      call check_energies(system, instant, bound, good)
       if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, squares, sound)
@@ -90,12 +90,12 @@ contains
       call show_good(good, system, observer, error)
       return
     end do
-    system%memory%step = not_begun  ! whoever runs it again begins anew
+    system%memory%step = not_begun  ! another run begins anew
   end subroutine run_explicit
 
-  !> Look at the energies if nobody has for long, and keep a state in which they agree. `bound` is
+  !> Compute the energies if that is long ago, and keep a state in which they agree. `bound` is
   !> what the kinetic energy does not exceed [J].
-  subroutine look(system, instant, bound, good)
+  subroutine check_energies(system, instant, bound, good)
     type(system_type), intent(inout) :: system
     type(instant_type), intent(in) :: instant
     real(wp), intent(in) :: bound
@@ -103,17 +103,17 @@ contains
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :)
 
-    if (system%watch%look_is_due(instant%step)) then
+    if (system%watch%check_is_due(instant%step)) then
       call velocities_now(system, instant%time, instant%kick, v)
       call energies_of(system, v, energies)
-      call system%watch%look(instant%step, energies%kinetic, energies%strain, &
+      call system%watch%check(instant%step, energies%kinetic, energies%strain, &
         & system%dissipated, system%external_work)
     end if
     if (system%watch%kinetic_is_due(instant%step, bound)) &
-      & call system%watch%look_at_kinetic(kinetic_energy(system))
+      & call system%watch%check_kinetic(kinetic_energy(system))
     if (system%watch%keeps(instant%step)) &
       & call keep_good(good, system, instant, system%watch%most_of_good())
-  end subroutine look
+  end subroutine check_energies
 
   !> Kinetic energy of the velocities as the integrator keeps them [J].
   real(wp) function kinetic_energy(system) result(kinetic)

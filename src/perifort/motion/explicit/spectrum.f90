@@ -34,7 +34,7 @@ module pd_motion_explicit_spectrum
   !> Chance that the start vector hides a frequency more than `accuracy` above the one found.
   real(wp), parameter :: chance = 1.0e-6_wp
   integer, parameter :: most_evaluations = 2000  !! no body needs them but by a fault
-  integer, parameter :: look_every = 8           !! evaluations between looks at the Ritz value
+  integer, parameter :: check_every = 8           !! evaluations between checks of the Ritz value
   integer, parameter :: seed = 20250829          !! of the start vector
   !> Bodies have been found unstable from nu = -0.18 downwards (doc/extremes.md).
   real(wp), parameter :: suspicious_ratio = -0.1_wp
@@ -87,7 +87,7 @@ contains
       spectrum%evaluations = m
       ! a length of rounding: the vectors so far hold all that the start vector consists of
       if (length <= 1.0e-13_wp*maxval(abs(diagonal(:m)))) beside(m) = 0.0_wp
-      if (mod(m, look_every) /= 0 .and. beside(m) > 0.0_wp) cycle
+      if (mod(m, check_every) /= 0 .and. beside(m) > 0.0_wp) cycle
       call largest_ritz_value(diagonal(:m), beside(:m - 1), spectrum%squared, last)
       spectrum%residual = beside(m)*last
       spectrum%converged = spectrum%residual <= accuracy*spectrum%squared .and. &
@@ -231,7 +231,7 @@ contains
         & beside(m))
       length = beside(m)
       if (length <= 1.0e-13_wp*maxval(abs(diagonal(:m)))) beside(m) = 0.0_wp
-      if (mod(m, look_every) /= 0 .and. beside(m) > 0.0_wp) cycle
+      if (mod(m, check_every) /= 0 .and. beside(m) > 0.0_wp) cycle
       call largest_ritz_value(diagonal(:m), beside(:m - 1), top, last)
       call largest_ritz_value(-diagonal(:m), beside(:m - 1), bottom, last)
       if (-bottom < surely_negative*top) lowest = -bottom/top

@@ -330,7 +330,7 @@ contains
     squared = max(piece%support, piece%load, piece%thermal)
   end function scale_of
 
-  !> Whether what acts on a piece, if anything does, is too little to be told from rounding.
+  !> Whether what acts on a piece, if anything does, cannot be distinguished from rounding.
   elemental logical function silent(piece)
     type(tally_type), intent(in) :: piece
     silent = scale_of(piece) < audible**2*piece%rounding

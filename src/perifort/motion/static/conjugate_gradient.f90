@@ -1,8 +1,8 @@
 !> Static equilibrium by Newton's method with a conjugate gradient inside (doc/theory.md, 7). The
 !> residual is the force as the model has it; the linear equations take a symmetric stiffness: at
 !> first that of the undeformed body with the bonds it has now, which the fast formulas give, and
-!> where that doesn't serve, the tangent at the present displacements. Where no equilibrium is found
-!> so, dynamic relaxation goes on.
+!> where that fails, the tangent at the present displacements. Where no equilibrium is found
+!> so, dynamic relaxation continues.
 module pd_motion_static_conjugate_gradient
   use pd_base_kinds, only: wp, i1
   use pd_body_body, only: share_halo
@@ -28,15 +28,15 @@ module pd_motion_static_conjugate_gradient
   !> Square of a force [N2] whose energies would be infinities.
   real(wp), parameter :: largest_reference = 1.0e200_wp
   !> The forces are evaluated anew whenever the residual of the linear equations has fallen by this
-  !> factor; a solve ends when what is not linear makes more than `told_apart` of what is left.
-  real(wp), parameter :: between_looks = 0.1_wp, told_apart = 0.3_wp
+  !> factor; a solve ends when what is not linear makes more than `not_linear` of what is left.
+  real(wp), parameter :: between_checks = 0.1_wp, not_linear = 0.3_wp
   !> ... and by this one after the tolerance has been reached, while something is still not known to
   !> be in equilibrium.
-  real(wp), parameter :: between_last_looks = 0.3_wp
+  real(wp), parameter :: between_last_checks = 0.3_wp
   !> Solves that gain nothing any more end at a residual below this and in balance, if the tolerance
   !> asks for more than the rounding of the forces lets them have.
   real(wp), parameter :: stalled = 1.0e-5_wp
-  !> So many iterations tell how soft the stiffness is.
+  !> So many iterations suffice to estimate how soft the stiffness is.
   integer, parameter :: enough_iterations = 10
   !> A solve that leaves more than this of the residual makes the undeformed stiffness give way to
   !> the tangent.
@@ -45,7 +45,7 @@ module pd_motion_static_conjugate_gradient
   !> step.
   real(wp), parameter :: useful_solve = 0.9_wp
   integer, parameter :: most_halvings = 6
-  !> Where points turn about stiff neighbours, the way to rest goes over a hill: so many solves may
+  !> Where points turn about stiff neighbours, the residual may grow on the way: so many solves may
   !> leave a residual up to so many times larger before they have to be taken back.
   integer, parameter :: most_ahead = 3
   real(wp), parameter :: farthest = 1.0e5_wp
@@ -56,30 +56,30 @@ module pd_motion_static_conjugate_gradient
   real(wp), parameter :: diverged = 1.0e6_wp
 
   !> How a solve ended.
-  integer, parameter :: under_way = 0      !! it hasn't
-  integer, parameter :: at_rest = 1        !! converged
-  integer, parameter :: go_on = 2          !! as far as the linear equations tell
-  integer, parameter :: no_stiffness = 3   !! a direction meets none, or a negative one
-  integer, parameter :: used_up = 4        !! no iterations left
+  integer, parameter :: under_way = 0       !! it hasn't
+  integer, parameter :: at_equilibrium = 1  !! converged
+  integer, parameter :: end_of_linear = 2   !! as far as the linear equations are valid
+  integer, parameter :: no_stiffness = 3    !! a direction meets none, or a negative one
+  integer, parameter :: used_up = 4         !! no iterations left
 
 contains
 
-  !> Bring `system`, at rest under earlier conditions, to rest at `instant%time`; bonds don't break.
-  !> If its memory says that it is on the way there, it goes on from where it stands. `trend` is the
-  !> change of displacement in the load step before, or of size 0. If `gave_way`, no rest was found,
-  !> and the displacements are the best on the way. An error is set if the iterations are used up,
-  !> if rounding hides the equilibrium, or if the observer sets one.
+  !> Bring `system`, in equilibrium under earlier conditions, to equilibrium at `instant%time`;
+  !> bonds don't break. If its memory says that it is on the way there, it continues from there.
+  !> `trend` is the change of displacement in the load step before, or of size 0. If `gave_way`, no
+  !> equilibrium was found, and the displacements are the best on the way. An error is set if the
+  !> iterations are used up, if rounding hides the equilibrium, or if the observer sets one.
   subroutine relax_by_conjugate_gradient(system, relaxation, rigid, trend, instant, observer, &
     & gave_way, error)
     type(system_type), intent(inout) :: system
-      !! at rest on return; how far it is meanwhile stands in its memory
+      !! in equilibrium on return; its memory has the progress until then
     type(relaxation_type), intent(in) :: relaxation  !! tolerance, iterations and the preconditioner
     type(rigid_type), intent(in) :: rigid            !! its pieces and their free motions
     real(wp), intent(in) :: trend(:, :)              !! (n_slots, dim), or of 0 rows [m]
     type(instant_type), intent(inout) :: instant
       !! time and load step; gets step, iterations and notes
     class(observer_type), intent(inout) :: observer  !! called once for each iteration
-    logical, intent(out) :: gave_way                 !! dynamic relaxation has to go on
+    logical, intent(out) :: gave_way                 !! dynamic relaxation has to continue
     type(error_type), allocatable, intent(out) :: error
     type(newton_type), allocatable :: newton
     type(balance_type) :: balance
@@ -110,7 +110,7 @@ contains
       amid = .false.
       call solve(system, relaxation, rigid, balance, newton, instant, observer, ended, error)
       if (allocated(error)) return
-      if (ended == at_rest) then
+      if (ended == at_equilibrium) then
         call add_note(instant, rounding_note(relaxation, balance))
         exit
       end if
@@ -177,7 +177,7 @@ contains
 
     associate (krylov => newton%krylov, sums => newton%sums)
       call linearise(system, deformed, krylov)
-      call look(system, t, krylov, sums)
+      call evaluate_residual(system, t, krylov, sums)
       allocate (imposed, source=system%state%u)
       allocate (rate, source=system%state%v)
       call impose(system%motions, t, imposed, rate)
@@ -198,8 +198,9 @@ contains
     end associate
   end subroutine begin
 
-  !> After a solve that has not come to rest: whether it has gained, goes uphill for a while, has to
-  !> be taken back or shortened, and where the next one is linearised. `gave_way`: nothing helps.
+  !> After a solve without equilibrium: whether the residual has fallen, may grow for a while, or
+  !> the solve has to be taken back or shortened, and where the next one is linearised. `gave_way`:
+  !> nothing helps.
   subroutine judge(system, t, trend, ended, newton, gave_way)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
@@ -236,7 +237,7 @@ contains
           call begin(system, t, trend, deformed, newton)
           return
         end if
-        call look(system, t, krylov, newton%sums)
+        call evaluate_residual(system, t, krylov, newton%sums)
       else
         call shorten(system, t, krylov, newton%sums, gave_way)
         if (residual > slow_solve**2*newton%least) newton%slow = newton%slow + 1
@@ -263,12 +264,12 @@ contains
     call free_of_rigid_motion(system, rigid, newton%krylov)
     call first_direction(system, newton%krylov)
     newton%hopeless = diverged**2*newton%linear%residual
-    newton%next_look = between_looks**2*newton%linear%residual
+    newton%next_check = between_checks**2*newton%linear%residual
   end subroutine begin_solve
 
-  !> Conjugate gradient on the linear equations, which moves the system along and looks at the true
-  !> forces now and then. At its end the forces, the residual and the sums are true. All that one
-  !> iteration leaves to the next is in `newton`, so that it can end and go on between any two.
+  !> Conjugate gradient on the linear equations, which moves the system along and evaluates the
+  !> true forces now and then. At its end the forces, the residual and the sums are true. All that
+  !> one iteration leaves to the next is in `newton`, so that it can be interrupted between any two.
   subroutine solve(system, relaxation, rigid, balance, newton, instant, observer, ended, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
@@ -283,7 +284,7 @@ contains
 
     do
       limit = relaxation%tolerance**2*max(balance%acting, newton%linear%support)
-      if (newton%linear%residual <= newton%next_look .or. &
+      if (newton%linear%residual <= newton%next_check .or. &
         & (newton%linear%residual <= limit .and. .not. newton%asked)) then
         newton%asked = newton%linear%residual <= limit
         call compare(system, relaxation, rigid, balance, instant, newton, ended)
@@ -301,7 +302,7 @@ contains
       call show(system, newton, instant, observer, error)
       if (allocated(error)) return
     end do
-    call look(system, instant%time, newton%krylov, newton%sums)
+    call evaluate_residual(system, instant%time, newton%krylov, newton%sums)
     instant%residual = relative(newton%sums%residual, max(balance%acting, newton%sums%support))
     if (ended == used_up) call weigh(system, relaxation, rigid, instant%time, balance)
   end subroutine solve
@@ -319,19 +320,20 @@ contains
 
     associate (krylov => newton%krylov, sums => newton%sums, linear => newton%linear)
       predicted = krylov%residual
-      call look(system, instant%time, krylov, sums)
+      call evaluate_residual(system, instant%time, krylov, sums)
       call weigh(system, relaxation, rigid, instant%time, balance)
       instant%residual = relative_residual(balance)
-      ended = at_rest
+      ended = at_equilibrium
       if (linear%change <= relaxation%tolerance**2*linear%displacement) then
         if (in_equilibrium(system, relaxation, rigid, newton, balance)) return
       end if
-      ended = go_on
-      if (squared_force(system, predicted - krylov%residual) > told_apart**2*linear%residual) return
+      ended = end_of_linear
+      if (squared_force(system, predicted - krylov%residual) > not_linear**2*linear%residual) return
       ended = under_way
       ! the directions are conjugate with the linear residual
       krylov%residual = predicted
-      newton%next_look = merge(between_last_looks, between_looks, newton%asked)**2*linear%residual
+      newton%next_check = linear%residual &
+        & *merge(between_last_checks, between_checks, newton%asked)**2
     end associate
   end subroutine compare
 
@@ -377,8 +379,8 @@ contains
     end associate
   end subroutine iterate
 
-  !> Let the observer see an iteration. What goes on with it is in the system's memory then, where a
-  !> checkpoint finds it.
+  !> Call the observer after an iteration. All that the next one needs is in the system's memory
+  !> then, where a checkpoint finds it.
   subroutine show(system, newton, instant, observer, error)
     type(system_type), intent(inout) :: system
     type(newton_type), allocatable, intent(inout) :: newton
@@ -396,7 +398,7 @@ contains
 
   !> The true forces at the present displacements, the residual that the loads at `t` leave, and its
   !> sums.
-  subroutine look(system, t, krylov, sums)
+  subroutine evaluate_residual(system, t, krylov, sums)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
     type(krylov_type), intent(inout) :: krylov
@@ -404,7 +406,7 @@ contains
 
     call renew_forces(system, t)
     call take_residual(system, t, krylov, sums)
-  end subroutine look
+  end subroutine evaluate_residual
 
   !> After a solve with the tangent that has not taken much of the residual: a shorter step.
   subroutine shorten(system, t, krylov, sums, failed)
@@ -420,7 +422,7 @@ contains
     whole = sums%residual
     step = merge(system%state%u - krylov%origin, 0.0_wp, system%held == 0_i1)
     system%state%u = system%state%u - step
-    call look(system, t, krylov, sums)
+    call evaluate_residual(system, t, krylov, sums)
     base = sums%residual
     failed = .false.
     part = 1.0_wp
@@ -430,7 +432,7 @@ contains
         cycle
       end if
       system%state%u = system%state%u + part*step
-      call look(system, t, krylov, sums)
+      call evaluate_residual(system, t, krylov, sums)
       if (sums%residual < (1 - (1 - useful_solve)*part)**2*base) return
       system%state%u = system%state%u - part*step
       part = part/2

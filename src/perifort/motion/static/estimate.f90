@@ -1,5 +1,5 @@
 !> How far the displacements of a state are from equilibrium, which its residual alone does not
-!> tell: a slender beam, or a stiff block on a soft pad, has a small residual long before.
+!> show: a slender beam, or a stiff block on a soft pad, has a small residual long before.
 module pd_motion_static_estimate
   use pd_base_kinds, only: wp, i1
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
@@ -23,7 +23,7 @@ module pd_motion_static_estimate
 contains
 
   !> Whether the error energy of every piece is within `allowed`. The correction that the present
-  !> tangent and residual ask for is looked for by conjugate gradients; the energy of the error is
+  !> tangent and residual ask for is computed by conjugate gradients; the energy of the error is
   !> the sum of what the iterations gain, as far as they have come, and the softest answer they have
   !> met bounds the rest. A tangent that is not positive says nothing: then `within` is true, and
   !> there is nothing but the residual to go by. The system is left as it was.

@@ -34,8 +34,8 @@ module pd_motion_static_relaxation
   integer, parameter :: judged_anyway = 200
   !> Iterations between two judgements, at least, and as a part of those that have been made.
   integer, parameter :: least_wait = 10, wait_part = 20
-  !> Iterations of dynamic relaxation after which conjugate gradients go on: on slender bodies and
-  !> large contrasts of stiffness its slowest mode needs millions.
+  !> Iterations of dynamic relaxation after which conjugate gradients continue: on slender bodies
+  !> and large contrasts of stiffness its slowest mode needs millions.
   integer, parameter :: patience = 100000
   !> Iterations that an estimate of the error may take.
   integer, parameter :: most_estimating = 20000
@@ -57,7 +57,7 @@ module pd_motion_static_relaxation
 contains
 
   !> Bring `system` to equilibrium under the conditions at each load step's time i/load_steps; if
-  !> its memory says that it has begun, it goes on from there. An error is set if there is no
+  !> its memory says that it has begun, it continues from there. An error is set if there is no
   !> equilibrium, if it is not found, or if the observer sets one.
   subroutine run_relaxation(system, relaxation, observer, error)
     type(system_type), intent(inout) :: system
@@ -152,12 +152,12 @@ contains
       if (allocated(error)) return
       call keep_good(good, system, instant)
     end do
-    system%memory%step = not_begun  ! whoever runs it again begins anew
+    system%memory%step = not_begun  ! another run begins anew
   end subroutine run_relaxation
 
-  !> Go on by conjugate gradients where dynamic relaxation has not converged, and say so; where they
-  !> end without an answer, dynamic relaxation begins anew from there, once. Its first error stays
-  !> if that finds no equilibrium either.
+  !> Continue by conjugate gradients where dynamic relaxation has not converged, and say so; where
+  !> they end without an answer, dynamic relaxation begins anew from there, once. Its first error
+  !> stays if that finds no equilibrium either.
   subroutine finish_by_conjugate_gradient(system, relaxation, rigid, instant, observer, error)
     type(system_type), intent(inout) :: system       !! where dynamic relaxation ended
     type(relaxation_type), intent(in) :: relaxation
@@ -185,7 +185,7 @@ contains
     end if
   end subroutine finish_by_conjugate_gradient
 
-  !> An error if the force of some term depends on displacements in a way that it does not tell.
+  !> An error if the force of some term depends on displacements for which it has no tangent.
   subroutine check_terms(system, error)
     type(system_type), intent(in) :: system
     type(error_type), allocatable, intent(out) :: error
@@ -263,7 +263,7 @@ contains
     if (allocated(instant%note)) deallocate (instant%note)
   end subroutine settle
 
-  !> Iterate to equilibrium at `instant%time`, or go on in the midst of that.
+  !> Iterate to equilibrium at `instant%time`, or continue within that.
   subroutine relax(system, relaxation, rigid, instant, observer, unfinished, error)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation
@@ -367,7 +367,7 @@ contains
   end subroutine relax
 
   !> Whether the state is in equilibrium, and known to be near enough to it; if it isn't, when to
-  !> look again.
+  !> check again.
   subroutine judge(system, relaxation, rigid, t, balance, accepted)
     type(system_type), intent(inout) :: system
     type(relaxation_type), intent(in) :: relaxation

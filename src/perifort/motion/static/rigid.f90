@@ -17,7 +17,7 @@ module pd_motion_static_rigid
 
   real(wp), parameter :: balanced = 1.0e-10_wp  !! net force and moment over the applied ones
   real(wp), parameter :: held_at_all = 1.0e-12_wp
-  integer, parameter :: most_turns = 60         !! iterations that look for a finite rotation
+  integer, parameter :: most_turns = 60         !! iterations to find a finite rotation
   real(wp), parameter :: negligible = 1.0e-14_wp !! motion over the displacements
 
   !> A piece, and its free rigid motions as combinations of three translations and three rotations.

@@ -117,7 +117,7 @@ contains
     integer :: k
 
     allocate (acted(rigid%pieces%number), source=.false.)
-    ! where terms of the force let a piece rest is theirs to say
+    ! the equilibrium of a piece depends on the terms of the force
     if (system%terms%number() > number_of_loads(system%terms)) acted = .true.
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)

@@ -13,7 +13,7 @@ module pd_motion_watch_fault
   public :: faulty_slot, stays_within, points_at_once, explain_fault, check_strain_energy, place, &
     & greatest_stretch
 
-  !> Points of a block whose rates are summed up by themselves: few enough to tell of the largest,
+  !> Points of a block whose rates are summed up by themselves: few enough to bound the largest,
   !> and a few kB of each array.
   integer, parameter :: points_at_once = 512
   real(wp), parameter :: large_stretch = 0.1_wp  !! beyond it a bond is noticeably stiffer [-]
@@ -23,7 +23,7 @@ contains
   !> The slot where a motion is none any more: a rate that is not finite, or that carries a point
   !> across its horizon in one step `dt`; 0 if all is well. Cheap enough for every step. `squares`
   !> gets the sum of the squares of all components, whose rounding depends on the number of threads:
-  !> it is a bound for those who watch, and no answer depends on its last digits.
+  !> it is a bound for the watch over the energy, and no answer depends on its last digits.
   integer function faulty_slot(system, rate, dt, squares) result(slot)
     type(system_type), intent(in) :: system     !! its horizon
     real(wp), intent(in), contiguous :: rate(:, :)
@@ -65,8 +65,8 @@ contains
   !> Whether all rates are finite and carry no point across its horizon in one step `dt`. `squares`
   !> is the sum of their squares, `largest_sum` the largest one of a component of a block, whose
   !> root none of them exceeds: sums are formed in passing, where the largest rate would cost as
-  !> much as the rest of the pass. They tell as long as a block whose points all move alike moves by
-  !> less than a twentieth of the horizon; else the largest rate is looked for.
+  !> much as the rest of the pass. They suffice as long as a block whose points all move alike moves
+  !> by less than a twentieth of the horizon; else the largest rate is computed.
   logical function stays_within(system, rate, dt, squares, largest_sum)
     type(system_type), intent(in) :: system  !! its horizon
     real(wp), intent(in), contiguous :: rate(:, :)
@@ -165,7 +165,7 @@ contains
 
   !> An error if the strain energy at time `t` [s] is below zero [J]. Only a < 0 can make it so, by
   !> dilatation: with a Poisson's ratio near -1 the corrected dilatation of corners outweighs the
-  !> energy of their bonds. Such a body has no state of rest and blows itself up, at any step. The
+  !> energy of their bonds. Such a body has no static equilibrium and is unstable at any step. The
   !> projected dilatation leaves the sign of energies open that are small beside the kinetic one.
   subroutine check_strain_energy(system, energies, t, error)
     type(system_type), intent(in) :: system      !! its materials and the rounding of its energies

@@ -22,7 +22,7 @@ module pd_motion_watch_rescue
 contains
 
   !> Keep the state of this instant, whose forces are known, in the place of the one before. If it
-  !> is ever wanted, it must not have more energy than `most` [J]: looking at that costs as much as
+  !> is ever wanted, it must not have more energy than `most` [J]: computing that costs as much as
   !> several steps.
   subroutine keep_good(good, system, instant, most)
     type(good_state_type), intent(inout) :: good  !! gets this state

@@ -135,13 +135,13 @@ contains
   end function checkpoint_bytes
 
   !> Begin: the clock runs from here. With the path '' none is ever due.
-  subroutine start(self, path, every, minutes, goes_on, keep_newest)
+  subroutine start(self, path, every, minutes, resumed, keep_newest)
     class(checkpoint_type), intent(inout) :: self  !! nothing written yet, or as of a run that goes
                                                    !! on
     character(*), intent(in) :: path               !! of the newest checkpoint
     integer, intent(in) :: every  !! steps (in a relaxation iterations) between two; 0: not by steps
     real(wp), intent(in) :: minutes                !! wall time between two; 0: not by time [min]
-    logical, intent(in) :: goes_on      !! the run has checkpoints from before
+    logical, intent(in) :: resumed      !! the run has checkpoints from before
     logical, intent(in) :: keep_newest  !! the newest of them is whole
 
     self%path = path
@@ -149,7 +149,7 @@ contains
     self%every = merge(every, 0, self%in_files)
     self%minutes = merge(minutes, 0.0_wp, self%in_files)
     self%keep_newest = keep_newest
-    self%written = merge(1, 0, goes_on)
+    self%written = merge(1, 0, resumed)
     self%last = wall_time()
   end subroutine start
 

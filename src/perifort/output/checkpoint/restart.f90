@@ -1,4 +1,4 @@
-!> Going on with a run from a checkpoint: which one, whether it fits the scene, and putting the run
+!> Continuing a run from a checkpoint: which one, whether it fits the scene, and putting the run
 !> back to where it was.
 module pd_output_checkpoint_restart
   use pd_base_error, only: error_type, fail, internal_fault
@@ -26,12 +26,12 @@ module pd_output_checkpoint_restart
 
   !> The state from which a run continues.
   type :: restart_type
-    logical :: found = .false.         !! there is a checkpoint to go on from
+    logical :: found = .false.         !! there is a checkpoint to start from
     logical :: complete = .false.      !! the run is complete: there is nothing to do
     logical :: newest = .true.         !! it is the newest of its run
     type(about_type) :: about
     type(reader_type) :: reader        !! open, at the system
-    character(:), allocatable :: note  !! what the user is told
+    character(:), allocatable :: note  !! message to the user
     logical :: longer = .false.        !! the end of the run may have changed
   end type restart_type
 
@@ -51,7 +51,7 @@ contains
     character(*), intent(in) :: named  !! path of a checkpoint, '' = the run's newest
     type(scene_type), intent(in) :: scene       !! the present one
     character(*), intent(in) :: command  !! starts the run again with `--restart`, for messages
-    type(restart_type), intent(out) :: restart  !! where to go on, with its file open at the system
+    type(restart_type), intent(out) :: restart  !! where to start, with its file open at the system
                                                 !! if one is found
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: path, newest

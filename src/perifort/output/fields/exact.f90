@@ -11,7 +11,7 @@ module pd_output_fields_exact
     logical :: known = .false.             !! the place and time belong to the answer: displacement
     logical :: knows_velocity = .false.
     logical :: knows_strain = .false.      !! dilatation and energy density
-    logical :: in_equilibrium = .false.    !! at rest and whole: no internal force, no damage
+    logical :: in_equilibrium = .false.    !! in equilibrium and whole: no internal force, no damage
     real(wp) :: displacement(3) = 0.0_wp   !! [m]
     real(wp) :: velocity(3) = 0.0_wp       !! [m/s]
     real(wp) :: dilatation = 0.0_wp        !! [-]

@@ -1,7 +1,7 @@
 !> A field of the output: what is known of a quantity that every point has.
 !>
-!> One description serves the results files, the probes, the columns of the history and the studies.
-!> Each field has a module of its own in this folder; `pd_output_fields_table` lists them.
+!> One description is used by the results files, the probes, the columns of the history and the
+!> studies. Each field has a module of its own in this folder; `pd_output_fields_table` lists them.
 module pd_output_fields_field
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp

@@ -16,17 +16,17 @@ contains
     type(system_type), intent(in) :: system
     type(recorder_type), intent(in) :: recorder
     character(*), intent(in) :: directory   !! of the results; '' = there are no files
-    character(:), allocatable :: text, parts
-    real(wp) :: balance, share
+    character(:), allocatable :: text, parts, unit
+    real(wp) :: balance, share, seconds
     integer :: steps
 
     text = recorder%timer%table()//newline
     steps = recorder%steps_done - recorder%first_step
+    unit = trim(merge('iteration', 'step     ', recorder%schedule%relaxation))
+    seconds = recorder%timer%seconds(recorder%phase())
     if (steps > 0) text = text//line('speed', &
-      & to_text(1.0e9_wp*recorder%timer%seconds('time stepping') &
-      & /(real(system%family%n_bonds, wp)*steps), 3)//' ns per bond and step, '// &
-      & to_text(steps/max(1.0e-9_wp, recorder%timer%seconds('time stepping')), 4)// &
-      & trim(merge(' iterations/s', ' steps/s     ', recorder%schedule%relaxation)))
+      & to_text(1.0e9_wp*seconds/(real(system%family%n_bonds, wp)*steps), 3)// &
+      & ' ns per bond and '//unit//', '//to_text(steps/max(1.0e-9_wp, seconds), 4)//' '//unit//'s/s')
     if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
     if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
       & 'load step')//' left to dynamic relaxation by the conjugate gradient')

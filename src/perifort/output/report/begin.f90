@@ -31,10 +31,10 @@ module pd_output_report_begin
     character(:), allocatable :: command           !! as typed, kept in the results
     integer :: threads = 0                         !! 0 = as many as OpenMP offers
     logical :: overwrite = .false.                 !! replace results that are there
-    logical :: restart = .false.                   !! go on from a checkpoint, if there is one
+    logical :: restart = .false.                   !! continue from a checkpoint, if there is one
     character(:), allocatable :: checkpoint        !! its path; '' = the newest of the run
     real(wp) :: max_minutes = 0.0_wp               !! of wall time, then stop in order; 0 = no limit
-    character(:), allocatable :: restart_command   !! goes on with the run, for messages
+    character(:), allocatable :: restart_command   !! continues the run, for messages
     logical :: quiet = .false.                     !! print nothing
     type(field_table_type), allocatable :: fields  !! that scenes may name; none = `all_fields`
   end type run_options_type
@@ -57,6 +57,7 @@ contains
     real(wp), allocatable :: positions(:, :)
     type(kept_type), allocatable :: kept
     type(field_table_type) :: table
+    type(error_type), allocatable :: ignored
     character(:), allocatable :: command
     integer :: f, c
 
@@ -82,8 +83,11 @@ contains
         & program_version, options%overwrite .or. options%restart, error, kept)
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
-      if (.not. recorder%results%goes_on()) call put_points(scene, body, recorder, error)
-      if (allocated(error)) return
+      if (.not. recorder%results%resumes()) call put_points(scene, body, recorder, error)
+      if (allocated(error)) then
+        call recorder%results%close(ignored)
+        return
+      end if
       call recorder%progress%start(int(plan%steps, i8), output_is_terminal(), options%quiet, &
         & first_step=int(merge(system%memory%load_step, restart%about%step, plan%relaxes), &
         & i8), load=plan%relaxes)
@@ -124,7 +128,7 @@ contains
     path = ''
     if (directory /= '') path = checkpoint_path(directory, stem)
     call recorder%checkpoint%start(path, &
-      & scene%output%checkpoint_every, scene%output%checkpoint_minutes, goes_on=restart%found, &
+      & scene%output%checkpoint_every, scene%output%checkpoint_minutes, resumed=restart%found, &
       & keep_newest=restart%newest)
     if (.not. restart%found) return
     recorder%first_step = restart%about%step

@@ -1,4 +1,4 @@
-!> There is no contact: separated or crushed pieces pass through each other. This looks for the
+!> There is no contact: separated or crushed pieces pass through each other. This searches for the
 !> first pair of points that do, so that a run can say so.
 module pd_output_report_contact
   use pd_base_kinds, only: wp, i4

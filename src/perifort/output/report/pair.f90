@@ -31,11 +31,11 @@ contains
 
     if (associated(observer%own) .and. .not. instant%rescued) then
       associate (timer => observer%recorder%timer)
-        call timer%stop('time stepping')
+        call timer%stop(observer%recorder%phase())
         call timer%start(phase)
         call observer%own%observe(system, instant, error)
         call timer%stop(phase)
-        call timer%start('time stepping')
+        call timer%start(observer%recorder%phase())
       end associate
       if (allocated(error)) then
         observer%own_fault = error%status /= status_interrupted

@@ -49,7 +49,7 @@ module pd_output_report_recorder
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
-    integer :: more_outputs = 0              !! which goes on would not have
+    integer :: more_outputs = 0              !! which continues would not have
     real(wp) :: most_seconds = 0.0_wp        !! wall time until the run stops by itself, if > 0 [s]
     character(:), allocatable :: command     !! continues the run; '' = not possible
     character(:), allocatable :: wish        !! why another observer asks to stop in order
@@ -59,6 +59,7 @@ module pd_output_report_recorder
     procedure :: keep_state
     procedure :: warn
     procedure :: energy_balance
+    procedure :: phase
   end type recorder_type
 
 contains
@@ -104,12 +105,13 @@ contains
       & .or. allocated(observer%wish))
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
     keeping = keeping .and. observer%checkpoint%in_files
-    row = row_due .or. stopping .or. instant%last
+    ! the history has no row of a load step that has not converged
+    row = row_due .or. ((stopping .or. instant%last) .and. instant%settled)
     output = output_due .or. stopping .or. instant%last
     observer%more_rows = merge(1, 0, row .and. .not. row_due)
     observer%more_outputs = merge(1, 0, output .and. .not. output_due)
     if (.not. (row .or. output .or. keeping)) return
-    call observer%timer%stop('time stepping')
+    call observer%timer%stop(observer%phase())
     call velocities_now(system, instant%time, instant%kick, v)
     if (row) then
       call observer%timer%start('energies and history')
@@ -123,16 +125,16 @@ contains
       call write_output(observer, system, instant, v, error)
       ! a restarted run does not have the output that is written because the run stops
       if (output_due .or. instant%last) then
-        call tell(observer, 'contact', contact_warning(system, instant%time))
+        call warn_if_any(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
-          & call tell(observer, 'strain', strain_warning(system, instant%time))
+          & call warn_if_any(observer, 'strain', strain_warning(system, instant%time))
       end if
       call observer%results%put_warnings(observer%warnings%text())
       call observer%timer%stop('output')
       if (allocated(error)) return
     end if
     if (keeping) call observer%keep_state(system, finished=.false.)
-    call observer%timer%start('time stepping')
+    call observer%timer%start(observer%phase())
     if (stopping) call fail(error, reason_to_stop(observer%most_seconds, observer%wish)//' at '// &
       & place_of(instant, observer%schedule%relaxation)// &
       & ': this state is the last output'//way_on(observer), status_interrupted)
@@ -151,6 +153,13 @@ contains
       & 'equilibrium in load step '//to_text(instant%load_step)//': dynamic relaxation '// &
       & 'continues from the present state')
   end subroutine note_giving_way
+
+  !> Name of the motion in the table of times.
+  pure function phase(self) result(name)
+    class(recorder_type), intent(in) :: self  !! with its schedule
+    character(:), allocatable :: name
+    name = trim(merge('iterations   ', 'time stepping', self%schedule%relaxation))
+  end function phase
 
   !> Whether the run has had the time that it was given.
   logical function time_is_over(recorder)
@@ -181,7 +190,7 @@ contains
       call velocities_now(system, instant%time, instant%kick, v)
       call write_output(recorder, system, instant, v, error)
       if (allocated(error)) return
-      call tell(recorder, 'contact', contact_warning(system, instant%time))
+      call warn_if_any(recorder, 'contact', contact_warning(system, instant%time))
       call recorder%results%put_warnings(recorder%warnings%text())
     end if
     recorder%rescued = state//' is the last output'
@@ -226,11 +235,11 @@ contains
   end subroutine keep_state
 
   !> Note a warning unless it is ''.
-  subroutine tell(recorder, subject, text)
+  subroutine warn_if_any(recorder, subject, text)
     class(recorder_type), intent(inout) :: recorder
     character(*), intent(in) :: subject, text
     if (len(text) > 0) call recorder%warn(subject, text)
-  end subroutine tell
+  end subroutine warn_if_any
 
   !> Note a warning; the first of a subject is printed at once.
   subroutine warn(recorder, subject, text)
@@ -253,7 +262,7 @@ contains
 
     associate (balance => recorder%balance)
       call energies_of(system, v, balance%energies)
-      call system%watch%look(instant%step, balance%energies%kinetic, balance%energies%strain, &
+      call system%watch%check(instant%step, balance%energies%kinetic, balance%energies%strain, &
         & system%dissipated, system%external_work)
       if (recorder%rows == 0) call balance%begin(system)
       now%system => system
@@ -267,7 +276,7 @@ contains
     if (.not. recorder%turned) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0
-      call tell(recorder, 'rotation', warning)
+      call warn_if_any(recorder, 'rotation', warning)
     end if
     if (.not. allocated(error)) call check_strain_energy(system, recorder%balance%energies, &
       & instant%time, error)

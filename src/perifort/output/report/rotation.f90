@@ -8,7 +8,7 @@ module pd_output_report_rotation
   private
   public :: turned_part, rotation_angle
 
-  integer, parameter :: most_samples = 200      !! points that are looked at
+  integer, parameter :: most_samples = 200      !! points that are checked
   real(wp), parameter :: least_intact = 0.5_wp  !! of a family's volume; points with less are loose
   real(wp), parameter :: golden = 0.61803398874989485_wp
 

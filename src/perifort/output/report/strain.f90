@@ -10,7 +10,7 @@ module pd_output_report_strain
 
   real(wp), parameter :: large_strain = 0.1_wp  !! of an intact bond [-]
   !> Part of the energy of a uniaxial stress at that strain which a point must hold before its bonds
-  !> are looked at, which takes long. Points at surfaces hold half of it, or less.
+  !> are checked, which takes long. Points at surfaces hold half of it, or less.
   real(wp), parameter :: suspicious = 0.25_wp
 
 contains

@@ -6,8 +6,8 @@ module pd_output_results_files
   use pd_base_kinds, only: i8
   implicit none (type, external)
   private
-  public :: make_directory, rename_file, remove_file, cut_file, file_exists, directory_exists, &
-    & file_bytes, set_environment, in_directory, sync_path
+  public :: make_directory, remove_empty, rename_file, remove_file, cut_file, file_exists, &
+    & directory_exists, file_bytes, set_environment, in_directory, sync_path
 
   ! allow(C071)
   interface  ! C's texts have no other form
@@ -17,6 +17,12 @@ module pd_output_results_files
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: mode
     end function c_mkdir
+
+    integer(c_int) function c_rmdir(path) bind(c, name='rmdir')
+      import :: c_char, c_int
+      implicit none (type, external)
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_rmdir
 
     integer(c_int) function c_rename(from, to) bind(c, name='rename')
       import :: c_char, c_int
@@ -73,21 +79,49 @@ contains
 
   !> Make a folder and the folders above it; those that are there are left alone.
   !> Fails with the path and the system's reason.
-  subroutine make_directory(path, error)
+  subroutine make_directory(path, error, made)
     character(*), intent(in) :: path  !! of the folder; '' for the current one
     type(error_type), allocatable, intent(out) :: error
+    !> length of the part of `path` that is the first folder made; 0 if none was made, or after an
+    !> error
+    integer, intent(out), optional :: made
     integer(c_int), parameter :: everyone = int(o'777', c_int)
-    integer :: i
-    integer(c_int) :: status
+    integer :: i, first
 
+    first = 0
+    if (present(made)) made = 0
     if (len_trim(path) == 0) return
-    do i = 2, len_trim(path)
-      if (path(i:i) == '/') status = c_mkdir(path(:i - 1)//c_null_char, everyone)
+    do i = 2, len_trim(path) + 1
+      if (i <= len_trim(path)) then
+        if (path(i:i) /= '/') cycle
+      end if
+      if (c_mkdir(path(:i - 1)//c_null_char, everyone) == 0_c_int .and. first == 0) first = i - 1
     end do
-    status = c_mkdir(trim(path)//c_null_char, everyone)
-    if (directory_exists(path)) return
+    if (directory_exists(path)) then
+      if (present(made)) made = first
+      return
+    end if
     call fail(error, 'cannot make the folder '//trim(path)//': '//reason_for(trim(path)))
+    if (first > 0) call remove_empty(path, first)
   end subroutine make_directory
+
+  !> Remove a folder that is empty, and thereafter those above it that are empty then. The first
+  !> one that is not stays, and all above it. A failure is not reported.
+  subroutine remove_empty(path, made)
+    character(*), intent(in) :: path  !! of the folder
+    integer, intent(in) :: made       !! as from `make_directory`: length of the path of the topmost
+                                      !! folder that may be removed; 0: none
+    integer(c_int) :: status
+    integer :: i
+
+    if (made == 0) return
+    do i = len_trim(path) + 1, made + 1, -1
+      if (i <= len_trim(path)) then
+        if (path(i:i) /= '/') cycle
+      end if
+      status = c_rmdir(path(:i - 1)//c_null_char)
+    end do
+  end subroutine remove_empty
 
   !> Why nothing can be made at `path`: mkdir keeps its reason in C's errno, which has no
   !> portable name, but opening a file at the same place fails for the same reason.

@@ -72,7 +72,7 @@ module pd_output_results_hdf5
     end function c_strlen
   end interface
 
-  !> The system's reason, as the error stack tells it.
+  !> The system's reason, from the error stack.
   type :: reason_type
     character(512) :: system = ''     !! errno's message, if a system call failed
     character(512) :: innermost = ''  !! HDF5's own words where the error arose
@@ -81,7 +81,7 @@ module pd_output_results_hdf5
 contains
 
   !> Start the library: silent (its errors become `error_type`), and without locks on files, so that
-  !> a file can be looked at while it is written. Further calls do nothing.
+  !> a file can be read while it is written. Further calls do nothing.
   subroutine start_hdf5(error)
     type(error_type), allocatable, intent(out) :: error
     integer :: status

@@ -113,10 +113,10 @@ contains
     allocate (rows, source=self%rows(:, :self%count - but))
   end function rows_so_far
 
-  !> Go on after `rows` (column, row), which the files have already if they are `written`.
+  !> Continue after `rows` (column, row), which the files have already if they are `written`.
   pure subroutine restore(self, rows, written)
     class(history_type), intent(inout) :: self  !! begun by `start`; has these rows only on return
-    real(wp), intent(in) :: rows(:, :)          !! (column, row) of the run that goes on
+    real(wp), intent(in) :: rows(:, :)          !! (column, row) of the run that continues
     logical, intent(in) :: written              !! whether the files have them; else they wait
 
     self%rows = rows

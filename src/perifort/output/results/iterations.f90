@@ -1,5 +1,5 @@
 !> The convergence of a relaxation, `iterations.csv`: a line for each iteration that is due. It is
-!> not part of a checkpoint: a restarted run keeps the lines up to where it goes on, and adds to
+!> not part of a checkpoint: a restarted run keeps the lines up to where it continues, and adds to
 !> them. An error is set if the file cannot be read or written.
 module pd_output_results_iterations
   use pd_base_error, only: error_type

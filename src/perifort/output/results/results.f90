@@ -9,7 +9,8 @@
 !>     call results%close(error)
 !>
 !> Nothing of an earlier run is touched before the first output is complete. After an error call
-!> `close` none the less: it leaves the files as they were at the last complete output.
+!> `close` none the less: it leaves the files as they were at the last complete output. Where there
+!> are none, the folder is removed again if `create` made it.
 !>
 !> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
 !> are the fields of the last output, and `answer` gives both.
@@ -22,7 +23,8 @@ module pd_output_results_results
   use pd_output_results_description, only: check_description
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
-  use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_file
+  use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_empty, &
+    & remove_file
   use pd_output_results_history, only: csv_type, history_type
   use pd_output_results_iterations, only: iterations_type
   use pd_output_results_sink, only: sink_type
@@ -55,9 +57,10 @@ module pd_output_results_results
     logical :: use_vtkhdf = .false., use_vtu = .false.
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
-    logical :: resumed = .false.         !! they are those of a run that goes on
+    logical :: resumed = .false.         !! they are those of a run that continues
     logical :: failed = .false.
     logical :: in_files = .true.         !! there is a folder to write to
+    integer :: made_folder = 0           !! part of its path that was made, as of `make_directory`
     real(wp), allocatable :: positions(:, :)       !! what stays in memory: points, ...
     type(values_type), allocatable :: latest(:)    !! fields of the output under way, ...
     type(values_type), allocatable :: complete(:)  !! and of the last complete one
@@ -79,7 +82,7 @@ module pd_output_results_results
     procedure :: close => close_results
     procedure :: sync
     procedure :: kept => rows_and_times
-    procedure :: goes_on
+    procedure :: resumes
     procedure :: keep_outputs
     procedure :: answer
   end type results_type
@@ -114,7 +117,7 @@ contains
     character(*), intent(in) :: version            !! of the program, kept in the file
     logical, intent(in) :: overwrite               !! older results may go; else they are an error
     type(error_type), allocatable, intent(out) :: error
-    type(kept_type), intent(in), optional :: kept  !! rows, times and scene of a checkpoint to go on
+    type(kept_type), intent(in), optional :: kept  !! rows, times and scene of a checkpoint to start
                                                    !! from; absent: a new run
     logical :: single
 
@@ -126,7 +129,7 @@ contains
       if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
       if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
       if (allocated(error)) return
-      call make_directory(directory, error)
+      call make_directory(directory, error, self%made_folder)
       if (allocated(error)) return
     end if
 
@@ -155,6 +158,7 @@ contains
         & planned_outputs, columns, planned_rows, single, scene_text, command, version, error)
       if (allocated(error)) then
         call explain_need(self, 'the layout', self%vtkhdf%layout_bytes(), error)
+        call remove_empty(self%directory, self%made_folder)
         return
       end if
     end if
@@ -364,7 +368,7 @@ contains
     end if
   end subroutine end_output
 
-  !> An error if the files are no longer where they are written: the system goes on to write files
+  !> An error if the files are no longer where they are written: the system continues to write files
   !> whose names or folder have been removed, and they vanish with the program.
   subroutine check_there(self, error)
     class(results_type), intent(in) :: self
@@ -425,8 +429,8 @@ contains
     if (self%history%is_due()) call write_rows(self, error)
   end subroutine add_row
 
-  !> Add a line about an iteration of a relaxation to `iterations.csv`. Of a run that goes on, lines
-  !> up to step `last` stay.
+  !> Add a line about an iteration of a relaxation to `iterations.csv`. Of a run that continues,
+  !> lines up to step `last` stay.
   subroutine add_iteration(self, line, last, error)
     class(results_type), intent(inout) :: self  !! after the first output; earlier lines are dropped
     character(*), intent(in) :: line  !! values in the order of the file's head, parted by commas
@@ -529,12 +533,12 @@ contains
     kept%times = self%times(:self%outputs - but_outputs)
   end function rows_and_times
 
-  !> Whether these are the files of a run that goes on, with all that was written before the first
+  !> Whether these are the files of a run that continues, with all that was written before the first
   !> output.
-  pure logical function goes_on(self)
+  pure logical function resumes(self)
     class(results_type), intent(in) :: self  !! the results
-    goes_on = self%resumed
-  end function goes_on
+    resumes = self%resumed
+  end function resumes
 
   !> From now on keep the fields of each output in memory until the next one is complete.
   subroutine keep_outputs(self, positions)
@@ -563,14 +567,14 @@ contains
     if (allocated(self%complete)) found%values = self%complete
   end subroutine answer
 
-  !> Complete the files. Those of a run that was `stopped` stay as they are, to go on another time;
-  !> with `keep_mark` they stay marked as unfinished. After an error in writing they stay as they
-  !> were at the last complete output; if nothing was written, nothing is left behind. An error if
-  !> what waits cannot be written, or if a file has been removed.
+  !> Complete the files. Those of a run that was `stopped` stay as they are, to be continued another
+  !> time; with `keep_mark` they stay marked as unfinished. After an error in writing they stay as
+  !> they were at the last complete output; if nothing was written, nothing is left behind. An error
+  !> if what waits cannot be written, or if a file has been removed.
   subroutine close_results(self, error, stopped, keep_mark)
     class(results_type), intent(inout) :: self  !! open or not; not open on return
     type(error_type), allocatable, intent(out) :: error
-    logical, intent(in), optional :: stopped    !! leave the files to a run that goes on; absent: no
+    logical, intent(in), optional :: stopped    !! leave the files to a restart; absent: no
     logical, intent(in), optional :: keep_mark  !! keep the mark of unfinished results; absent: no
     type(error_type), allocatable :: ignored
     logical :: leave, complete
@@ -593,6 +597,8 @@ contains
     if (self%failed .or. allocated(error) .or. .not. self%started) then
       if (self%use_vtkhdf) call self%vtkhdf%abandon()
       if (self%csv%is_open()) call self%csv%close(ignored)
+      ! a folder made for these results goes if nothing has come to be in it
+      call remove_empty(self%directory, self%made_folder)
       return
     end if
     if (self%use_vtkhdf) then

@@ -133,7 +133,7 @@ contains
 
   !> Give the open file another name, in place of an older file.
   subroutine rename_sink(self, path, error)
-    class(sink_type), intent(inout) :: self  !! open; goes on under the new name
+    class(sink_type), intent(inout) :: self  !! open; continues under the new name
     character(*), intent(in) :: path         !! the new name, in the same file system
     type(error_type), allocatable, intent(out) :: error
 

@@ -68,7 +68,7 @@ contains
     self%single = single
   end subroutine create
 
-  !> Go on with a series, made ready by `create`, after the outputs at `times` [s]; later ones are
+  !> Continue a series, made ready by `create`, after the outputs at `times` [s]; later ones are
   !> removed. An error if the file of one of them is missing.
   subroutine resume(self, times, error)
     class(vtu_series), intent(inout) :: self  !! as `create` left it; with these outputs on return
