@@ -234,9 +234,12 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: points(3) = [200000, 450, 60]
     real(wp), parameter :: lattice(3) = [165.0_wp, 281.0_wp, 502.0_wp]  ! bytes a point
-    real(wp), parameter :: list(3) = [245.0_wp, 395.0_wp, 625.0_wp]
-    real(wp), parameter :: exact(3) = [292.0_wp, 768.0_wp, 2622.0_wp]
-    real(wp), parameter :: program = 17.6e6_wp
+    real(wp), parameter :: list(3) = [362.0_wp, 490.0_wp, 785.0_wp]
+    real(wp), parameter :: exact(3) = [441.0_wp, 892.0_wp, 3055.0_wp]
+    real(wp), parameter :: two_laws(3) = [362.0_wp, 1193.0_wp, 4456.0_wp]
+    real(wp), parameter :: two_in_list(3) = [393.0_wp, 1267.0_wp, 4617.0_wp]
+    real(wp), parameter :: softening(3) = [490.0_wp, 1572.0_wp, 5598.0_wp]
+    real(wp), parameter :: program = 18.5e6_wp
     type(scene_type) :: scene
     integer :: dim
 
@@ -247,6 +250,15 @@ contains
       call expect_memory(list(dim), 'list')
       scene%horizon%volume_correction = 'exact'
       call expect_memory(exact(dim), 'exact volumes')
+      scene%horizon%volume_correction = 'linear'
+      scene%materials = [scene%materials(1), scene%materials(1)]
+      scene%materials(2)%model = 'lps'
+      call expect_memory(two_in_list(dim), 'two laws, list')
+      scene%horizon%family = 'lattice'
+      call expect_memory(two_laws(dim), 'two laws, lattice')
+      scene%materials%model = [character(64) :: 'lps', 'softening']
+      scene%materials%critical_stretch = 0.05_wp
+      call expect_memory(softening(dim), 'two laws, one of which has a history')
     end do
 
   contains

@@ -31,19 +31,23 @@ contains
 
   !> Largest memory that a run of a scene takes [bytes], without its clouds, whose points are not
   !> known before they are read; 0 without lattice bodies. The constants are fitted to the largest
-  !> resident sets of runs of 2e5 points in each dimension, with horizons of 3 to 6 spacings
-  !> (doc/performance.md, memory).
+  !> resident sets of runs of 1e5 to 2e5 points in each dimension on two threads, with horizons of 3
+  !> to 5 spacings: both kinds of families, bonds that break, and the generic pass with two laws and
+  !> with laws that have a history. The prediction is 0.9 to 1.2 times what they took.
   real(wp) function predicted_memory(scene) result(bytes)
     type(scene_type), intent(in) :: scene  !! a checked scene
-    real(wp), parameter :: program = 20.0e6_wp                          !! without points
+    real(wp), parameter :: program = 18.5e6_wp                          !! without points
     real(wp), parameter :: per_point(3) = [165.0_wp, 280.0_wp, 500.0_wp]  !! in 1D, 2D, 3D
-    real(wp), parameter :: per_list_point = 90.0_wp, per_list_bond = 1.0_wp  !! bits and members
-    real(wp), parameter :: per_exact_bond = 16.0_wp                     !! partial volumes of lists
+    real(wp), parameter :: per_list_point = 175.0_wp, per_list_bond = 1.6_wp  !! members, tables
+    real(wp), parameter :: per_generic_point = 60.0_wp                  !! the same without tables
+    real(wp), parameter :: per_exact_bond = 17.5_wp                     !! partial volumes of lists
     real(wp), parameter :: per_weight = 16.0_wp                         !! tables of lattices
     real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded
+    real(wp), parameter :: per_breaking = 30.0_wp                       !! limits and damage
     real(wp), parameter :: per_solver = 80.0_wp, per_rule = 24.0_wp     !! a component
     real(wp), parameter :: block = 8.0_wp                               !! slots with one table
-    real(wp), parameter :: per_generic_bond = 32.0_wp, per_history = 8.0_wp
+    real(wp), parameter :: per_generic_bond = 33.0_wp                   !! of both directions each
+    real(wp), parameter :: per_history = 13.0_wp                        !! a real, two states
     real(wp), parameter :: pi = acos(-1.0_wp)
     real(wp) :: points, ratio, members, kinds
     integer :: dim, history
@@ -61,9 +65,12 @@ contains
     end select
     members = min(points, members)
     breaking = size(scene%cracks) > 0 .or. any_critical(scene)
+    call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
+    if (breaking) bytes = bytes + points*per_breaking
     if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
-      bytes = bytes + points*(per_list_point + per_list_bond*members)
+      bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
+        & + per_list_bond*members)
       if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members
     else
       ! blocks near the surfaces have weights of their own
@@ -71,7 +78,6 @@ contains
       bytes = bytes + kinds*members*block*per_weight
       if (breaking) bytes = bytes + points*per_bit*members
     end if
-    call look_at_laws(scene, generic, history)
     if (generic) bytes = bytes + points*members*(per_generic_bond + per_history*history)
     if (scene%time%method == 'relaxation') then
       bytes = bytes + points*dim*per_solver
@@ -82,7 +88,7 @@ contains
   end function predicted_memory
 
   !> Whether the generic pass computes the laws of a scene, and the most reals of history of a bond.
-  subroutine look_at_laws(scene, generic, history)
+  subroutine find_laws(scene, generic, history)
     type(scene_type), intent(in) :: scene
     logical, intent(out) :: generic
     integer, intent(out) :: history
@@ -98,11 +104,11 @@ contains
         n = laws%number_of(one%model)
         if (n == 0) cycle
         generic = generic .or. .not. laws%items(n)%law%weighted .or. one%influence &
-          & /= first%influence .or. (one%model == 'lps') .neqv. (first%model == 'lps')
+          & /= first%influence .or. ((one%model == 'lps') .neqv. (first%model == 'lps'))
         history = max(history, laws%items(n)%law%bond_history)
       end associate
     end do
-  end subroutine look_at_laws
+  end subroutine find_laws
 
   !> Number of points of each body's lattice, 0 for clouds.
   pure function numbers_of_points(scene) result(numbers)

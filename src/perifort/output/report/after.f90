@@ -26,7 +26,8 @@ contains
     seconds = recorder%timer%seconds(recorder%phase())
     if (steps > 0) text = text//line('speed', &
       & to_text(1.0e9_wp*seconds/(real(system%family%n_bonds, wp)*steps), 3)// &
-      & ' ns per bond and '//unit//', '//to_text(steps/max(1.0e-9_wp, seconds), 4)//' '//unit//'s/s')
+      & ' ns per bond and '//unit//', '//to_text(steps/max(1.0e-9_wp, seconds), 4)// &
+      & ' '//unit//'s/s')
     if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
     if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
       & 'load step')//' left to dynamic relaxation by the conjugate gradient')
