@@ -57,7 +57,7 @@ def impact(length, radius, speed, duration, material, cells, small=False):
     foot, axis, end = z < 1e-12, r < 1e-12, z > length - 1e-12
     start = np.stack([r, z])
     radii, _, _, area = geometry(r, z, quads)
-    # Per radian, like all forces here; the integral of each shape function in a rectangle
+    # Per radian, like all forces here; to each node the quarter of the rectangle next to it
     mass = np.bincount(quads.ravel(), (material.density * area
                                        * (radii + radii.mean(0)) / 8).ravel(), len(r))
     speeds = np.zeros((2, len(r)))
