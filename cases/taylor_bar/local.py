@@ -1,8 +1,9 @@
 """The Taylor bar of a local material, apart from the program: explicit finite elements.
 
 Axisymmetric elements of four nodes with one point and viscous hourglass control; von Mises plasticity
-with linear isotropic hardening; large strains by Jaumann's rate and the radial return. The wall is a
-plane that the foot of the bar neither leaves nor rubs on, the same as the symmetry plane of the scenes.
+with linear isotropic hardening, by the radial return; large strains with Jaumann's rate, or small ones, with
+stress and equilibrium in the undeformed bar. The wall is a plane that the foot of the bar neither leaves nor
+rubs on, the same as the symmetry plane of the scenes.
 """
 from dataclasses import dataclass
 
@@ -41,8 +42,10 @@ def geometry(r, z, quads):
     return radii, along_r, along_z, (radii * along_r).sum(0)
 
 
-def impact(length, radius, speed, duration, material, cells):
-    """A cylinder whose end z = 0 is stopped at t = 0 by a wall; `cells`: (across, along)."""
+def impact(length, radius, speed, duration, material, cells, small=False):
+    """A cylinder whose end z = 0 is stopped at t = 0 by a wall; `cells`: (across, along); `small`: the
+    theory of small strains.
+    """
     elastic = material.youngs_modulus / (1 + material.poissons_ratio)
     mu, kappa = elastic / 2, material.youngs_modulus / (3 * (1 - 2 * material.poissons_ratio))
     sound = np.sqrt((kappa + 4 * mu / 3) / material.density)
@@ -52,8 +55,9 @@ def impact(length, radius, speed, duration, material, cells):
     first = (np.arange(along)[:, None] * (across + 1) + np.arange(across)).ravel()
     quads = np.stack([first, first + 1, first + across + 2, first + across + 1])
     foot, axis, end = z < 1e-12, r < 1e-12, z > length - 1e-12
+    start = np.stack([r, z])
     radii, _, _, area = geometry(r, z, quads)
-    # Per radian, like all forces here; the integral of each shape function in a rectangle
+    # Per radian, like all forces here; to each node the quarter of the rectangle next to it
     mass = np.bincount(quads.ravel(), (material.density * area
                                        * (radii + radii.mean(0)) / 8).ravel(), len(r))
     speeds = np.zeros((2, len(r)))
@@ -63,18 +67,21 @@ def impact(length, radius, speed, duration, material, cells):
     work, time, rows = 0.0, 0.0, []
     hourglass = np.array([1.0, -1.0, 1.0, -1.0])[:, None]
     while time < duration:
-        _, _, _, area = geometry(r, z, quads)
-        diagonal = np.maximum(np.hypot(*(a[quads[2]] - a[quads[0]] for a in (r, z))),
-                              np.hypot(*(a[quads[3]] - a[quads[1]] for a in (r, z))))
+        place = start if small else np.stack([r, z])
+        _, _, _, area = geometry(*place, quads)
+        diagonal = np.maximum(np.hypot(*(place[:, quads[2]] - place[:, quads[0]])),
+                              np.hypot(*(place[:, quads[3]] - place[:, quads[1]])))
         step = 0.5 * np.min(area / diagonal) / sound
         # Rates in the middle of the step, so that a rotation leaves no strain at first order
-        half = np.stack([r, z]) + step / 2 * speeds
+        half = start if small else place + step / 2 * speeds
         radii, along_r, along_z, area = geometry(*half, quads)
         u, w = speeds[0][quads], speeds[1][quads]
         rate = np.stack([(along_r * u).sum(0) / area, (along_z * w).sum(0) / area,
                          u.mean(0) / radii.mean(0)])
         u_z, w_r = (along_z * u).sum(0) / area, (along_r * w).sum(0) / area
         spin, shear, volume = (u_z - w_r) / 2, (u_z + w_r) / 2, rate.sum(0)
+        if small:
+            spin = 0 * spin
         turned = np.stack([2 * spin * stress[3], -2 * spin * stress[3], 0 * spin,
                            spin * (stress[1] - stress[0])])
         stress = stress + step * turned
@@ -89,12 +96,13 @@ def impact(length, radius, speed, duration, material, cells):
         stress[:3] += pressure
         strain = strain + flow
         r, z = r + step * speeds[0], z + step * speeds[1]
-        radii, along_r, along_z, area = geometry(r, z, quads)
+        place = start if small else np.stack([r, z])
+        radii, along_r, along_z, area = geometry(*place, quads)
         centre = radii.mean(0)
         work += 2 * np.pi * np.sum(flow * (limit + material.hardening * flow / 2) * area * centre)
         # Of the corners' speeds the part that no strain of the element sees
         seen = hourglass - ((hourglass * radii).sum(0) * along_r
-                            + (hourglass * z[quads]).sum(0) * along_z) / area
+                            + (hourglass * place[1][quads]).sum(0) * along_z) / area
         damping = 0.0125 * material.density * sound * np.sqrt(area) * centre * seen
         pull = np.stack([(along_r * stress[0] + along_z * stress[3]) * centre + area * stress[2] / 4
                          + damping * (seen * u).sum(0),

@@ -49,9 +49,9 @@ class Bar:
         z = self.results.points[self.foot, 2]
         return np.min(z + self.results.field("displacement")[self.foot, 2]) / self.spacing
 
-    def local(self, duration):
+    def local(self, duration, small=False):
         """The same bar of a local material, and the growth of its radius at the same place."""
-        bar = impact(self.length, RADIUS, self.speed, duration, COPPER, (8, 48))
+        bar = impact(self.length, RADIUS, self.speed, duration, COPPER, (8, 48), small)
         row = self.spacing / 2 / (self.length / 48)
         return bar, np.interp(row, np.arange(49), bar.r[:, -1]) / RADIUS - 1
 
@@ -149,12 +149,18 @@ def main():
 
     bar = collide(case, "bar.nml" if across == 12 else "bar_8.nml", across)
     local, growth = bar.local(DURATION)
+    linear, wider = bar.local(DURATION, small=True)
     results, h = bar.results, bar.results.history
-    case.near(f"50 m/s, {across} across: largest shortening [mm]", 1e3 * bar.shortening.max(),
+    # Measured: 15 % at 8 across, 3 % at 12, 1 % at 16, where less of the bar is surface
+    allowed = 0.2 if quick else 0.05
+    case.near(f"50 m/s, {across} across: largest shortening [mm], small strains",
+              1e3 * bar.shortening.max(), 1e3 * linear.shortening.max(), relative=0.05)
+    case.near("   growth of the foot's radius [%]", 100 * bar.growth(), 100 * wider, relative=allowed)
+    case.near("   largest shortening [mm], large strains", 1e3 * bar.shortening.max(),
               1e3 * local.shortening.max(), relative=0.1)
+    case.near("   growth of the foot's radius [%]", 100 * bar.growth(), 100 * growth, relative=0.15)
     case.show("   length over initial length [-]", 1 - bar.shortening.max() / bar.length,
               1 - local.shortening.max() / bar.length)
-    case.near("   growth of the foot's radius [%]", 100 * bar.growth(), 100 * growth, relative=0.15)
     moving = 0.5 * COPPER.density * SPEED**2 * np.pi * RADIUS**2 * bar.length
     case.near("   plastic over initial kinetic energy, at rest [-]", bar.plastic,
               local.plastic[np.argmax(local.shortening)] / moving, relative=0.02)
@@ -195,7 +201,7 @@ def main():
         for speed, duration in ((25.0, 14e-6), (100.0, 45e-6), (210.0, 60e-6)):
             other = collide(case, f"bar_8_{speed:.0f}.nml", 8, speed=speed, duration=duration)
             beside, wider = other.local(duration)
-            case.show(f"8 across, {speed:.0f} m/s: largest shortening [mm]",
+            case.show(f"8 across, {speed:.0f} m/s: largest shortening [mm], large strains",
                       1e3 * other.shortening.max(), 1e3 * beside.shortening.max())
             case.show("   growth of the foot's radius [%]", 100 * other.growth(), 100 * wider)
             case.show("   lowest point above the wall, in spacings", other.lowest())
@@ -212,25 +218,28 @@ def pictures(case, bar, local, fast):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     from plot import save
-    figure, axes = plt.subplots(1, 3, figsize=(12, 5.5))
+    figure, axes = plt.subplots(1, 3, figsize=(12, 4.5))
     for axis, run in zip(axes, (bar, fast)):
         duration = run.results.history["time"][-1]
         beside = run.local(duration)[0]
         x, u = run.results.points, run.results.field("displacement")
         cut = (np.abs(x[:, 1]) < run.spacing) & (x[:, 1] > 0)
         y = 1e3 * (x + u)[cut]
-        drawn = axis.scatter(y[:, 0], y[:, 2], c=1e3 * np.abs(u[cut, 2]), s=14, cmap="viridis")
+        drawn = axis.scatter(y[:, 0], y[:, 2], c=1e3 * np.abs(u[cut, 2]), s=22, cmap="viridis")
         for side in (1, -1):
             for end in (1, -1):
                 axis.plot(1e3 * side * np.append(beside.r[:, -1], beside.r[-1, ::-1]),
                           1e3 * end * np.append(beside.z[:, -1], beside.z[-1, ::-1]), color="tab:red",
                           linewidth=1)
         axis.axhline(0.0, color="0.5", linewidth=0.6)
-        axis.set(aspect="equal", xlabel="x [mm]", ylabel="z [mm]",
+        axis.set(aspect="equal", xlim=(-6, 6), ylim=(-8, 8), xlabel="x [mm]", ylabel="z [mm]",
                  title=f"{run.speed:.0f} m/s after {1e6 * duration:.0f} us")
         figure.colorbar(drawn, ax=axis, label="$|u_z|$ [mm]", shrink=0.8)
     h = bar.results.history
-    axes[2].plot(1e6 * local.time, 1e3 * local.shortening, color="tab:red", label="finite elements, 50 m/s")
+    linear = bar.local(DURATION, small=True)[0]
+    axes[2].plot(1e6 * local.time, 1e3 * local.shortening, color="tab:red", label="elements, large strains")
+    axes[2].plot(1e6 * linear.time, 1e3 * linear.shortening, "--", color="tab:red",
+                 label="elements, small strains")
     axes[2].plot(1e6 * h["time"], 1e3 * bar.shortening, color="tab:blue", label="perifort, 50 m/s")
     axes[2].set(xlabel="time [us]", ylabel="shortening [mm]")
     axes[2].legend()
