@@ -7,6 +7,7 @@ module pd_study_trade_analytic
   use pd_base_numbers, only: pi
   use pd_base_text, only: newline, to_text
   use pd_body_generate, only: horizon_of
+  use pd_law_laws, only: all_laws, law_table_type
   use pd_family_volume, only: reach, volume_correction, volume_rule_number, volume_rule_type
   use pd_motion_system, only: system_type
   use pd_scene_content_groups, only: closed_forms
@@ -104,6 +105,8 @@ contains
       reason = 'it needs a lattice; the box of a cloud is not known'
     else if (size(scene%materials) /= 1) then
       reason = 'it needs a single material'
+    else if (has_history(scene)) then
+      reason = 'it is for an elastic bond law'
     else if (size(scene%cracks) > 0) then
       reason = 'the scene has a crack'
     else if (any(is_set(scene%initial%temperature_change))) then
@@ -116,6 +119,19 @@ contains
       if (allocated(scene%boundaries(i)%times)) reason = 'a boundary has its own times'
     end do
   end subroutine common_ground
+
+  !> Whether the law of the first material has a history.
+  logical function has_history(scene)
+    type(scene_type), intent(in) :: scene
+    type(law_table_type) :: laws
+    integer :: n
+
+    laws = all_laws()
+    if (allocated(scene%laws%items)) laws = scene%laws
+    n = laws%number_of(scene%materials(1)%model)
+    has_history = .false.
+    if (n > 0) has_history = laws%items(n)%law%bond_history + laws%items(n)%law%point_history > 0
+  end function has_history
 
   !> A bar released from uniform strain, held at one end.
   subroutine fit_vibration(scene, form, reason)
@@ -248,6 +264,9 @@ contains
 
     if (form%dim /= 1) then
       reason = 'it is for dimension 1'
+    else if (scene%materials(1)%model == 'lps' .or. .not. any(scene%materials(1)%influence &
+      & == [character(8) :: '', 'inverse'])) then
+      reason = "it is for the chapter's laws with influence = 'inverse'"
     else if (scene%time%method /= 'explicit') then
       reason = "it needs &time method = 'explicit'"
     else if (size(scene%loads) + size(scene%boundaries) + size(scene%removed) > 0) then
