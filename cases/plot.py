@@ -34,9 +34,10 @@ def values_of(results, name, output=-1):
         values = results.field(name, output)
         label = name.replace("_", " ")
         if values.ndim == 2:
-            # A tensor's components off the diagonal stand for two each
-            twice = [len(set(c)) for c in results.components[name]]
-            values, label = np.sqrt((values**2) @ twice), f"|{label}|"
+            # Components off the diagonal of a symmetric tensor stand for two each
+            names = results.components[name]
+            times = [2 if len(set(c)) == 2 and c[::-1] not in names else 1 for c in names]
+            values, label = np.sqrt((values**2) @ times), f"|{label}|"
     elif base in results.fields and component in results.components[base]:
         values = results.field(base, output)[:, results.components[base].index(component)]
         label = f"{base.replace('_', ' ')} {component}"

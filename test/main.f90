@@ -60,6 +60,7 @@ program main
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_explicit_time_step, only: collect_motion_explicit_time_step
   use test_orders, only: collect_orders
+  use test_output_fields_stress, only: collect_output_fields_stress
   use test_output_fields_table, only: collect_output_fields_table
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
@@ -154,6 +155,7 @@ program main
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_explicit_time_step', collect_motion_explicit_time_step)
   call register('orders', collect_orders)
+  call register('output_fields_stress', collect_output_fields_stress)
   call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)

@@ -115,10 +115,36 @@ contains
     call table%find_component('force_density', 3, field, component, found)
     call expect_true(error, found .and. field%name == 'force_density' .and. component == 0, &
       & 'force_density')
+    call expect_names(error, 'stress', [character(24) :: 'xx', 'xx yy zz xy', &
+      & 'xx yy zz xy yz xz'])
+    call expect_names(error, 'deformation_gradient', [character(26) :: 'xx', 'xx xy yx yy', &
+      & 'xx xy xz yx yy yz zx zy zz'])
+    call expect_names(error, 'principal_stress', [character(5) :: '1 2 3', '1 2 3', '1 2 3'])
     call table%find_component('momentum_flux_xy', 3, field, component, found)
     call expect_true(error, found .and. field%rank == rank_symmetric .and. component == 4, &
       & 'momentum_flux_xy')
   end subroutine test_components
+
+  !> The names of all components of a field of the program, by dimension.
+  subroutine expect_names(error, name, expected)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: name
+    character(*), intent(in) :: expected(3)
+    type(field_table_type) :: table
+    type(output_field_type) :: field
+    character(40) :: names
+    integer :: c, dim
+
+    table = all_fields()
+    field = table%field(name)
+    do dim = 1, 3
+      names = ''
+      do c = 1, field%components(dim)
+        names = trim(names)//' '//field%component_name(c, dim)
+      end do
+      call expect_true(error, adjustl(names) == expected(dim), name//': '//names)
+    end do
+  end subroutine expect_names
 
   !> Run or check a scene with fields of a table; threads are as before afterwards.
   subroutine compute(text, name, table, fault, only_check)
@@ -161,10 +187,10 @@ contains
     call expect_true(error, fault%status == status_input .and. &
       & .not. file_exists(here//'/unknown/unknown.vtkhdf'), 'status and files')
     call compute(flight//"&probe name = 'a' point = 0, 0 /"//line// &
-      & "&probe name = 'b' point = 0, 0 fields = 'stress' /", 'unknown', all_fields(), fault, &
+      & "&probe name = 'b' point = 0, 0 fields = 'entropy' /", 'unknown', all_fields(), fault, &
       & only_check=.true.)
     if (.not. allocated(error)) call expect_parts(error, fault, &
-      & "unknown value 'stress' of key 'fields' in group &probe|unknown.nml:7|allowed: "// &
+      & "unknown value 'entropy' of key 'fields' in group &probe|unknown.nml:7|allowed: "// &
       & 'displacement')
     if (allocated(error)) return
     more = all_fields()

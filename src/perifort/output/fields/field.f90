@@ -11,11 +11,15 @@ module pd_output_fields_field
   use pd_scene_content_types, only: name_length
   implicit none (type, external)
   private
-  public :: output_field_type, moment_type, rank_scalar, rank_vector, rank_symmetric
+  public :: output_field_type, moment_type, shared_type
+  public :: rank_scalar, rank_vector, rank_symmetric, rank_stress, rank_tensor, rank_principal
 
   integer, parameter :: rank_scalar = 0
   integer, parameter :: rank_vector = 1
   integer, parameter :: rank_symmetric = 2  !! a symmetric tensor: xx, yy, zz, xy, yz, xz
+  integer, parameter :: rank_stress = 3     !! the same, which in the plane has zz, too
+  integer, parameter :: rank_tensor = 4     !! any tensor, row by row
+  integer, parameter :: rank_principal = 5  !! the three principal values of a tensor
 
   !> A field. `fill` is needed; the other procedures may be left out.
   type :: output_field_type
@@ -36,10 +40,17 @@ module pd_output_fields_field
     procedure :: missing
   end type output_field_type
 
+  !> What several fields of one output need, computed by the first of them.
+  type :: shared_type
+    real(wp), allocatable :: gradient(:, :, :)  !! of the displacements (3, 3, owned points) [-]
+    integer :: undefined = 0                    !! points at which it is not defined
+  end type shared_type
+
   !> What fields are taken from: a system at one instant.
   type :: moment_type
     type(system_type), pointer :: system => null()        !! with forces that are up to date
     real(wp), pointer, contiguous :: v(:, :) => null()    !! velocities now (n_slots, dim) [m/s]
+    type(shared_type), pointer :: shared => null()        !! else each field computes all it needs
   end type moment_type
 
   abstract interface
@@ -89,13 +100,17 @@ contains
     case (rank_scalar); components = 1
     case (rank_vector); components = dim
     case (rank_symmetric); components = dim*(dim + 1)/2
+    case (rank_stress); components = dim*(dim + 1)/2 + merge(1, 0, dim == 2)
+    case (rank_tensor); components = dim**2
+    case (rank_principal); components = 3
     case default
       components = 0
       call internal_fault('a field of the output has a rank that is not known')
     end select
   end function components
 
-  !> Name of component `c` in `dim` dimensions: '' of a scalar, x y z, or xx yy zz xy yz xz.
+  !> Name of component `c` in `dim` dimensions: '' of a scalar; x y z; xx yy zz xy yz xz of a
+  !> symmetric tensor; xx xy xz yx .. of any tensor; 1 2 3 of principal values.
   pure function component_name(field, c, dim) result(name)
     class(output_field_type), intent(in) :: field
     integer, intent(in) :: c                      !! 1 .. components
@@ -103,7 +118,9 @@ contains
     character(:), allocatable :: name
     character(*), parameter :: pairs(6) = ['xx', 'yy', 'zz', 'xy', 'yz', 'xz']
     character(*), parameter :: plane(3) = ['xx', 'yy', 'xy']
-    character(*), parameter :: directions = 'xyz'
+    character(*), parameter :: plane_stress(4) = ['xx', 'yy', 'zz', 'xy']
+    character(*), parameter :: directions = 'xyz', numbers = '123'
+    integer :: row, column
 
     select case (field%rank)
     case (rank_scalar)
@@ -113,6 +130,15 @@ contains
     case (rank_symmetric)
       name = pairs(c)
       if (dim == 2) name = plane(c)
+    case (rank_stress)
+      name = pairs(c)
+      if (dim == 2) name = plane_stress(c)
+    case (rank_tensor)
+      row = (c - 1)/dim + 1
+      column = mod(c - 1, dim) + 1
+      name = directions(row:row)//directions(column:column)
+    case (rank_principal)
+      name = numbers(c:c)
     case default
       name = ''
       call internal_fault('a field of the output has a rank that is not known')

@@ -1,13 +1,20 @@
 !> The table of output fields: all that a scene may name, and what is known of each.
 module pd_output_fields_table
   use pd_base_error, only: internal_fault
+  use pd_output_fields_bond_stress, only: bond_stress_field
   use pd_output_fields_damage, only: damage_field
+  use pd_output_fields_deformation_gradient, only: deformation_gradient_field
   use pd_output_fields_dilatation, only: dilatation_field
   use pd_output_fields_displacement, only: displacement_field
   use pd_output_fields_energy_density, only: energy_density_field
   use pd_output_fields_field, only: output_field_type, rank_scalar
   use pd_output_fields_force_density, only: force_density_field
+  use pd_output_fields_fragment, only: fragment_field
+  use pd_output_fields_principal_stress, only: principal_stress_field
+  use pd_output_fields_strain, only: strain_field
+  use pd_output_fields_stress, only: stress_field
   use pd_output_fields_velocity, only: velocity_field
+  use pd_output_fields_von_mises, only: von_mises_field
   use pd_scene_content_types, only: name_length
   implicit none (type, external)
   private
@@ -35,6 +42,13 @@ contains
     call table%add(dilatation_field())
     call table%add(force_density_field())
     call table%add(energy_density_field())
+    call table%add(deformation_gradient_field())
+    call table%add(strain_field())
+    call table%add(stress_field())
+    call table%add(von_mises_field())
+    call table%add(principal_stress_field())
+    call table%add(bond_stress_field())
+    call table%add(fragment_field())
   end function all_fields
 
   !> Add a field at the end.

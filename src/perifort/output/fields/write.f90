@@ -2,7 +2,7 @@
 module pd_output_fields_write
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
-  use pd_output_fields_field, only: moment_type, output_field_type
+  use pd_output_fields_field, only: moment_type, output_field_type, shared_type
   use pd_output_results_results, only: results_type
   use pd_output_results_types, only: field_type
   implicit none (type, external)
@@ -11,21 +11,28 @@ module pd_output_fields_write
 
 contains
 
-  !> Write all fields of an output that has begun.
-  subroutine write_fields(results, fields, now, error)
+  !> Write all fields of an output that has begun. `undefined` is the number of points at which the
+  !> gradient of the displacements is not defined, 0 if no field needs it.
+  subroutine write_fields(results, fields, now, undefined, error)
     type(results_type), intent(inout) :: results        !! was created with these fields
     type(output_field_type), intent(in) :: fields(:)
     type(moment_type), intent(in) :: now
+    integer, intent(out) :: undefined
     type(error_type), allocatable, intent(out) :: error
+    type(shared_type), target :: shared
+    type(moment_type) :: moment
     type(field_type) :: entry
     real(wp), allocatable :: values(:, :)
     integer :: f, n
 
+    undefined = 0
+    moment = now
+    moment%shared => shared
     do f = 1, size(fields)
       entry = fields(f)%in_file(now%system%body%dim)
       allocate (values(now%system%body%n_points, entry%components))
       n = fields(f)%components(now%system%body%dim)
-      call fields(f)%fill(now, values(:, :n))
+      call fields(f)%fill(moment, values(:, :n))
       values(:, n + 1:) = 0.0_wp
       if (entry%components == 1) then
         call results%put_field(f, values(:, 1), error)
@@ -35,6 +42,7 @@ contains
       if (allocated(error)) return
       deallocate (values)
     end do
+    undefined = shared%undefined
   end subroutine write_fields
 
 end module pd_output_fields_write

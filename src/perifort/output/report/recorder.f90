@@ -18,7 +18,8 @@ module pd_output_report_recorder
   use pd_output_report_columns, only: history_row, history_table_type, row_source_type
   use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
   use pd_output_report_probes, only: probe_type
-  use pd_output_report_run_warnings, only: contact_warning, rotation_warning, strain_warning
+  use pd_output_report_run_warnings, only: contact_warning, gradient_warning, &
+    & rotation_warning, strain_warning
   use pd_output_report_schedule, only: due_at, iteration_due, schedule_type
   use pd_output_results_results, only: results_type
   implicit none (type, external)
@@ -302,11 +303,16 @@ contains
     type(instant_type), intent(in) :: instant
     real(wp), target, contiguous, intent(in) :: v(:, :)
     type(error_type), allocatable, intent(out) :: error
+    type(moment_type) :: now
+    integer :: undefined
 
+    now%system => system
+    now%v => v
     call recorder%results%begin_output(instant%time, error)
     if (allocated(error)) return
-    call write_fields(recorder%results, recorder%fields, moment_type(system, v), error)
+    call write_fields(recorder%results, recorder%fields, now, undefined, error)
     if (allocated(error)) return
+    call tell(recorder, 'gradient', gradient_warning(undefined, instant%time))
     call recorder%results%end_output(error)
     recorder%outputs = recorder%outputs + 1
     recorder%output_step = instant%step

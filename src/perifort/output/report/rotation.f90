@@ -2,6 +2,7 @@
 !> with it checks whether parts have rotated.
 module pd_output_report_rotation
   use pd_base_kinds, only: wp
+  use pd_base_tensors, only: cofactors, determinant
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
@@ -126,29 +127,5 @@ contains
     end do
     angle = acos(max(-1.0_wp, min(1.0_wp, (R(1, 1) + R(2, 2) + R(3, 3) - 1)/2)))
   end function rotation_angle
-
-  pure real(wp) function determinant(a)
-    real(wp), intent(in) :: a(3, 3)
-    real(wp) :: c(3, 3)
-    c = cofactors(a)
-    determinant = dot_product(a(:, 1), c(:, 1))
-  end function determinant
-
-  !> The matrix of cofactors: det(a) times the inverse transposed.
-  pure function cofactors(a) result(c)
-    real(wp), intent(in) :: a(3, 3)
-    real(wp) :: c(3, 3)
-    integer :: i, j, i1, i2, j1, j2
-
-    do j = 1, 3
-      j1 = mod(j, 3) + 1
-      j2 = mod(j + 1, 3) + 1
-      do i = 1, 3
-        i1 = mod(i, 3) + 1
-        i2 = mod(i + 1, 3) + 1
-        c(i, j) = a(i1, j1)*a(i2, j2) - a(i1, j2)*a(i2, j1)
-      end do
-    end do
-  end function cofactors
 
 end module pd_output_report_rotation

@@ -10,7 +10,7 @@ module pd_output_report_run_warnings
   use pd_output_report_strain, only: find_large_strains, large_strain
   implicit none (type, external)
   private
-  public :: contact_warning, rotation_warning, strain_warning
+  public :: contact_warning, gradient_warning, rotation_warning, strain_warning
 
   !> Rotations that cause a warning with the projected dilatation: beyond 10 degrees its error is
   !> 1.5 % and more. So large a share of the points must have turned: a few may turn at the tip of a
@@ -67,5 +67,18 @@ contains
       & ' %, the most by '//to_text(100*stretch, 3)//' % (point '//to_text(point)// &
       & '): the material is linear in the strain and not valid for large strains'
   end function strain_warning
+
+  !> Points have too few bonds for a gradient of the displacements, which a field of the output
+  !> needs.
+  function gradient_warning(number, time) result(text)
+    integer, intent(in) :: number             !! points
+    real(wp), intent(in) :: time              !! [s]
+    character(:), allocatable :: text
+
+    text = ''
+    if (number > 0) text = 'at t = '//to_text(time)//' s the intact bonds of '// &
+      & counted(number, 'point')//' do not span the space: their deformation gradient is not '// &
+      & 'defined and is written as 1, their strain as 0'
+  end function gradient_warning
 
 end module pd_output_report_run_warnings

@@ -37,8 +37,8 @@ contains
       if (allocated(error)) return
       names(i) = fields(i)%name
       call check_name(names(i), names(:i - 1), error)
-      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3, 6])) &
-        & call fail(error, 'field '//trim(fields(i)%name)//' has neither 1, 3 nor 6 components')
+      if (.not. allocated(error) .and. all(fields(i)%components /= [1, 3, 4, 6, 9])) &
+        & call fail(error, 'field '//trim(fields(i)%name)//' has not 1, 3, 4, 6 or 9 components')
     end do
     do i = 1, size(columns)
       if (allocated(error)) return
