@@ -312,7 +312,7 @@ contains
     if (allocated(error)) return
     call write_fields(recorder%results, recorder%fields, now, undefined, error)
     if (allocated(error)) return
-    call tell(recorder, 'gradient', gradient_warning(undefined, instant%time))
+    call warn_if_any(recorder, 'gradient', gradient_warning(undefined, instant%time))
     call recorder%results%end_output(error)
     recorder%outputs = recorder%outputs + 1
     recorder%output_step = instant%step
