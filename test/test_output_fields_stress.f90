@@ -118,7 +118,7 @@ contains
     allocate (values(system%body%n_points, n), one(n, 1))
     call field%fill(now, values)
     call field%values_at(now, [int(system%body%slot(3))], one)
-    call expect_close(error, one(:, 1), values(3, :), 1.0e-12_wp*maxval(abs(values(3, :))), &
+    call expect_close(error, one(:, 1), values(3, :), 1.0e-12_wp*max_abs(values(3, :)), &
       & name//' at one point')
   end subroutine field_of
 
@@ -439,7 +439,7 @@ contains
         k = system%body%point(at_point(system%body, centre))
         if (allocated(error)) return
         call expect_close(error, bonds(k, :), classical(k, [1, 2, 4]), &
-          & 0.005_wp*maxval(abs(classical(k, :))), 'stress of bonds')
+          & 0.005_wp*max_abs(classical(k, :)), 'stress of bonds')
       end associate
     end do
   end subroutine test_bond_stress
