@@ -1,4 +1,4 @@
-!> Families: the points with which each point interacts. The abstract type that lattice and list
+!> The points with which each point interacts, its family. The abstract type that lattice and list
 !> families extend.
 !>
 !> Everything outside the hot loops works on `bonds_of`, which lists the bonds of one slot.
