@@ -27,9 +27,11 @@ contains
     type(bonds_type) :: bonds
     real(wp) :: strain, dilatation, energy, scale, gb, gd
     integer :: k, i, c
+    logical :: weighted
 
+    weighted = has_factors(laws)
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
-    !$omp parallel default(none) shared(body, family, materials, D, S, laws) &
+    !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted) &
     !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, k, i, c)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
@@ -45,13 +47,22 @@ contains
           dilatation = 0.0_wp
           energy = 0.0_wp
           scale = 0.0_wp
-          do i = 1, bonds%n
-            strain = (bonds%xi(i, c)/bonds%length(i))**2
-            call law_factors(laws, int(body%material(k)), bonds%length(i), gb, gd)
-            dilatation = dilatation + gd*strain*bonds%weight(i)
-            energy = energy + gb*strain**2*bonds%length(i)*bonds%weight(i)
-            scale = scale + bonds%length(i)*bonds%weight(i)
-          end do
+          if (weighted) then
+            do i = 1, bonds%n
+              strain = (bonds%xi(i, c)/bonds%length(i))**2
+              call law_factors(laws, int(body%material(k)), bonds%length(i), gb, gd)
+              dilatation = dilatation + gd*strain*bonds%weight(i)
+              energy = energy + gb*strain**2*bonds%length(i)*bonds%weight(i)
+              scale = scale + bonds%length(i)*bonds%weight(i)
+            end do
+          else
+            do i = 1, bonds%n
+              strain = (bonds%xi(i, c)/bonds%length(i))**2
+              dilatation = dilatation + strain*bonds%weight(i)
+              energy = energy + strain**2*bonds%length(i)*bonds%weight(i)
+              scale = scale + bonds%length(i)*bonds%weight(i)
+            end do
+          end if
           ! a chain inside a plane has no stretch across it, up to the rounding of its positions
           if (energy <= 1.0e-20_wp*scale) cycle
           D(k, c) = 1.0_wp/(m%t*dilatation)
@@ -68,6 +79,23 @@ contains
     end do
     !$omp end parallel
   end subroutine surface_factors
+
+  !> Whether some law has factors that differ from 1. Without, sums have the bits of the plain loop.
+  pure logical function has_factors(laws)
+    type(law_item_type), intent(in), optional :: laws(:)
+    integer :: i
+
+    has_factors = .false.
+    if (.not. present(laws)) return
+    do i = 1, size(laws)
+      select type (law => laws(i)%law)
+      class is (weighted_law_type)
+        has_factors = has_factors .or. law%has_factors()
+      class default  ! its bonds have no factors here
+        continue
+      end select
+    end do
+  end function has_factors
 
   !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1 without laws
   !> and for laws with a force of their own.

@@ -289,7 +289,13 @@ contains
           if (model%dilatation) weights%dilatation(l, m) = 0.0_wp
           if (alive(k) == 0_i1 .or. alive(j) == 0_i1) cycle
           weight = grid%fraction(o)*grid%cell_volume
-          weights%stretch(l, m) = weight*grid%length(o)*(q_of(model, int(k)) + q_of(model, int(j)))
+          if (.not. allocated(model%scale)) then
+            weights%stretch(l, m) = weight*grid%length(o)*(model%materials(model%material(k))%q &
+              & + model%materials(model%material(j))%q)
+          else
+            weights%stretch(l, m) = weight*grid%length(o)*(q_of(model, int(k)) &
+              & + q_of(model, int(j)))
+          end if
           if (model%dilatation) weights%dilatation(l, m) = weight
           if (model%weighted) then
             call bond_factors_of(model, int(k), grid%length(o), gb, gd)

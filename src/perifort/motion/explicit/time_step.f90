@@ -60,8 +60,13 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
-            & *law_factor(model, k, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
+          if (model%weighted) then
+            inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
+              & *law_factor(model, k, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
+          else
+            inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
+              & /bonds%length(i)
+          end if
         end do
         associate (m => model%materials(model%material(k)))
           inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*t_of(model, k)**2
@@ -76,6 +81,13 @@ contains
       do i = 1, bonds%n
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
+        if (.not. model%weighted) then
+          bound(k) = bound(k) + ((model%materials(model%material(k))%q &
+            & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
+            & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j)) &
+            & *bonds%weight(i)/bonds%length(i)
+          cycle
+        end if
         bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j)) &
           & *surface_factor(model, model%S, n, k, j) &
           & *law_factor(model, k, bonds%length(i), .false.) &
