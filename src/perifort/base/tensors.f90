@@ -1,5 +1,6 @@
 !> Tensors of three dimensions as matrices: determinant, cofactors, principal values.
 module pd_base_tensors
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
@@ -42,7 +43,7 @@ contains
 
     b = a
     values = sum(abs(a))
-    if (.not. values(1) <= huge(1.0_wp)) return  ! no numbers: neither are the eigenvalues
+    if (.not. all(ieee_is_finite(a))) return  ! no numbers: neither are the eigenvalues
     least = epsilon(1.0_wp)/8*values(1)
     ! each sweep squares the elements off the diagonal, relative to the others
     do sweep = 1, 20
