@@ -58,7 +58,7 @@ contains
     real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
     integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
     real(wp), intent(out) :: dissipated   !! energy lost at fixed u [J]
-    real(wp), intent(in), contiguous, optional :: others(:, :, :)
+    real(wp), intent(in), optional :: others(:, :, :)
       !! (n_slots, dim, sets) other displacements, read at `slots` and at the ends of their bonds
       !! alone [m]
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
@@ -129,7 +129,7 @@ contains
     integer, intent(in) :: k
     type(bonds_type), intent(in) :: bonds              !! of slot `k`
     real(wp), intent(out) :: density(0:)               !! (0:sets) [J/m3]
-    real(wp), intent(in), contiguous, optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
+    real(wp), intent(in), optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
     integer :: o
 
     if (model%generic) then
