@@ -11,7 +11,8 @@ module test_output_fields_stress
   use pd_driver, only: run_scene
   use pd_force_forces, only: energy_pass
   use pd_motion_system, only: renew_forces, start_system, system_type
-  use pd_output_fields_field, only: moment_type, output_field_type, shared_type
+  use pd_output_fields_field, only: moment_type, output_field_type
+  use pd_output_fields_gradient, only: shared_type
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_report_begin, only: run_options_type
   use pd_output_results_datasets, only: get_shape, read_rows
@@ -116,7 +117,7 @@ contains
     now%v => system%state%v
     n = field%components(system%body%dim)
     allocate (values(system%body%n_points, n), one(n, 1))
-    call field%fill(now, values)
+    call field%all_values(now, values)
     call field%values_at(now, [int(system%body%slot(3))], one)
     call expect_close(error, one(:, 1), values(3, :), 1.0e-12_wp*max_abs(values(3, :)), &
       & name//' at one point')
@@ -544,7 +545,7 @@ contains
       now%system => system
       now%v => system%state%v
       now%shared => shared
-      call field%fill(now, values)
+      call field%all_values(now, values)
       call expect_true(error, shared%undefined == expected, to_text(shared%undefined)//' points')
       if (expected > 0) call expect_close(error, values(1, :), [1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], &
         & 0.0_wp, 'F')

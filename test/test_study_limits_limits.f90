@@ -135,9 +135,10 @@ contains
     call expect(error, set_up%plan%step, 1.0e-7_wp, 0.0_wp, 'step asked for')
   end subroutine test_plan
 
-  !> Frequencies go with one over the size, whatever it is; a shift changes nothing, in lists but
-  !> for the rounding of the places, 1e6 sizes x 20 spacings x 1e-16 = 2e-9 of a spacing. The crack
-  !> and what is held come along.
+  !> Frequencies go with one over the size, whatever it is and whatever the law: the chapter's, one
+  !> with factors of a bond's length, one with scales of the points. A shift changes nothing, in
+  !> lists but for the rounding of the places, 1e6 sizes x 20 spacings x 1e-16 = 2e-9 of a spacing.
+  !> The crack and what is held come along.
   subroutine test_free_body(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -147,12 +148,17 @@ contains
     type(fault_type), allocatable :: fault
     real(wp), parameter :: factors(3) = [1.0_wp, 1.0e-9_wp, 1.0e3_wp]
     real(wp) :: shift
-    integer :: f, i
+    character(11), parameter :: models(3) = [character(11) :: 'state_based', 'state_based', 'lps']
+    character(8), parameter :: influences(3) = [character(8) :: '', 'gaussian', '']
+    integer :: f, i, m
 
-    do f = 1, 2
+    do f = 1, 6
+      m = (f + 1)/2
       call box_scene([16, 12], spacing, 0.42_wp, scene)
+      scene%materials(1)%model = models(m)
+      scene%materials(1)%influence = influences(m)
       scene%horizon%surface_correction = 'energy'
-      scene%horizon%family = families(f)
+      scene%horizon%family = families(mod(f, 2) + 1)
       deallocate (scene%cracks)
       allocate (scene%cracks(1))
       scene%cracks(1)%from(:2) = [-1.0_wp, 0.06_wp]
@@ -170,7 +176,8 @@ contains
         end if
         call largest_frequency(twin, 1.0e-4_wp, there)
         call expect(error, there%squared*factors(mod(i - 1, 3) + 1)**2/here%squared, 1.0_wp, &
-          & merge(1.0e-7_wp, 1.0e-11_wp, i == 4), families(f)//', '//text_of(real(i, wp)))
+          & merge(1.0e-7_wp, 1.0e-11_wp, i == 4), families(mod(f, 2) + 1)//', '// &
+          & trim(models(m))//', '//text_of(real(i, wp)))
       end do
     end do
   end subroutine test_free_body
@@ -230,9 +237,10 @@ contains
     character(10), parameter :: methods(2) = [character(10) :: 'explicit', 'relaxation']
 
     options%threads = 1
-    do i = 1, 2
+    do i = 1, 3
       call box_scene([20], spacing, 0.3_wp, scene)
-      scene%time%method = methods(i)
+      scene%time%method = methods(mod(i - 1, 2) + 1)
+      if (i == 3) scene%materials(1)%model = 'lps'
       open (newunit=unit, status='scratch', action='readwrite')
       call run_limits(scene, options, 0.05_wp, fault, unit)
       if (allocated(fault)) then
@@ -261,6 +269,8 @@ contains
       call expect_true(error, any(index(lines(:n), 'in kilometres') > 0) .and. &
         & any(index(lines(:n), 'runge_kutta') > 0) .and. any(index(lines(:n), 'at 1.005 of') > 0) &
         & .and. (any(index(lines(:n), 'static') > 0) .eqv. i == 2), 'all parts')
+      call expect_true(error, any(index(lines(:n), "is for the chapter's laws") > 0) .eqv. i == 3, &
+        & 'the printed form')
     end do
   end subroutine test_command
 

@@ -4,10 +4,10 @@ module pd_set_up_materials
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
-  use pd_law_laws, only: all_laws, law_item_type, law_table_type
+  use pd_law_laws, only: law_item_type, law_table_type
   use pd_law_material, only: material_type, new_material
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: laws_of, scene_type, is_set
   implicit none (type, external)
   private
   public :: materials_of_scene
@@ -28,8 +28,7 @@ contains
     logical :: plane_strain
     integer :: i, p, q
 
-    table = all_laws()
-    if (allocated(scene%laws%items)) table = scene%laws
+    table = laws_of(scene)
     plane_strain = scene%header%dimension == 2 .and. scene%header%plane == 'strain'
     depth = merge(scene%header%area, scene%header%thickness, scene%header%dimension == 1)
     allocate (materials(size(scene%materials)), laws(size(scene%materials)))

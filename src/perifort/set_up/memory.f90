@@ -4,9 +4,9 @@ module pd_set_up_memory
   use pd_base_error, only: error_type
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
-  use pd_law_laws, only: all_laws, law_table_type
+  use pd_law_laws, only: law_table_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: is_set, laws_of, scene_type
   use pd_body_generate, only: horizon_of
   implicit none (type, external)
   private
@@ -93,19 +93,26 @@ contains
     logical, intent(out) :: generic
     integer, intent(out) :: history
     type(law_table_type) :: laws
-    integer :: i, n
+    character(:), allocatable :: influence, others
+    integer :: i, n, first
 
-    laws = all_laws()
-    if (allocated(scene%laws%items)) laws = scene%laws
+    laws = laws_of(scene)
     generic = .false.
     history = 0
+    first = 0
     do i = 1, size(scene%materials)
-      associate (one => scene%materials(i), first => scene%materials(1))
-        n = laws%number_of(one%model)
-        if (n == 0) cycle
-        generic = generic .or. .not. laws%items(n)%law%weighted .or. one%influence &
-          & /= first%influence .or. ((one%model == 'lps') .neqv. (first%model == 'lps'))
-        history = max(history, laws%items(n)%law%bond_history)
+      n = laws%number_of(scene%materials(i)%model)
+      if (n == 0) cycle
+      influence = trim(laws%items(n)%law%influence)
+      if (scene%materials(i)%influence /= '') influence = trim(scene%materials(i)%influence)
+      if (first == 0) then
+        first = n
+        others = influence
+      end if
+      associate (law => laws%items(n)%law)
+        generic = generic .or. .not. law%weighted .or. influence /= others &
+          & .or. .not. same_type_as(law, laws%items(first)%law)
+        history = max(history, law%bond_history)
       end associate
     end do
   end subroutine find_laws

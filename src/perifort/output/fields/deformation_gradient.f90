@@ -2,8 +2,7 @@
 module pd_output_fields_deformation_gradient
   use pd_base_kinds, only: wp
   use pd_motion_system, only: system_type
-  use pd_output_fields_field, only: moment_type, output_field_type, rank_tensor
-  use pd_output_fields_gradient, only: at_slot_from_gradient, fill_from_gradient
+  use pd_output_fields_field, only: output_field_type, rank_tensor
   implicit none (type, external)
   private
   public :: deformation_gradient_field
@@ -15,22 +14,8 @@ contains
     field%name = 'deformation_gradient'
     field%meaning = 'gradient F of the deformed position, from the intact bonds'
     field%rank = rank_tensor
-    field%fill => fill
-    field%at_slot => at_slot
+    field%of_gradient => of_gradient
   end function deformation_gradient_field
-
-  subroutine fill(now, values)
-    type(moment_type), intent(in) :: now
-    real(wp), intent(out) :: values(:, :)
-    call fill_from_gradient(now, of_gradient, values)
-  end subroutine fill
-
-  subroutine at_slot(now, k, values)
-    type(moment_type), intent(in) :: now
-    integer, intent(in) :: k
-    real(wp), intent(out) :: values(:)
-    call at_slot_from_gradient(now, k, of_gradient, values)
-  end subroutine at_slot
 
   subroutine of_gradient(system, k, gradient, values)
     type(system_type), intent(in) :: system

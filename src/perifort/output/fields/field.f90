@@ -7,11 +7,13 @@ module pd_output_fields_field
   use pd_base_kinds, only: wp
   use pd_motion_system, only: system_type
   use pd_output_fields_exact, only: exact_type
+  use pd_output_fields_gradient, only: at_slot_from_gradient, fill_from_gradient, &
+    & from_gradient_interface, shared_type
   use pd_output_results_types, only: field_type
   use pd_scene_content_types, only: name_length
   implicit none (type, external)
   private
-  public :: output_field_type, moment_type, shared_type
+  public :: output_field_type, moment_type
   public :: rank_scalar, rank_vector, rank_symmetric, rank_stress, rank_tensor, rank_principal
 
   integer, parameter :: rank_scalar = 0
@@ -21,7 +23,7 @@ module pd_output_fields_field
   integer, parameter :: rank_tensor = 4     !! any tensor, row by row
   integer, parameter :: rank_principal = 5  !! the three principal values of a tensor
 
-  !> A field. `fill` is needed; the other procedures may be left out.
+  !> A field. It has `fill` or `of_gradient`; the other procedures may be left out.
   type :: output_field_type
     character(name_length) :: name = ''       !! as in the scene, in lower case
     character(32) :: unit = '1'               !! SI, for instance 'm/s'; '1' for none
@@ -29,22 +31,19 @@ module pd_output_fields_field
     integer :: rank = rank_scalar
     procedure(fill_interface), pointer, nopass :: fill => null()
     procedure(point_interface), pointer, nopass :: at_slot => null()  !! else `fill` is called
+    procedure(from_gradient_interface), pointer, nopass :: of_gradient => null()
+      !! instead of `fill` and `at_slot`: the values follow from the gradient of the displacements
     procedure(exact_interface), pointer, nopass :: exact => null()    !! else no answer knows it
     procedure(lack_interface), pointer, nopass :: lack => null()      !! else always available
   contains
     procedure :: components
     procedure :: component_name
     procedure :: in_file
+    procedure :: all_values
     procedure :: values_at
     procedure :: exact_values
     procedure :: missing
   end type output_field_type
-
-  !> What several fields of one output need, computed by the first of them.
-  type :: shared_type
-    real(wp), allocatable :: gradient(:, :, :)  !! of the displacements (3, 3, owned points) [-]
-    integer :: undefined = 0                    !! points at which it is not defined
-  end type shared_type
 
   !> What fields are taken from: a system at one instant.
   type :: moment_type
@@ -163,6 +162,22 @@ contains
     entry%labels = adjustl(entry%labels)
   end function in_file
 
+  !> Values of all points, in point order. Fields of one output share what the moment has for that.
+  subroutine all_values(field, now, values)
+    class(output_field_type), intent(in) :: field
+    type(moment_type), intent(in) :: now
+    real(wp), intent(out) :: values(:, :)         !! (n_points, components)
+    type(shared_type) :: own
+
+    if (.not. associated(field%of_gradient)) then
+      call field%fill(now, values)
+    else if (associated(now%shared)) then
+      call fill_from_gradient(now%system, now%shared, field%of_gradient, values)
+    else
+      call fill_from_gradient(now%system, own, field%of_gradient, values)
+    end if
+  end subroutine all_values
+
   !> Values at some slots.
   subroutine values_at(field, now, slots, values)
     class(output_field_type), intent(in) :: field
@@ -172,7 +187,11 @@ contains
     real(wp), allocatable :: of_points(:, :)
     integer :: i
 
-    if (associated(field%at_slot)) then
+    if (associated(field%of_gradient)) then
+      do i = 1, size(slots)
+        call at_slot_from_gradient(now%system, slots(i), field%of_gradient, values(:, i))
+      end do
+    else if (associated(field%at_slot)) then
       do i = 1, size(slots)
         call field%at_slot(now, slots(i), values(:, i))
       end do

@@ -10,15 +10,20 @@ module pd_output_fields_gradient
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_force_model, only: model_type
   use pd_motion_system, only: system_type
-  use pd_output_fields_field, only: moment_type, shared_type
   implicit none (type, external)
   private
-  public :: fill_from_gradient, at_slot_from_gradient, from_gradient_interface
+  public :: shared_type, fill_from_gradient, at_slot_from_gradient, from_gradient_interface
   public :: displacement_gradient, strain_of, stress_of, lack_of_stress, components_of
 
   !> Least determinant of sum w xi xi^T, scaled to a trace of its dimension (1 if no direction is
   !> preferred), with which the gradient is defined. Half a family has 0.1 and more.
   real(wp), parameter :: flat = 1.0e-6_wp
+
+  !> What several fields of one output need, computed by the first of them.
+  type :: shared_type
+    real(wp), allocatable :: gradient(:, :, :)  !! of the displacements (3, 3, owned points) [-]
+    integer :: undefined = 0                    !! points at which it is not defined
+  end type shared_type
 
   abstract interface
     !> Components of a field at one slot.
@@ -34,20 +39,16 @@ module pd_output_fields_gradient
 
 contains
 
-  !> The values of all points of a field that the gradient gives. Fields of one output share it.
-  subroutine fill_from_gradient(now, of_gradient, values)
-    type(moment_type), intent(in) :: now
+  !> The values of all points of a field that the gradient gives.
+  subroutine fill_from_gradient(system, shared, of_gradient, values)
+    type(system_type), intent(in) :: system
+    type(shared_type), intent(inout) :: shared    !! with the gradients on return
     procedure(from_gradient_interface) :: of_gradient
+      !! components of the field at a point
     real(wp), intent(out) :: values(:, :)         !! (points, components)
-    type(shared_type), target :: own
-    type(shared_type), pointer :: shared
-    type(system_type), pointer :: system
     real(wp), allocatable :: of_point(:)
     integer :: i, k, n
 
-    system => now%system
-    shared => own
-    if (associated(now%shared)) shared => now%shared
     if (.not. allocated(shared%gradient)) call find_gradients(system, shared)
     values = 0.0_wp
     n = system%body%last_owned - system%body%first_owned + 1
@@ -63,19 +64,20 @@ contains
   end subroutine fill_from_gradient
 
   !> The values of one slot.
-  subroutine at_slot_from_gradient(now, k, of_gradient, values)
-    type(moment_type), intent(in) :: now
+  subroutine at_slot_from_gradient(system, k, of_gradient, values)
+    type(system_type), intent(in) :: system
     integer, intent(in) :: k                      !! slot of a point
     procedure(from_gradient_interface) :: of_gradient
+      !! components of the field at a point
     real(wp), intent(out) :: values(:)            !! (components)
     type(bonds_type) :: bonds
     real(wp) :: gradient(3, 3)
     logical :: defined
 
-    call allocate_bonds(now%system%family, bonds)
-    call now%system%family%bonds_of(k, bonds)
-    call displacement_gradient(now%system%state%u, k, bonds, gradient, defined)
-    call of_gradient(now%system, k, gradient, values)
+    call allocate_bonds(system%family, bonds)
+    call system%family%bonds_of(k, bonds)
+    call displacement_gradient(system%state%u, k, bonds, gradient, defined)
+    call of_gradient(system, k, gradient, values)
   end subroutine at_slot_from_gradient
 
   !> The gradients of all points that the process owns.

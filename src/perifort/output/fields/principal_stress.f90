@@ -3,9 +3,8 @@ module pd_output_fields_principal_stress
   use pd_base_kinds, only: wp
   use pd_base_tensors, only: principal_values
   use pd_motion_system, only: system_type
-  use pd_output_fields_field, only: moment_type, output_field_type, rank_principal
-  use pd_output_fields_gradient, only: at_slot_from_gradient, fill_from_gradient, &
-    & lack_of_stress, stress_of
+  use pd_output_fields_field, only: output_field_type, rank_principal
+  use pd_output_fields_gradient, only: lack_of_stress, stress_of
   implicit none (type, external)
   private
   public :: principal_stress_field
@@ -18,23 +17,9 @@ contains
     field%unit = 'Pa'
     field%meaning = 'principal values of `stress`, the largest first'
     field%rank = rank_principal
-    field%fill => fill
-    field%at_slot => at_slot
+    field%of_gradient => of_gradient
     field%lack => lack_of_stress
   end function principal_stress_field
-
-  subroutine fill(now, values)
-    type(moment_type), intent(in) :: now
-    real(wp), intent(out) :: values(:, :)
-    call fill_from_gradient(now, of_gradient, values)
-  end subroutine fill
-
-  subroutine at_slot(now, k, values)
-    type(moment_type), intent(in) :: now
-    integer, intent(in) :: k
-    real(wp), intent(out) :: values(:)
-    call at_slot_from_gradient(now, k, of_gradient, values)
-  end subroutine at_slot
 
   subroutine of_gradient(system, k, gradient, values)
     type(system_type), intent(in) :: system

@@ -2,9 +2,8 @@
 module pd_output_fields_strain
   use pd_base_kinds, only: wp
   use pd_motion_system, only: system_type
-  use pd_output_fields_field, only: moment_type, output_field_type, rank_symmetric
-  use pd_output_fields_gradient, only: at_slot_from_gradient, components_of, &
-    & fill_from_gradient, strain_of
+  use pd_output_fields_field, only: output_field_type, rank_symmetric
+  use pd_output_fields_gradient, only: components_of, strain_of
   implicit none (type, external)
   private
   public :: strain_field
@@ -16,22 +15,8 @@ contains
     field%name = 'strain'
     field%meaning = 'strain of Green and Lagrange, (F^T F - 1)/2, thermal strain included'
     field%rank = rank_symmetric
-    field%fill => fill
-    field%at_slot => at_slot
+    field%of_gradient => of_gradient
   end function strain_field
-
-  subroutine fill(now, values)
-    type(moment_type), intent(in) :: now
-    real(wp), intent(out) :: values(:, :)
-    call fill_from_gradient(now, of_gradient, values)
-  end subroutine fill
-
-  subroutine at_slot(now, k, values)
-    type(moment_type), intent(in) :: now
-    integer, intent(in) :: k
-    real(wp), intent(out) :: values(:)
-    call at_slot_from_gradient(now, k, of_gradient, values)
-  end subroutine at_slot
 
   subroutine of_gradient(system, k, gradient, values)
     type(system_type), intent(in) :: system

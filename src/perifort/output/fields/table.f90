@@ -59,7 +59,7 @@ contains
     if (.not. allocated(table%fields)) allocate (table%fields(0))
     if (table%number_of(field%name) > 0) &
       & call internal_fault('two fields of the output are named '//trim(field%name))
-    if (.not. associated(field%fill)) &
+    if (.not. (associated(field%fill) .or. associated(field%of_gradient))) &
       & call internal_fault('nothing computes the field '//trim(field%name))
     table%fields = [table%fields, field]
   end subroutine add

@@ -2,9 +2,8 @@
 module pd_output_fields_von_mises
   use pd_base_kinds, only: wp
   use pd_motion_system, only: system_type
-  use pd_output_fields_field, only: moment_type, output_field_type
-  use pd_output_fields_gradient, only: at_slot_from_gradient, fill_from_gradient, &
-    & lack_of_stress, stress_of
+  use pd_output_fields_field, only: output_field_type
+  use pd_output_fields_gradient, only: lack_of_stress, stress_of
   implicit none (type, external)
   private
   public :: von_mises_field
@@ -16,23 +15,9 @@ contains
     field%name = 'von_mises'
     field%unit = 'Pa'
     field%meaning = 'equivalent stress of von Mises, of `stress`'
-    field%fill => fill
-    field%at_slot => at_slot
+    field%of_gradient => of_gradient
     field%lack => lack_of_stress
   end function von_mises_field
-
-  subroutine fill(now, values)
-    type(moment_type), intent(in) :: now
-    real(wp), intent(out) :: values(:, :)
-    call fill_from_gradient(now, of_gradient, values)
-  end subroutine fill
-
-  subroutine at_slot(now, k, values)
-    type(moment_type), intent(in) :: now
-    integer, intent(in) :: k
-    real(wp), intent(out) :: values(:)
-    call at_slot_from_gradient(now, k, of_gradient, values)
-  end subroutine at_slot
 
   subroutine of_gradient(system, k, gradient, values)
     type(system_type), intent(in) :: system

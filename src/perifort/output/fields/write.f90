@@ -2,7 +2,8 @@
 module pd_output_fields_write
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
-  use pd_output_fields_field, only: moment_type, output_field_type, shared_type
+  use pd_output_fields_field, only: moment_type, output_field_type
+  use pd_output_fields_gradient, only: shared_type
   use pd_output_results_results, only: results_type
   use pd_output_results_types, only: field_type
   implicit none (type, external)
@@ -32,7 +33,7 @@ contains
       entry = fields(f)%in_file(now%system%body%dim)
       allocate (values(now%system%body%n_points, entry%components))
       n = fields(f)%components(now%system%body%dim)
-      call fields(f)%fill(moment, values(:, :n))
+      call fields(f)%all_values(moment, values(:, :n))
       values(:, n + 1:) = 0.0_wp
       if (entry%components == 1) then
         call results%put_field(f, values(:, 1), error)

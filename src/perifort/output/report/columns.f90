@@ -4,13 +4,13 @@ module pd_output_report_columns
   use pd_base_kinds, only: wp
   use pd_base_reduce, only: largest_over
   use pd_force_generic, only: has_plasticity
-  use pd_law_laws, only: all_laws, law_table_type
+  use pd_law_laws, only: law_table_type
   use pd_motion_observer, only: instant_type
   use pd_motion_system, only: energies_type, system_type
   use pd_output_fields_field, only: moment_type
   use pd_output_report_probes, only: probe_columns, probe_row, probe_type
   use pd_output_results_types, only: column_type
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: laws_of, scene_type
   implicit none (type, external)
   private
   public :: history_table_type, history_table, history_columns, history_row, columns_of_scene, &
@@ -120,8 +120,7 @@ contains
     type(law_table_type) :: laws
     integer :: i, n
 
-    laws = all_laws()
-    if (allocated(scene%laws%items)) laws = scene%laws
+    laws = laws_of(scene)
     names_plasticity = .false.
     do i = 1, size(scene%materials)
       n = laws%number_of(scene%materials(i)%model)

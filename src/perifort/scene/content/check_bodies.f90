@@ -5,12 +5,12 @@ module pd_scene_content_check_bodies
   use pd_base_error, only: error_type
   use pd_base_text, only: join, nearest_name, to_text, with_unit
   use pd_law_law, only: required
-  use pd_law_laws, only: all_laws, law_item_type, law_table_type
+  use pd_law_laws, only: law_item_type, law_table_type
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: rule_fault, given, check_known, check_vector, check_finite_box
   use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: scene_type, body_group, shape_group, material_group, &
-    & crack_group, is_set, name_length
+    & crack_group, is_set, laws_of, name_length
   implicit none (type, external)
   private
   public :: check_body, check_shape, check_material, check_crack, check_file
@@ -290,8 +290,7 @@ contains
     character(:), allocatable :: note, nearest
     integer :: i, j
 
-    laws = all_laws()
-    if (allocated(scene%laws%items)) laws = scene%laws
+    laws = laws_of(scene)
     associate (material => scene%materials(number))
       i = laws%number_of(material%model)
       if (i == 0) then

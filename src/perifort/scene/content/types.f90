@@ -5,7 +5,7 @@
 !> Whoever builds a scene without a file fills these types directly.
 module pd_scene_content_types
   use pd_base_error, only: internal_fault
-  use pd_law_laws, only: law_table_type
+  use pd_law_laws, only: all_laws, law_table_type
   use pd_scene_format_file, only: line_type
   use pd_scene_format_given, only: is_set, name_length, path_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
@@ -30,7 +30,7 @@ module pd_scene_content_types
     & material_group, horizon_group, crack_group, initial_group, boundary_group, load_group, &
     & time_group, relaxation_group, output_group, probe_group, study_group, name_length, &
     & path_length, unset, is_set
-  public :: added_type, group_entry, group_table, group_interface, groups_interface
+  public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
   type :: added_type
@@ -114,6 +114,15 @@ module pd_scene_content_types
   end interface
 
 contains
+
+  !> The bond laws that a scene may name: its own table, else that of the program.
+  function laws_of(scene) result(laws)
+    type(scene_type), intent(in) :: scene  !! any scene
+    type(law_table_type) :: laws
+
+    laws = all_laws()
+    if (allocated(scene%laws%items)) laws = scene%laws
+  end function laws_of
 
   !> Add a group. Without `one` or `all` the scene holds it among `added`.
   subroutine add(table, name, purpose, repeatable, fresh, one, all)

@@ -39,6 +39,7 @@ module pd_study_limits_limits
     real(wp) :: equation = 0.0_wp      !! 7.25 with surface factors
     real(wp) :: most = 0.0_wp          !! its largest value over the points
     real(wp) :: printed = 0.0_wp       !! 7.25 as printed; 0: its sum is negative somewhere
+    logical :: chapter = .true.        !! the laws are the chapter's, so that it has a value as printed
     integer :: slot = 0                !! where `equation` is least
     integer :: printed_slot = 0        !! where `printed` is
     real(wp) :: spectral = 0.0_wp      !! 2/omega of the body as it is
@@ -74,10 +75,10 @@ contains
     call check_names(scene, fields_of(options), error)
     if (.not. allocated(error)) call prepare(explicit, set_up, error)
     if (allocated(error)) return
-    if (set_up%system%model%weighted .or. set_up%system%model%generic) then
+    if (set_up%system%model%generic) then
       call scene_fault(error, scene, 'material', 1, 'model', &
-        & "limits are measured for the chapter's laws with influence = 'inverse' only", &
-        & 'the free vibration that they are compared with has no other laws')
+        & 'limits are measured for laws of the fast loops only', &
+        & 'bond laws of the generic pass may change their stiffness, so that no frequency lasts')
       return
     end if
     associate (system => set_up%system)
@@ -124,8 +125,11 @@ contains
     allocate (sums(system%body%n_slots), source=0.0_wp)
     call stiffness_bound(system%body, system%family, system%model, system%workspace, sums)
     call least_step(system, sums, limits%equation, limits%slot, limits%most)
-    call printed_stiffness(system%body, system%family, system%model, sums)
-    call least_step(system, sums, limits%printed, limits%printed_slot)
+    limits%chapter = .not. system%model%weighted
+    if (limits%chapter) then
+      call printed_stiffness(system%body, system%family, system%model, sums)
+      call least_step(system, sums, limits%printed, limits%printed_slot)
+    end if
     call largest_frequency(system, accuracy, limits%spectrum)
     limits%spectral = stable_step_of(limits%spectrum)
     if (.not. system%model%breaking) return
@@ -170,7 +174,9 @@ contains
       & 'adams_bashforth 0.36 of it,'//newline//'adams_moulton 0.645, runge_kutta 1.415'//newline
     text = text//'  7.25 as used     '//with_unit(limits%equation, 's', 6)//', least at '// &
       & where_is(system, limits%slot)//'; elsewhere up to '//with_unit(limits%most, 's', 4)//newline
-    if (limits%printed > 0.0_wp) then
+    if (.not. limits%chapter) then
+      text = text//"  7.25 as printed  is for the chapter's laws with influence = 'inverse'"//newline
+    else if (limits%printed > 0.0_wp) then
       text = text//'  7.25 as printed  '//with_unit(limits%printed, 's', 6)//', least at '// &
         & where_is(system, limits%printed_slot)//', without surface factors'//newline
     else

@@ -7,13 +7,15 @@ module pd_study_limits_vibration
   use pd_base_error, only: error_type, internal_fault
   use pd_base_reduce, only: largest_of_ranks, noise, noise_after
   use pd_body_body, only: body_type, allocate_points, gather, scatter
-  use pd_law_material, only: material_type, never
+  use pd_law_laws, only: law_item_type
+  use pd_law_material, only: material_type, never, new_material
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
-  use pd_force_model, only: new_model
+  use pd_force_generic, only: begin_laws
+  use pd_force_model, only: model_type, new_model
   use pd_force_weights, only: build_weights
   use pd_motion_conditions, only: motion_type, moved_by_displacement
   use pd_motion_curve, only: constant_curve
@@ -49,6 +51,7 @@ contains
     real(wp), intent(in) :: factor           !! size of the copy over that of `system` [-]
     type(system_type), intent(out) :: twin   !! the copy
     type(error_type), allocatable, intent(out) :: error
+    type(law_item_type), allocatable :: laws(:)
     type(material_type), allocatable :: materials(:)
     type(lattice_family_type), allocatable :: lattice
     type(list_family_type), allocatable :: list
@@ -56,9 +59,9 @@ contains
     logical :: cut
 
     call copy_points(system%body, shift, factor, twin%body)
-    materials = resized(system%model%materials, system%body%dim, factor)
     rule = system%family%rule
     rule%delta = factor*rule%delta
+    call resized(system%model, rule%delta, laws, materials)
     cut = .false.
     if (size(system%state%damage) > 0) cut = any(system%state%damage > 0.0_wp)
     select type (family => system%family)
@@ -76,10 +79,11 @@ contains
       call internal_fault('free_body does not know a kind of family')
     end select
     call new_model(twin%body, materials, system%model%projected, &
-      & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), twin%model)
+      & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), twin%model, laws)
     twin%model%surface = system%model%surface
     if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
-      & twin%model%S)
+      & twin%model%S, laws)
+    call begin_laws(twin%body, twin%family, twin%model, twin%workspace%generic)
     select type (family => twin%family)
     type is (lattice_family_type)
       call build_weights(family, twin%model, twin%workspace%lattice)
@@ -128,22 +132,28 @@ contains
     end do
   end subroutine copy_points
 
-  !> The same materials for a horizon `factor` times as long; none can fail or expand.
-  pure function resized(materials, dim, factor) result(others)
-    type(material_type), intent(in) :: materials(:)
-    integer, intent(in) :: dim
-    real(wp), intent(in) :: factor
-    type(material_type), allocatable :: others(:)
+  !> The same laws and materials for another horizon; none can fail or expand.
+  subroutine resized(model, delta, laws, materials)
+    type(model_type), intent(in) :: model                          !! with its laws
+    real(wp), intent(in) :: delta                                  !! horizon of the copy [m]
+    type(law_item_type), allocatable, intent(out) :: laws(:)       !! set up for it
+    type(material_type), allocatable, intent(out) :: materials(:)  !! of these laws
+    integer :: i
 
-    allocate (others, source=materials)
-    others%b = materials%b/factor**(dim + 2)
-    others%d = materials%d/factor**(dim + 1)
-    others%q = materials%q/factor**(dim + 1)
-    others%p = materials%p/factor**dim
-    others%t = materials%t/factor**dim
-    others%critical_stretch = never
-    others%expansion = 0.0_wp
-  end function resized
+    if (.not. allocated(model%laws)) call internal_fault('a body whose materials have no laws')
+    allocate (laws, source=model%laws)
+    allocate (materials(size(laws)))
+    do i = 1, size(laws)
+      associate (law => laws(i)%law, old => model%materials(i))
+        call law%set_up(new_material(old%youngs_modulus, old%poissons_ratio, old%density, law%dim, &
+          & law%plane_strain, law%depth, law%depth, delta, law%bond_based), law%dim, &
+          & law%plane_strain, delta, law%depth)
+        law%material%critical_stretch = never
+        law%material%expansion = 0.0_wp
+        materials(i) = law%material
+      end associate
+    end do
+  end subroutine resized
 
   !> Cut in `twin` the bonds that are broken in `system`.
   subroutine copy_cuts(system, twin)

@@ -7,11 +7,11 @@ module pd_study_trade_analytic
   use pd_base_numbers, only: pi
   use pd_base_text, only: newline, to_text
   use pd_body_generate, only: horizon_of
-  use pd_law_laws, only: all_laws, law_table_type
+  use pd_law_laws, only: law_table_type
   use pd_family_volume, only: reach, volume_correction, volume_rule_number, volume_rule_type
   use pd_motion_system, only: system_type
   use pd_scene_content_groups, only: closed_forms
-  use pd_scene_content_types, only: boundary_group, initial_group, is_set, scene_type
+  use pd_scene_content_types, only: boundary_group, initial_group, is_set, laws_of, scene_type
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, form_chain, form_hole, &
     & form_linear, form_wave
   use pd_study_trade_pull, only: pull
@@ -126,8 +126,7 @@ contains
     type(law_table_type) :: laws
     integer :: n
 
-    laws = all_laws()
-    if (allocated(scene%laws%items)) laws = scene%laws
+    laws = laws_of(scene)
     n = laws%number_of(scene%materials(1)%model)
     has_history = .false.
     if (n > 0) has_history = laws%items(n)%law%bond_history + laws%items(n)%law%point_history > 0
