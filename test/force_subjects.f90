@@ -17,7 +17,8 @@ module force_subjects
     & volume_linear_extended, &
     & volume_exact
   use pd_force_forces, only: internal_force
-  use pd_force_generic, only: begin_laws, generic_point_dilatation, refresh_bonds
+  use pd_force_generic_bonds, only: begin_laws, refresh_bonds
+  use pd_force_generic_points, only: generic_point_dilatation
   use pd_force_model, only: model_type, new_model, options_of, p_of
   use pd_force_weights, only: build_weights
   use pd_force_workspace, only: workspace_type

@@ -8,7 +8,7 @@ module test_law_contract
   use pd_base_numbers, only: pi
   use pd_base_snapshot, only: snapshot_type
   use pd_force_forces, only: energy_pass, internal_force
-  use pd_force_generic, only: commit_laws, keep_laws
+  use pd_force_generic_points, only: commit_laws, keep_laws
   use pd_force_model, only: options_of
   use pd_law_laws, only: all_laws, law_table_type
   use bodies, only: expect, expect_true, rotation_matrix, shake

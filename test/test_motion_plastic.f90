@@ -8,7 +8,7 @@
 module test_motion_plastic
   use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
-  use pd_force_generic, only: generic_point_dilatation, generic_point_energy
+  use pd_force_generic_points, only: generic_point_dilatation, generic_point_energy
   use pd_set_up_move, only: move
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_observer, only: instant_type, observer_type

@@ -9,8 +9,9 @@ module pd_force_breaking
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_law_material, only: never
-  use pd_force_generic, only: generic_energy_product, generic_point_damage, generic_point_energy, &
-    & refresh_slot
+  use pd_force_generic_bonds, only: refresh_slot
+  use pd_force_generic_points, only: generic_energy_product, generic_point_damage, &
+    & generic_point_energy
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
     & energy_product, point_damage

@@ -7,7 +7,7 @@ module pd_force_forces
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
   use pd_family_lattice, only: lattice_family_type
-  use pd_force_generic, only: generic_energy, generic_force, generic_pulls
+  use pd_force_generic_pass, only: generic_energy, generic_force, generic_pulls
   use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
   use pd_force_model, only: force_options_type, model_type

@@ -5,7 +5,7 @@ module pd_motion_keep
   use pd_base_archive, only: archive_type
   use pd_base_checksum, only: checksum_type
   use pd_base_kinds, only: wp, i1, i8
-  use pd_force_generic, only: keep_laws
+  use pd_force_generic_points, only: keep_laws
   use pd_motion_heating, only: keep_heating
   use pd_motion_memory, only: keep_memory
   use pd_motion_system, only: system_type

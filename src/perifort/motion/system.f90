@@ -6,7 +6,8 @@ module pd_motion_system
   use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
-  use pd_force_generic, only: commit_laws, renew_pulls
+  use pd_force_generic_pass, only: renew_pulls
+  use pd_force_generic_points, only: commit_laws
   use pd_force_forces, only: internal_force, energy_pass, whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of, p_of
   use pd_force_reference, only: point_dilatation, point_force

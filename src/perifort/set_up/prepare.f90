@@ -16,7 +16,7 @@ module pd_set_up_prepare
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of, find_weakest
-  use pd_force_generic, only: begin_laws, refresh_bonds
+  use pd_force_generic_bonds, only: begin_laws, refresh_bonds
   use pd_force_model, only: new_model
   use pd_force_term, only: term_list_type
   use pd_motion_conditions, only: add_loads_to, load_type

@@ -9,7 +9,7 @@ module pd_motion_explicit_time_step
   use pd_family_surface, only: bond_factor
   use pd_family_lattice, only: lattice_family_type
   use pd_force_bound, only: lattice_bound, lattice_printed_bound
-  use pd_force_generic, only: generic_bound
+  use pd_force_generic_pass, only: generic_bound
   use pd_force_model, only: bond_factors_of, model_type, q_of, t_of
   use pd_force_workspace, only: workspace_type
   implicit none (type, external)

@@ -3,7 +3,7 @@ module pd_output_fields_dilatation
   use pd_base_kinds, only: wp
   use pd_body_body, only: gather
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_force_generic, only: generic_point_dilatation
+  use pd_force_generic_points, only: generic_point_dilatation
   use pd_force_reference, only: point_dilatation, reference_dilatation
   use pd_motion_system, only: system_type
   use pd_output_fields_exact, only: exact_type

@@ -4,7 +4,7 @@ module pd_output_fields_energy_density
   use pd_body_body, only: gather
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_forces, only: energy_pass
-  use pd_force_generic, only: generic_point_energy
+  use pd_force_generic_points, only: generic_point_energy
   use pd_force_reference, only: point_energy
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type

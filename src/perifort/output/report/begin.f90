@@ -10,7 +10,7 @@ module pd_output_report_begin
   use pd_body_body, only: body_type, gather
   use pd_set_up_conditions, only: region_mask
   use pd_set_up_plan, only: plan_type
-  use pd_force_generic, only: has_plasticity
+  use pd_force_generic_points, only: has_plasticity
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about
   use pd_output_fields_table, only: all_fields, field_table_type

@@ -3,7 +3,7 @@
 module pd_output_report_columns
   use pd_base_kinds, only: wp
   use pd_base_reduce, only: largest_over
-  use pd_force_generic, only: has_plasticity
+  use pd_force_generic_points, only: has_plasticity
   use pd_law_laws, only: law_table_type
   use pd_motion_observer, only: instant_type
   use pd_motion_system, only: energies_type, system_type

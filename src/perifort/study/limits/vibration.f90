@@ -14,7 +14,7 @@ module pd_study_limits_vibration
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
-  use pd_force_generic, only: begin_laws
+  use pd_force_generic_bonds, only: begin_laws
   use pd_force_model, only: model_type, new_model
   use pd_force_weights, only: build_weights
   use pd_motion_conditions, only: motion_type, moved_by_displacement

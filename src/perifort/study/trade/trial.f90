@@ -7,7 +7,7 @@ module pd_study_trade_trial
   use pd_base_numbers, only: median
   use pd_base_text, only: to_text
   use pd_set_up_prepare, only: prepare, set_up_type
-  use pd_force_generic, only: has_plasticity
+  use pd_force_generic_points, only: has_plasticity
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_set_up_conditions, only: region_mask
   use pd_output_fields_check, only: check_available
