@@ -6,6 +6,7 @@ module test_study_trade_closed_form
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, field_at, form_chain, &
     & form_hole, form_linear, form_wave
   use bodies, only: expect, expect_true
+  use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   implicit none (type, external)
   private
@@ -142,6 +143,47 @@ contains
     end associate
   end function stress_at
 
+  !> Hold a form to values of a field, to the error of the differences.
+  subroutine expect_values(error, form, field, x, values)
+    type(error_type), allocatable, intent(inout) :: error
+    type(closed_form_type), intent(in) :: form
+    character(*), intent(in) :: field
+    real(wp), intent(in) :: x(:), values(:)
+    real(wp) :: found(size(values))
+    type(field_table_type) :: table
+    logical :: known
+
+    table = all_fields()
+    call field_at(form, table%field(field), x, 0.0_wp, found, known)
+    call expect_true(error, known, field//' is known')
+    call expect_close(error, found, values, 1.0e-8_wp, field)
+  end subroutine expect_values
+
+  !> F row by row, from differences of the displacement.
+  function gradient_at(form, x) result(gradient)
+    type(closed_form_type), intent(in) :: form
+    real(wp), intent(in) :: x(2)
+    real(wp) :: gradient(4)
+    real(wp), parameter :: step = 1.0e-5_wp
+    real(wp) :: up(2), down(2), there(2)
+    type(field_table_type) :: table
+    logical :: known
+    integer :: c
+
+    table = all_fields()
+    do c = 1, 2
+      up = x
+      up(c) = up(c) + step
+      down = x
+      down(c) = down(c) - step
+      call field_at(form, table%field('displacement'), up, 0.0_wp, there, known)
+      gradient([c, c + 2]) = there
+      call field_at(form, table%field('displacement'), down, 0.0_wp, there, known)
+      gradient([c, c + 2]) = (gradient([c, c + 2]) - there)/(2*step)
+    end do
+    gradient([1, 4]) = gradient([1, 4]) + 1
+  end function gradient_at
+
   !> At the rim (a hair outside, for the differences) no traction; hoop stress S(1 - 2 cos 2 theta),
   !> 3 S beside the load. Differences err by 1e-9.
   subroutine test_hole_edge(error)
@@ -185,6 +227,10 @@ contains
       call expect(error, (right(3) - left(3) + up(2) - down(2))/(2*step), 0.0_wp, 2.0e-4_wp, &
         & 'balance y')
       s = stress_at(form, x)
+      call expect_values(error, form, 'stress', x, [s(1), s(2), 0.0_wp, s(3)])
+      call expect_values(error, form, 'von_mises', x, [sqrt(s(1)**2 + s(2)**2 - s(1)*s(2) &
+        & + 3*s(3)**2)])
+      call expect_values(error, form, 'deformation_gradient', x, gradient_at(form, x))
       call expect(error, value_of(form, 'dilatation', x, 0.0_wp), (1 - 0.3_wp)*(s(1) + s(2)) &
         & /7.0_wp, 1.0e-8_wp, 'dilatation')
       call expect(error, value_of(form, 'energy_density', x, 0.0_wp), (s(1)**2 + s(2)**2 &
@@ -237,6 +283,14 @@ contains
       end do
       call expect(error, value_of(form, 'energy_density', spread(0.0_wp, 1, d), 0.0_wp), &
         & sum(stress*strain)/2, 1.0e-13_wp, 'energy')
+      if (d == 2) then
+        ! the moduli of the plane: E and nu are those of plane stress
+        call expect_values(error, form, 'stress', spread(0.0_wp, 1, d), [stress(1, 1), &
+          & stress(2, 2), 0.0_wp, stress(1, 2)])
+      else
+        call expect_values(error, form, 'stress', spread(0.0_wp, 1, d), [stress(1, 1), &
+          & stress(2, 2), stress(3, 3), stress(1, 2), stress(2, 3), stress(1, 3)])
+      end if
     end do
   end subroutine test_linear
 

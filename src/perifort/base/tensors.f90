@@ -4,7 +4,7 @@ module pd_base_tensors
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: determinant, cofactors, principal_values
+  public :: determinant, cofactors, principal_values, equivalent_stress
 
 contains
 
@@ -32,6 +32,14 @@ contains
       end do
     end do
   end function cofactors
+
+  !> The equivalent stress of von Mises: that under uniaxial stress with the same deviator's norm.
+  pure real(wp) function equivalent_stress(s)
+    real(wp), intent(in) :: s(3, 3)  !! symmetric [Pa]
+
+    equivalent_stress = sqrt(((s(1, 1) - s(2, 2))**2 + (s(2, 2) - s(3, 3))**2 &
+      & + (s(3, 3) - s(1, 1))**2)/2 + 3*(s(1, 2)**2 + s(2, 3)**2 + s(1, 3)**2))
+  end function equivalent_stress
 
   !> Eigenvalues of a symmetric matrix, the largest first, by Jacobi's rotations: their error is
   !> some epsilon of the largest element, however close they are to each other.

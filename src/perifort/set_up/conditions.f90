@@ -14,7 +14,7 @@ module pd_set_up_conditions
   use pd_motion_heating, only: heating_type, new_heating
   implicit none (type, external)
   private
-  public :: motions_of_scene, loads_of_scene, heating_of_scene, region_mask, no_fail_mask, &
+  public :: volume_of, motions_of_scene, loads_of_scene, heating_of_scene, region_mask, no_fail_mask, &
     & in_no_fail_zones
 
 contains
@@ -107,8 +107,8 @@ contains
 
   !> The volume of points, whose slots stand in the order of the points [m3].
   real(wp) function volume_of(body, slots) result(volume)
-    type(body_type), intent(in) :: body
-    integer(i4), intent(in) :: slots(:)
+    type(body_type), intent(in) :: body     !! the points, arranged in slots
+    integer(i4), intent(in) :: slots(:)     !! (any number) in the order of the points
     type(running_type) :: running
     real(wp) :: totals(6)
     integer :: i

@@ -26,6 +26,8 @@ module pd_set_up_prepare
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_conditions, only: motions_of_scene, loads_of_scene, heating_of_scene, &
     & in_no_fail_zones
+  use pd_set_up_terms, only: add_dashpots_of_scene, add_springs_of_scene, gravity_of_scene, &
+    & leave_uncorrected
   use pd_set_up_families, only: make_family, finish_family
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
@@ -113,6 +115,10 @@ contains
       call loads_of_scene(scene, system%body, loads, error)
       if (allocated(error)) return
       call add_loads_to(system%terms, loads)
+      call gravity_of_scene(scene, system%body, materials, loads)
+      call add_loads_to(system%terms, loads)
+      call add_springs_of_scene(scene, system%body, system%terms)
+      call add_dashpots_of_scene(scene, system%body, materials, system%motions, system%terms)
       if (present(terms)) call system%terms%add(terms)
       call timer%stop('conditions')
 
@@ -121,6 +127,8 @@ contains
         & any([(laws(i)%law%corrected, i=1, size(laws))])
       if (system%model%surface) call surface_factors(system%body, system%family, materials, &
         & system%model%D, system%model%S, laws)
+      if (system%model%surface) call leave_uncorrected(scene, system%motions, system%model%D, &
+        & system%model%S)
       call find_weakest(system%family, system%model)
       call begin_laws(system%body, system%family, system%model, system%workspace%generic)
       call finish_family(system)

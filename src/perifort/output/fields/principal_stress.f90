@@ -3,6 +3,7 @@ module pd_output_fields_principal_stress
   use pd_base_kinds, only: wp
   use pd_base_tensors, only: principal_values
   use pd_motion_system, only: system_type
+  use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: output_field_type, rank_principal
   use pd_output_fields_gradient, only: lack_of_stress, stress_of
   implicit none (type, external)
@@ -18,6 +19,7 @@ contains
     field%meaning = 'principal values of `stress`, the largest first'
     field%rank = rank_principal
     field%of_gradient => of_gradient
+    field%exact => exact
     field%lack => lack_of_stress
   end function principal_stress_field
 
@@ -28,5 +30,14 @@ contains
     real(wp), intent(out) :: values(:)
     values = principal_values(stress_of(system%model, k, gradient))
   end subroutine of_gradient
+
+  pure subroutine exact(state, values, known)
+    type(exact_type), intent(in) :: state
+    real(wp), intent(out) :: values(:)
+    logical, intent(out) :: known
+
+    known = state%knows_stress
+    values = principal_values(state%stress)
+  end subroutine exact
 
 end module pd_output_fields_principal_stress

@@ -1,7 +1,9 @@
 !> The field `von_mises`.
 module pd_output_fields_von_mises
   use pd_base_kinds, only: wp
+  use pd_base_tensors, only: equivalent_stress
   use pd_motion_system, only: system_type
+  use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: output_field_type
   use pd_output_fields_gradient, only: lack_of_stress, stress_of
   implicit none (type, external)
@@ -16,6 +18,7 @@ contains
     field%unit = 'Pa'
     field%meaning = 'equivalent stress of von Mises, of `stress`'
     field%of_gradient => of_gradient
+    field%exact => exact
     field%lack => lack_of_stress
   end function von_mises_field
 
@@ -24,11 +27,16 @@ contains
     integer, intent(in) :: k
     real(wp), intent(in) :: gradient(3, 3)
     real(wp), intent(out) :: values(:)
-    real(wp) :: s(3, 3)
-
-    s = stress_of(system%model, k, gradient)
-    values = sqrt(((s(1, 1) - s(2, 2))**2 + (s(2, 2) - s(3, 3))**2 + (s(3, 3) - s(1, 1))**2)/2 &
-      & + 3*(s(1, 2)**2 + s(2, 3)**2 + s(1, 3)**2))
+    values = equivalent_stress(stress_of(system%model, k, gradient))
   end subroutine of_gradient
+
+  pure subroutine exact(state, values, known)
+    type(exact_type), intent(in) :: state
+    real(wp), intent(out) :: values(:)
+    logical, intent(out) :: known
+
+    known = state%knows_stress
+    values = equivalent_stress(state%stress)
+  end subroutine exact
 
 end module pd_output_fields_von_mises

@@ -5,13 +5,13 @@ module pd_output_report_overview
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: is_set, scene_type
   use pd_law_law, only: bond_law_type
   use pd_law_material, only: material_type, never
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_set_up_conditions, only: no_fail_mask, region_mask
-  use pd_motion_conditions, only: load_of, load_type, number_of_loads
+  use pd_motion_conditions, only: load_of, load_type
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -133,7 +133,10 @@ contains
           & system%motions(i)%slots), 'point')//', '//place(group%side, group%region))
       end associate
     end do
-    do i = 1, number_of_loads(system%terms)
+    if (any(is_set(scene%header%gravity))) text = text//line('gravity', to_text(norm2( &
+      & scene%header%gravity(:system%body%dim)), 4)//' m/s2 on '// &
+      & counted(system%body%n_points, 'point'))
+    do i = 1, size(scene%loads)
       associate (group => scene%loads(i))
         text = text//line('load '//to_text(i), counted(points_of_load(i), &
           & 'point')//', '//place(group%side, group%region))

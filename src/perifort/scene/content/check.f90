@@ -60,6 +60,11 @@ contains
         if (allocated(error)) return
       end do
     end associate
+    if (any(is_set(scene%header%gravity))) then
+      call check_vector(scene%header%gravity, scene%header%dimension, 'gravity', 'scene', 1, error, &
+        & source)
+      if (allocated(error)) return
+    end if
     do i = 1, size(scene%no_fail)
       call check_no_fail(scene, i, error, source)
       if (allocated(error)) return

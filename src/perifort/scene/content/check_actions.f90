@@ -4,10 +4,10 @@ module pd_scene_content_check_actions
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_content_check_bodies, only: check_file
-  use pd_scene_content_rules, only: rule_fault, check_known, check_components
+  use pd_scene_content_rules, only: rule_fault, check_known, check_components, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_course, only: ramp_of
-  use pd_scene_content_types, only: scene_type, is_set, name_length
+  use pd_scene_content_types, only: load_group, scene_type, is_set, name_length
   implicit none (type, external)
   private
   public :: check_initial, check_boundary, check_load
@@ -98,9 +98,13 @@ contains
       if (allocated(error)) return
       call check_components(boundary%velocity, d, 'velocity', 'boundary', number, error, source)
       if (allocated(error)) return
-      if (.not. any(is_set(boundary%displacement)) .and. .not. any(is_set(boundary%velocity))) then
+      if (boundary%absorbing) then
+        call check_absorbing(scene, number, error, source)
+        if (allocated(error)) return
+      else if (.not. any(is_set(boundary%displacement)) .and. &
+        & .not. any(is_set(boundary%velocity))) then
         call rule_fault(error, 'boundary', number, '', 'group &boundary imposes nothing', &
-          & 'expected displacement_x.. or velocity_x..', source)
+          & 'expected displacement_x.. or velocity_x.., or absorbing', source)
         return
       end if
       do i = 1, d
@@ -121,6 +125,83 @@ contains
         & number, error, source)
     end associate
   end subroutine check_boundary
+
+  !> An absorbing `&boundary`: a free layer at a side, in time.
+  subroutine check_absorbing(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(*), parameter :: what = "an absorbing boundary"
+    character(:), allocatable :: key, note
+
+    associate (boundary => scene%boundaries(number))
+      key = ''
+      if (boundary%side == '') then
+        key = 'region'
+        note = 'its layer takes in waves that meet a side: give a side instead'
+      else if (any(is_set(boundary%displacement))) then
+        key = 'displacement_'//first_of(boundary%displacement)
+        note = 'its layer is free: leave out displacement and velocity'
+      else if (any(is_set(boundary%velocity))) then
+        key = 'velocity_'//first_of(boundary%velocity)
+        note = 'its layer is free: leave out displacement and velocity'
+      else if (is_set(boundary%ramp_time) .or. allocated(boundary%times)) then
+        key = merge('times    ', 'ramp_time', allocated(boundary%times))
+        note = 'its dashpots act from the start'
+      else if (boundary%name /= '') then
+        key = 'name'
+        note = 'its forces are those of dashpots; the history has no reaction of them'
+      else if (scene%time%method == 'relaxation') then
+        key = 'absorbing'
+        note = "dashpots have no force in static equilibrium: it needs &time method = 'explicit'"
+      end if
+      if (key /= '') call rule_fault(error, 'boundary', number, trim(key), what//" with '"// &
+        & trim(key)//"'", note, source)
+    end associate
+
+  contains
+
+    !> The first direction that is given.
+    pure character(1) function first_of(value) result(direction)
+      real(wp), intent(in) :: value(3)
+      character(*), parameter :: directions = 'xyz'
+      integer :: c
+
+      c = findloc(is_set(value), .true., dim=1)
+      direction = directions(c:c)
+    end function first_of
+  end subroutine check_absorbing
+
+  !> The springs of a `&load`: a stiffness for each direction, none negative.
+  subroutine check_springs(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    associate (load => scene%loads(number), d => scene%header%dimension)
+      call check_vector(load%stiffness, d, 'stiffness', 'load', number, error, source)
+      if (allocated(error)) return
+      if (any(load%stiffness(:d) < 0.0_wp) .or. .not. any(load%stiffness(:d) > 0.0_wp)) then
+        call rule_fault(error, 'load', number, 'stiffness', "'stiffness' is negative, or 0 along "// &
+          & 'all directions', 'expected values of at least 0 N/m, one of them positive', source)
+      else if (.not. loads_anything(load) .and. (is_set(load%ramp_time) .or. &
+        & allocated(load%times))) then
+        call rule_fault(error, 'load', number, trim(merge('times    ', 'ramp_time', &
+          & allocated(load%times))), 'springs with a course in time', &
+          & 'springs act from the start; a course is for forces', source)
+      end if
+    end associate
+  end subroutine check_springs
+
+  !> Whether a `&load` has a force.
+  pure logical function loads_anything(load)
+    type(load_group), intent(in) :: load
+
+    loads_anything = is_set(load%pressure) .or. any(is_set(load%force)) .or. &
+      & any(is_set(load%body_force))
+  end function loads_anything
 
   !> One `&load`; the only body and, in relaxation, the ramp over the load steps are defaults. An
   !> error is set if a rule is broken.
@@ -147,10 +228,12 @@ contains
       if (allocated(error)) return
       call check_components(load%body_force, d, 'body_force', 'load', number, error, source)
       if (allocated(error)) return
-      if (.not. is_set(load%pressure) .and. .not. any(is_set(load%force)) .and. &
-        & .not. any(is_set(load%body_force))) then
+      if (any(is_set(load%stiffness))) then
+        call check_springs(scene, number, error, source)
+        if (allocated(error)) return
+      else if (.not. loads_anything(load)) then
         call rule_fault(error, 'load', number, '', 'group &load loads nothing', &
-          & 'expected pressure, force_x.. or body_force_x..', source)
+          & 'expected pressure, force_x.., body_force_x.. or stiffness', source)
         return
       end if
       if (is_set(load%pressure) .and. load%region /= '') then
@@ -158,8 +241,8 @@ contains
           & "a pressure needs a 'side'; a region takes force_x.. or body_force_x..", source)
         return
       end if
-      call check_course(scene, load%ramp_time, load%times, load%values, 'load', number, error, &
-        & source)
+      if (loads_anything(load)) call check_course(scene, load%ramp_time, load%times, load%values, &
+        & 'load', number, error, source)
     end associate
   end subroutine check_load
 

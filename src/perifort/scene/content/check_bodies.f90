@@ -265,6 +265,10 @@ contains
         call rule_fault(error, 'material', number, 'scatter', "model = '"// &
           & trim(material%model)//"' has no 'scatter'", &
           & 'its bonds lose their strength little by little', source)
+      else if (.not. is_set(material%density) .and. any(is_set(scene%header%gravity))) then
+        call rule_fault(error, 'material', number, 'density', &
+          & "group &material lacks the key 'density'", &
+          & 'gravity needs the mass density [kg/m3]', source)
       else if (.not. is_set(material%density) .and. scene%time%method == 'explicit') then
         call rule_fault(error, 'material', number, '', &
           & "group &material lacks the key 'density'", &

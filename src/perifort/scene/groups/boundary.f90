@@ -17,6 +17,7 @@ module pd_scene_groups_boundary
     character(name_length) :: region = ''        !! existing points instead
     real(wp) :: displacement(3) = unset          !! imposed, unset = free [m]
     real(wp) :: velocity(3) = unset              !! imposed, unset = free [m/s]
+    logical :: absorbing = .false.               !! the layer takes in waves
     real(wp) :: ramp_time = unset                !! [s]
     real(wp), allocatable :: times(:)            !! [s]
     real(wp), allocatable :: values(:)           !! factors at `times` [-]
@@ -39,6 +40,8 @@ contains
     call keys%key('region', group%region, 'name of a region, instead of side')
     call keys%triple('displacement', group%displacement, 'm', 'imposed displacement', 'free')
     call keys%triple('velocity', group%velocity, 'm/s', 'imposed velocity', 'free')
+    call keys%key('absorbing', group%absorbing, 'side: the layer is free and takes in waves that '// &
+      & 'meet the side')
     call visit_course(keys, group%ramp_time, group%times, group%values)
   end subroutine visit
 

@@ -1,7 +1,7 @@
 !> The group `&scene`: the problem as a whole.
 module pd_scene_groups_header
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: name_length, path_length
+  use pd_scene_format_given, only: name_length, path_length, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type, change_harmless, change_refused
   implicit none (type, external)
@@ -20,6 +20,7 @@ module pd_scene_groups_header
     character(name_length) :: plane = 'stress'   !! 2D: 'stress' or 'strain'
     real(wp) :: thickness = 1.0_wp               !! 2D: h [m]
     real(wp) :: area = 1.0_wp                    !! 1D: cross section A [m2]
+    real(wp) :: gravity(3) = unset               !! acceleration of all points [m/s2]
     character(name_length) :: precision = 'double' !! of bonds: 'double' or 'mixed'
     character(name_length) :: defaults = ''      !! a `known_defaults`; '' = those of this version
   contains
@@ -41,6 +42,8 @@ contains
       & allowed=[character(6) :: 'stress', 'strain'])
     call keys%key('thickness', group%thickness, 'm', '2D: thickness h', above=0.0_wp)
     call keys%key('area', group%area, 'm2', '1D: cross section A', above=0.0_wp)
+    call keys%key('gravity', group%gravity, 'm/s2', 'acceleration that acts on all points; in '// &
+      & 'relaxation it grows over the load steps', default='none')
     call keys%key('precision', group%precision, 'of the bonds: mixed computes them in single '// &
       & 'precision, from a state in double precision (lattice families)', &
       & allowed=[character(6) :: 'double', 'mixed'])

@@ -17,6 +17,7 @@ module pd_scene_groups_load
     real(wp) :: pressure = unset                 !! [Pa], positive pushes
     real(wp) :: force(3) = unset                 !! total over the points: force_x, _y, _z [N]
     real(wp) :: body_force(3) = unset            !! density: body_force_x, _y, _z [N/m3]
+    real(wp) :: stiffness(3) = unset             !! of springs, total over the points [N/m]
     real(wp) :: ramp_time = unset                !! [s]
     real(wp), allocatable :: times(:)            !! [s]
     real(wp), allocatable :: values(:)           !! factors at `times` [-]
@@ -37,6 +38,8 @@ contains
     call keys%key('pressure', group%pressure, 'Pa', 'side: pressure, positive pushes')
     call keys%triple('force', group%force, 'N', 'total force over the points', '0')
     call keys%triple('body_force', group%body_force, 'N/m3', 'force density', '0')
+    call keys%key('stiffness', group%stiffness, 'N/m', 'total stiffness of springs that pull the '// &
+      & 'points back, along each direction', default='none')
     call visit_course(keys, group%ramp_time, group%times, group%values)
   end subroutine visit
 

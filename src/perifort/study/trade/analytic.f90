@@ -71,6 +71,7 @@ contains
     if (form%dim == 2 .and. scene%header%plane == 'strain') then
       form%modulus = form%modulus/(1 - nu**2)
       form%ratio = nu/(1 - nu)
+      form%across = nu
     end if
     select case (name)
     case ('bar_vibration')
@@ -111,9 +112,14 @@ contains
       reason = 'the scene has a crack'
     else if (any(is_set(scene%initial%temperature_change))) then
       reason = 'the scene has a temperature change'
+    else if (any(is_set(scene%header%gravity))) then
+      reason = 'the scene has gravity'
+    else if (any(scene%boundaries%absorbing)) then
+      reason = 'the scene has an absorbing boundary'
     end if
     do i = 1, size(scene%loads)
       if (allocated(scene%loads(i)%times)) reason = 'a load has its own times'
+      if (any(is_set(scene%loads(i)%stiffness))) reason = 'a &load has springs'
     end do
     do i = 1, size(scene%boundaries)
       if (allocated(scene%boundaries(i)%times)) reason = 'a boundary has its own times'

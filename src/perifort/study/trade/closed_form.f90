@@ -22,6 +22,7 @@ module pd_study_trade_closed_form
     character(:), allocatable :: name
     real(wp) :: modulus = 0.0_wp         !! E; plane strain: E/(1 - nu2) [Pa]
     real(wp) :: ratio = 0.0_wp           !! nu; plane strain: nu/(1 - nu)
+    real(wp) :: across = 0.0_wp          !! 2D: stress zz over xx + yy, nu in plane strain, else 0
     ! form_linear: u = gradient (x - origin) + shift
     real(wp) :: gradient(3, 3) = 0.0_wp  !! [-]
     real(wp) :: origin(3) = 0.0_wp       !! of form_wave the held end, of form_hole the centre [m]
@@ -55,6 +56,7 @@ contains
     logical, intent(out) :: known                 !! `values` are set to the closed form's answer
     type(exact_type) :: state
 
+    state%dim = form%dim
     if (all(x >= form%lower) .and. all(x <= form%upper)) then
       select case (form%kind)
       case (form_wave)
@@ -90,6 +92,9 @@ contains
     state%velocity(1) = form%side*form%gradient(1, 1)*form%speed*(slope(s + run) - slope(s - run))/2
     state%dilatation = strain
     state%energy_density = form%modulus*strain**2/2
+    state%knows_stress = .true.
+    state%gradient(1, 1) = strain
+    state%stress(1, 1) = form%modulus*strain
 
   contains
 
@@ -123,6 +128,13 @@ contains
     state%displacement(:d) = form%shift(:d) + matmul(form%gradient(:d, :d), x - form%origin(:d))
     state%dilatation = sum([(strain(c, c), c=1, d)])
     state%energy_density = energy_of(form, strain(:d, :d), state%dilatation)
+    state%knows_stress = .true.
+    state%gradient(:d, :d) = form%gradient(:d, :d)
+    state%stress(:d, :d) = form%modulus/(1 + form%ratio)*strain(:d, :d)
+    do c = 1, d
+      state%stress(c, c) = state%stress(c, c) + lame_of(form)*state%dilatation
+    end do
+    if (d == 2) state%stress(3, 3) = form%across*(state%stress(1, 1) + state%stress(2, 2))
   end subroutine linear
 
   !> All is known of a state of equilibrium, and the velocity is 0.
@@ -139,25 +151,29 @@ contains
     type(closed_form_type), intent(in) :: form
     real(wp), intent(in) :: strain(:, :)
     real(wp), intent(in) :: trace
-    real(wp) :: shear, lame
+
+    energy = form%modulus/(2*(1 + form%ratio))*sum(strain**2) + lame_of(form)*trace**2/2
+  end function energy_of
+
+  !> lambda of the dimension [Pa]: stress = 2 mu strain + lambda tr(strain). In 1D, where the ratio
+  !> is 0, nothing is left for it.
+  pure real(wp) function lame_of(form) result(lame)
+    type(closed_form_type), intent(in) :: form
 
     associate (e => form%modulus, nu => form%ratio)
-      shear = e/(2*(1 + nu))
       select case (form%dim)
       case (3)
         lame = e*nu/((1 + nu)*(1 - 2*nu))
       case (2)
         lame = e*nu/(1 - nu**2)
       case (1)
-        energy = e*trace**2/2
-        return
+        lame = 0.0_wp
       case default
         lame = 0.0_wp
-        call internal_fault('energy_of knows one to three dimensions')
+        call internal_fault('lame_of knows one to three dimensions')
       end select
     end associate
-    energy = shear*sum(strain**2) + lame*trace**2/2
-  end function energy_of
+  end function lame_of
 
   !> The solution of Kirsch: a hole in an infinite plate under uniaxial stress S, by Kolosov's
   !> potentials
@@ -169,7 +185,7 @@ contains
     real(wp), intent(in) :: x(:)
     type(exact_type), intent(inout) :: state
     complex(wp) :: z, phi, phi1, phi2, psi, psi1, u, shear_part
-    real(wp) :: mu, kappa, along, across, mean, half_difference
+    real(wp) :: mu, kappa, along, across, mean, half_difference, turn
     integer :: other
 
     other = 3 - form%axis
@@ -196,6 +212,20 @@ contains
     across = mean + half_difference
     state%energy_density = (along**2 + across**2 - 2*form%ratio*along*across)/(2*form%modulus) &
       & + aimag(shear_part)**2/(2*mu)
+    state%knows_stress = .true.
+    ! the rotation of Kolosov's solution: mu (du_2/dx_1 - du_1/dx_2) = (kappa + 1) Im(phi')
+    turn = (kappa + 1)/(2*mu)*aimag(phi1)
+    associate (c => form%axis, shear => aimag(shear_part))
+      state%gradient(c, c) = (along - form%ratio*across)/form%modulus
+      state%gradient(other, other) = (across - form%ratio*along)/form%modulus
+      state%gradient(c, other) = shear/(2*mu) - turn
+      state%gradient(other, c) = shear/(2*mu) + turn
+      state%stress(c, c) = along
+      state%stress(other, other) = across
+      state%stress(c, other) = shear
+      state%stress(other, c) = shear
+      state%stress(3, 3) = form%across*(along + across)
+    end associate
   end subroutine hole
 
   !> Displacements and velocities of one wave number k on an endless chain stay of that wave number

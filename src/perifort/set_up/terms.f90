@@ -1,0 +1,123 @@
+!> What acts on a scene's points beside bonds and loads: gravity, springs, absorbing boundaries.
+module pd_set_up_terms
+  use pd_base_kinds, only: wp
+  use pd_body_body, only: body_type
+  use pd_body_waves, only: longitudinal_speed, shear_speed
+  use pd_force_dashpots, only: new_dashpots
+  use pd_force_springs, only: new_springs
+  use pd_force_term, only: term_list_type
+  use pd_law_material, only: material_type
+  use pd_motion_conditions, only: load_of, load_type, motion_type
+  use pd_motion_curve, only: constant_curve, ramp
+  use pd_scene_content_types, only: is_set, scene_type
+  use pd_set_up_conditions, only: volume_of
+  implicit none (type, external)
+  private
+  public :: gravity_of_scene, add_springs_of_scene, add_dashpots_of_scene, leave_uncorrected
+
+contains
+
+  !> The weight of all points, layers included, as one load; none without `gravity`. In relaxation it
+  !> grows over the load steps.
+  subroutine gravity_of_scene(scene, body, materials, loads)
+    type(scene_type), intent(in) :: scene            !! a checked scene
+    type(body_type), intent(in) :: body              !! its points, arranged in slots
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
+    type(load_type), allocatable, intent(out) :: loads(:)  !! (0 or 1)
+    integer :: c
+
+    allocate (loads(merge(1, 0, any(is_set(scene%header%gravity)))))
+    if (size(loads) == 0) return
+    associate (load => loads(1), gravity => scene%header%gravity)
+      load%slots = body%slot
+      allocate (load%density(size(load%slots), body%dim))
+      do c = 1, body%dim
+        load%density(:, c) = materials(body%material(load%slots))%density*gravity(c)
+      end do
+      load%curve = constant_curve()
+      if (scene%time%method == 'relaxation') load%curve = ramp(1.0_wp)
+    end associate
+  end subroutine gravity_of_scene
+
+  !> Springs of every `&load` with a stiffness, shared out among its points by volume.
+  subroutine add_springs_of_scene(scene, body, terms)
+    type(scene_type), intent(in) :: scene         !! a checked scene
+    type(body_type), intent(in) :: body           !! its points, arranged in slots
+    type(term_list_type), intent(inout) :: terms  !! with the loads of the scene first
+    type(load_type), pointer :: load
+    integer :: l
+
+    do l = 1, size(scene%loads)
+      associate (group => scene%loads(l))
+        if (.not. any(is_set(group%stiffness))) cycle
+        load => load_of(terms, l)
+        call terms%add(new_springs(load%slots, &
+          & group%stiffness(:body%dim)/volume_of(body, load%slots)))
+      end associate
+    end do
+  end subroutine add_springs_of_scene
+
+  !> Dashpots in the layer of every absorbing `&boundary` (doc/theory.md, 10): per area of the side
+  !> rho c_p along its normal, rho c_s across it. Of the n rows of a layer the two act that are next
+  !> to a distance of 0.2 (n - 2) (1 + (n - 3)/6) rows from the outermost one: there the mass of what
+  !> lies beyond balances the softness of the incomplete families.
+  subroutine add_dashpots_of_scene(scene, body, materials, motions, terms)
+    type(scene_type), intent(in) :: scene            !! a checked scene
+    type(body_type), intent(in) :: body              !! its points, arranged in slots
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
+    type(motion_type), intent(in) :: motions(:)      !! (boundaries) with the slots of the layers
+    type(term_list_type), intent(inout) :: terms     !! with the dashpots on return
+    real(wp), allocatable :: damping(:, :)
+    real(wp) :: direction, row, width, outermost
+    integer :: m, i, c, k, axis, rows
+
+    do m = 1, size(scene%boundaries)
+      if (.not. scene%boundaries(m)%absorbing) cycle
+      associate (slots => motions(m)%slots, side => scene%boundaries(m)%side)
+        axis = index('xyz', side(1:1))
+        direction = merge(-1.0_wp, 1.0_wp, side(3:5) == 'min')
+        allocate (damping(size(slots), body%dim))
+        outermost = maxval(direction*body%x(slots, axis))
+        width = outermost - minval(direction*body%x(slots, axis))
+        do i = 1, size(slots)
+          k = slots(i)
+          rows = nint(width/body%spacing(k)) + 1
+          row = (outermost - direction*body%x(k, axis))/body%spacing(k)
+          associate (material => materials(body%material(k)))
+            do c = 1, body%dim
+              damping(i, c) = share(row, rows)*material%density/body%spacing(k) &
+                & *merge(longitudinal_speed(material), shear_speed(material), c == axis)
+            end do
+          end associate
+        end do
+        call terms%add(new_dashpots(slots, damping))
+        deallocate (damping)
+      end associate
+    end do
+  end subroutine add_dashpots_of_scene
+
+  !> The part of the dashpots in a row; the rows of a column add up to 1.
+  pure real(wp) function share(row, rows)
+    real(wp), intent(in) :: row   !! rows from the outermost one [-]
+    integer, intent(in) :: rows   !! of the layer
+
+    share = max(0.0_wp, 1 - abs(row - min(0.2_wp*max(0, rows - 2)*(1 + (rows - 3)/6.0_wp), &
+      & rows - 1.0_wp)))
+  end function share
+
+  !> Take the surface correction from the points of absorbing layers, whose softness their mass
+  !> balances.
+  pure subroutine leave_uncorrected(scene, motions, D, S)
+    type(scene_type), intent(in) :: scene         !! a checked scene
+    type(motion_type), intent(in) :: motions(:)   !! (boundaries) with the slots of the layers
+    real(wp), intent(inout) :: D(:, :), S(:, :)   !! (n_slots, dim) surface factors [-]
+    integer :: m
+
+    do m = 1, size(scene%boundaries)
+      if (.not. scene%boundaries(m)%absorbing) cycle
+      D(motions(m)%slots, :) = 1.0_wp
+      S(motions(m)%slots, :) = 1.0_wp
+    end do
+  end subroutine leave_uncorrected
+
+end module pd_set_up_terms
