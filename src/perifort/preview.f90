@@ -124,8 +124,8 @@ contains
       allocate (about%kept%rows(columns, 0), about%kept%times(0))
       call take_all_memory(system, plan)
       ! rows and times are counted and not made: a long run may have more than fit into the memory
-      bytes = checkpoint_bytes(about, system, measures) + 8*(int(columns, i8)*planned_rows(schedule) &
-        & + planned_outputs(schedule, plan%step))
+      bytes = checkpoint_bytes(about, system, measures) + 8*(int(columns, i8) &
+        & *planned_rows(schedule) + planned_outputs(schedule, plan%step))
     end associate
   end function bytes_of_checkpoint
 

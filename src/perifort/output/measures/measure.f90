@@ -1,6 +1,6 @@
-!> What the history measures besides the columns that every run has: an abstract kind, and the list of
-!> the measures of a run. Each kind has a module of its own in this folder; `pd_output_measures_table`
-!> lists them.
+!> What the history measures besides the columns that every run has: an abstract kind, and the list
+!> of the measures of a run. Each kind has a module of its own in this folder;
+!> `pd_output_measures_table` lists them.
 !>
 !>     call measures_of(scene, table, measures)         ! known before there are points
 !>     call measures%begin(scene, system, error)        ! where they measure
@@ -9,7 +9,7 @@
 !>     call measures%keep(archive)                      ! in a checkpoint
 module pd_output_measures_measure
   use pd_base_archive, only: archive_type
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp
   use pd_base_warnings, only: warnings_type
   use pd_motion_observer, only: instant_type
@@ -133,14 +133,25 @@ contains
     call move_alloc(longer, self%items)
   end subroutine add
 
-  !> Find where all of them measure. An error if a measure cannot be had of this system.
+  !> Find where all of them measure. An error if a measure cannot be had of this system, or if two
+  !> columns have one name.
   subroutine begin(self, scene, system, error)
     class(measure_list_type), intent(inout) :: self  !! of the scene
     type(scene_type), intent(in) :: scene            !! for the places of errors
     type(system_type), intent(in) :: system          !! made from it, before its first step
     type(error_type), allocatable, intent(out) :: error
-    integer :: i
+    type(column_type), allocatable :: columns(:)
+    integer :: i, j
 
+    columns = self%columns(system%body%dim)
+    do i = 2, size(columns)
+      j = findloc(columns(:i - 1)%name, columns(i)%name, dim=1)
+      if (j == 0) cycle
+      call fail(error, "two columns of the history would be named '"//trim(columns(i)%name)// &
+        & "', of a "//trim(columns(j)%origin)//' and of a '//trim(columns(i)%origin)// &
+        & ': give one of the groups another name')
+      return
+    end do
     do i = 1, size(self%items)
       call self%items(i)%measure%begin(scene, system, error)
       if (allocated(error)) return

@@ -2,8 +2,10 @@
 module pd_output_measures_table
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_boundary, only: add_boundaries
+  use pd_output_measures_fragments, only: add_fragments
   use pd_output_measures_measure, only: measure_list_type
   use pd_output_measures_probe, only: add_probes
+  use pd_output_measures_tip, only: add_tips
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
@@ -18,8 +20,10 @@ contains
     type(measure_list_type), intent(out) :: measures     !! not begun yet
 
     allocate (measures%items(0))
+    call add_fragments(scene, measures)
     call add_boundaries(scene, measures)
     call add_probes(scene, table, measures)
+    call add_tips(scene, measures)
   end subroutine measures_of
 
 end module pd_output_measures_table

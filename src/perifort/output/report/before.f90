@@ -1,5 +1,5 @@
-!> What is known of a run's output before its first step: its measures, whether the schedule fits the
-!> run, warnings and notes.
+!> What is known of a run's output before its first step: its measures, whether the schedule fits
+!> the run, warnings and notes.
 module pd_output_report_before
   use pd_base_error, only: error_type
   use pd_output_fields_check, only: check_available, check_names

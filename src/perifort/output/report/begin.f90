@@ -41,8 +41,8 @@ module pd_output_report_begin
 
 contains
 
-  !> Files, history and progress of a run, whose measures the recorder has. With `in_memory` the last
-  !> output stays in memory, too.
+  !> Files, history and progress of a run, whose measures the recorder has. With `in_memory` the
+  !> last output stays in memory, too.
   subroutine open_recorder(scene, options, system, plan, directory, stem, restart, recorder, &
     & in_memory, error)
     type(scene_type), intent(in) :: scene
@@ -64,6 +64,7 @@ contains
     if (restart%found) kept = restart%about%kept
     associate (body => system%body, schedule => recorder%schedule)
       schedule = schedule_of(scene, plan, system%family%n_bonds)
+      recorder%fragments = scene%output%fragments
       recorder%columns = history_table(plan%relaxes, has_plasticity(system%model))
       table = fields_of(options)
       allocate (recorder%fields(size(scene%output%fields)))

@@ -15,6 +15,7 @@ module pd_output_report_recorder
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
   use pd_output_report_balance, only: balance_type
+  use pd_output_measures_fragments, only: fragment_type, fragments_of
   use pd_output_measures_measure, only: measure_list_type, row_source_type
   use pd_output_report_columns, only: history_row, history_table_type
   use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
@@ -47,6 +48,7 @@ module pd_output_report_recorder
     type(warnings_type) :: warnings
     logical :: turned = .false.              !! parts have rotated, which was reported
     logical :: quiet = .false.               !! warnings are kept, but not printed
+    logical :: fragments = .false.           !! of every output are listed
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
@@ -323,8 +325,29 @@ contains
     if (allocated(error)) return
     call warn_if_any(recorder, 'gradient', gradient_warning(undefined, instant%time))
     call recorder%results%end_output(error)
+    if (recorder%fragments .and. .not. allocated(error)) &
+      & call list_fragments(recorder, now, error)
     recorder%outputs = recorder%outputs + 1
     recorder%output_step = instant%step
   end subroutine write_output
+
+  !> A line for each fragment.
+  subroutine list_fragments(recorder, now, error)
+    class(recorder_type), intent(inout) :: recorder
+    type(moment_type), intent(in) :: now
+    type(error_type), allocatable, intent(out) :: error
+    type(fragment_type), allocatable :: fragments(:)
+    real(wp), allocatable :: values(:, :)
+    integer :: i
+
+    call fragments_of(now, fragments)
+    allocate (values(12, size(fragments)))
+    do i = 1, size(fragments)
+      associate (f => fragments(i))
+        values(:, i) = [real(f%points, wp), f%mass, f%centre, f%velocity, f%spin, f%size]
+      end associate
+    end do
+    call recorder%results%add_fragments(values, error)
+  end subroutine list_fragments
 
 end module pd_output_report_recorder
