@@ -11,6 +11,7 @@ module pd_output_measures_tip
   use pd_base_text, only: line => labelled_line, to_text
   use pd_base_warnings, only: warnings_type
   use pd_body_generate, only: touch
+  use pd_family_family, only: allocate_bonds, bonds_type
   use pd_motion_system, only: system_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
   use pd_output_measures_reach, only: reach_type
@@ -305,15 +306,59 @@ contains
     end function vector
   end function describe_tip
 
-  !> A crack that begins where no point is cannot be found.
+  !> A crack that begins where no point is cannot be found, nor can one beside which the damage
+  !> stays below the threshold.
   subroutine warn_of_tip(measure, system, warnings)
     class(tip_measure_type), intent(in) :: measure
     type(system_type), intent(in) :: system
     type(warnings_type), intent(inout) :: warnings
+    real(wp) :: beside
 
     if (.not. measure%reach%has_place(system%body)) call warnings%add('tip '// &
       & to_text(measure%number), 'no point lies within 1.5 spacings of the place from which '// &
       & 'the tip '//measure%name//' is looked for: its crack cannot be found', tell=.false.)
+    if (system%body%dim == 1) return
+    beside = damage_beside(measure, system)
+    if (beside <= measure%threshold) call warnings%add('threshold '//to_text(measure%number), &
+      & 'the damage beside a straight crack is '//to_text(beside, 2)//', not above the '// &
+      & 'threshold of the tip '//measure%name//' ('//to_text(measure%threshold, 3)// &
+      & '): it follows branches and rough cracks at best; a lower threshold finds more', &
+      & tell=.false.)
   end subroutine warn_of_tip
+
+  !> The damage of a point inside a body half a spacing beside a long, straight crack along the
+  !> direction, and in 3D along its front: the part of its family that lies beyond.
+  real(wp) function damage_beside(measure, system) result(damage)
+    class(tip_measure_type), intent(in) :: measure
+    type(system_type), intent(in) :: system
+    integer, parameter :: looked_at = 1000  ! points among which the one with most bonds is taken
+    type(bonds_type) :: bonds
+    real(wp) :: normal(3), along(3)
+    integer :: i, best, k
+
+    associate (body => system%body, d => measure%direction)
+      along = [0.0_wp, 0.0_wp, 1.0_wp]
+      if (body%dim == 3) along = merge(1.0_wp, 0.0_wp, [1, 2, 3] == measure%across)
+      normal = [along(2)*d(3) - along(3)*d(2), along(3)*d(1) - along(1)*d(3), &
+        & along(1)*d(2) - along(2)*d(1)]
+      normal = normal/norm2(normal)
+      call allocate_bonds(system%family, bonds)
+      best = 0
+      k = int(body%slot(1))
+      do i = 1, body%n_points, max(1, body%n_points/looked_at)
+        call system%family%bonds_of(int(body%slot(i)), bonds)
+        if (bonds%n <= best) cycle
+        best = bonds%n
+        k = int(body%slot(i))
+      end do
+      call system%family%bonds_of(k, bonds)
+      damage = 0.0_wp
+      if (bonds%n == 0) return
+      associate (beyond => matmul(bonds%xi(:bonds%n, :), normal(:body%dim)))
+        damage = sum(bonds%weight(:bonds%n), mask=beyond > 0.5_wp*body%spacing(k)*(1 + touch)) &
+          & /sum(bonds%weight(:bonds%n))
+      end associate
+    end associate
+  end function damage_beside
 
 end module pd_output_measures_tip
