@@ -127,9 +127,9 @@ contains
     end do
   end subroutine test_straight
 
-  !> A time of waiting before the growth does not count, one after it does. 2 columns in 3 rows are a
-  !> stair that leaves its straight line by a third of a column at most either way: over 10 columns
-  !> the slope is within 3 % of the speed.
+  !> A time of waiting before the growth does not count, one after it does. 2 columns in 3 rows are
+  !> a stair that leaves its straight line by a third of a column at most either way: over 10
+  !> columns the slope is within 3 % of the speed.
   subroutine test_stand(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
