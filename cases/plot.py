@@ -258,7 +258,8 @@ def history_pictures(results, folder):
     finish_history(axes[-1], label, relaxation)
     save(figure, folder / "energies.png")
 
-    reactions = [name for name in h if results.origins[name] == "boundary"]
+    reactions = [name for name in h
+                 if results.origins[name] == "boundary" and results.units[name] == "N"]
     probes = [name for name in h if results.origins[name] == "probe"]
     units = {}
     for name in probes:

@@ -38,7 +38,8 @@ module perifort
   use pd_scene_content_types, only: body_group, boundary_group, crack_group, group_table, &
     & header_type, horizon_group, initial_group, is_set, load_group, material_group, &
     & name_length, no_fail_group, output_group, path_length, probe_group, region_group, &
-    & relaxation_group, scene_type, shape_group, study_group, time_group, unset
+    & relaxation_group, scene_type, shape_group, study_group, time_group, &
+    & tip_group, unset
   use pd_scene_content_write, only: scene_text
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type
@@ -51,7 +52,7 @@ module perifort
   public :: read_scene, read_scene_text, check_scene, scene_text
   public :: scene_type, header_type, body_group, shape_group, region_group, material_group, &
     & horizon_group, crack_group, no_fail_group, initial_group, boundary_group, load_group, &
-    & time_group, relaxation_group, output_group, probe_group, study_group
+    & time_group, relaxation_group, output_group, probe_group, tip_group, study_group
   public :: unset, is_set, name_length, path_length
   ! own groups
   public :: group_table, group_type, keys_type, list_groups

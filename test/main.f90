@@ -62,6 +62,9 @@ program main
   use test_orders, only: collect_orders
   use test_output_fields_stress, only: collect_output_fields_stress
   use test_output_fields_table, only: collect_output_fields_table
+  use test_output_measures_boundary, only: collect_output_measures_boundary
+  use test_output_measures_fragments, only: collect_output_measures_fragments
+  use test_output_measures_tip, only: collect_output_measures_tip
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
@@ -160,6 +163,9 @@ program main
   call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
+  call register('output_measures_boundary', collect_output_measures_boundary)
+  call register('output_measures_fragments', collect_output_measures_fragments)
+  call register('output_measures_tip', collect_output_measures_tip)
   call register('output_report_contact', collect_output_report_contact)
   call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)

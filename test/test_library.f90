@@ -10,7 +10,7 @@ module test_library
     & point_near, positions_of, preview_scene, probe_group, program_version, read_scene_text, &
     & relaxation_group, run_options_type, run_scene, scene_text, scene_type, shape_group, &
     & status_input, status_interrupted, status_no_answer, study_group, system_type, time_group, &
-    & unset, velocities_of, volumes_of, wp
+    & tip_group, unset, velocities_of, volumes_of, wp
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -186,9 +186,9 @@ contains
     type(fault_type), allocatable :: fault
     character(:), allocatable :: text
     integer :: i
-    character(*), parameter :: groups(16) = [character(10) :: 'scene', 'body', 'remove', 'region', &
+    character(*), parameter :: groups(17) = [character(10) :: 'scene', 'body', 'remove', 'region', &
       & 'material', 'horizon', 'crack', 'no_fail', 'initial', 'boundary', 'load', 'time', &
-      & 'relaxation', 'output', 'probe', 'study']
+      & 'relaxation', 'output', 'probe', 'tip', 'study']
 
     scene%header = header_type(title='all', dimension=2)
     scene%bodies = [body_group(name='plate', lower=[0.0_wp, 0.0_wp, unset], upper=[0.1_wp, 0.1_wp, &
@@ -208,6 +208,8 @@ contains
     scene%relaxation = relaxation_group(tolerance=1.0e-5_wp)
     scene%output = output_group(every=2)
     scene%probes = [probe_group(name='tip', point=[0.1_wp, 0.1_wp, unset])]
+    scene%tips = [tip_group(name='front', from=[0.0_wp, 0.03_wp, unset], direction=[1.0_wp, &
+      & 0.0_wp, unset])]
     scene%studies = [study_group(vary='horizon%ratio', measure='strain_energy', against='finest')]
     scene%studies(1)%values = [character(1024) :: '2.5', '3.0']
     call check_scene(scene, fault)

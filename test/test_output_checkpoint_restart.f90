@@ -12,7 +12,7 @@ module test_output_checkpoint_restart
   use pd_output_results_datasets, only: read_rows
   use pd_output_results_files, only: file_bytes, file_exists, make_directory, remove_file
   use pd_output_results_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
-  use pd_scene_content_types, only: scene_type, unset
+  use pd_scene_content_types, only: scene_type, tip_group, unset
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   use bodies, only: box_scene, expect_true, youngs_modulus
   implicit none (type, external)
@@ -29,6 +29,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('a running crack, cut after every step', test_crack), &
+      & new_unittest('a tip and fragments, cut after every step', test_measures), &
       & new_unittest('every integrator, cut after every step', test_integrators), &
       & new_unittest('on two threads', test_two_threads), &
       & new_unittest('a block in 3D', test_block), &
@@ -272,6 +273,42 @@ contains
     call accept(error, fault)
     call close_file(file, fault)
   end subroutine expect_broken
+
+  !> What goes from row to row, and the table beside the results.
+  subroutine test_measures(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call plate(scene)
+    scene%output%fragments = .true.
+    scene%output%history_every = 1
+    scene%time%steps = 60
+    scene%tips = [tip_group(name='a', from=[0.0_wp, 6*spacing, unset], direction=[1.0_wp, 0.1_wp, &
+      & unset])]
+    call run(scene, 'whole', fault, threads=2)
+    call accept(error, fault)
+    call expect_broken(error, 'whole')
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    call expect_same_results(error, 'whole', 'pieces', 10)
+    call expect_same_file(error, here//'/whole/fragments.csv', here//'/pieces/fragments.csv')
+    ! rows that are written only because the run stops leave no trace
+    scene%output%history_every = 4
+    call run(scene, 'whole', fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    call expect_same_results(error, 'whole', 'pieces', 10)
+    ! a tip cannot join later
+    call run(scene, 'pieces', fault, minutes=1.0e-12_wp)
+    scene%tips(1)%threshold = 0.4_wp
+    call run(scene, 'pieces', fault, restart=.true.)
+    call expect_true(error, allocated(fault), 'another tip goes on')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, '&tip threshold') > 0, fault%message)
+  end subroutine test_measures
 
   subroutine test_crack(error)
     type(error_type), allocatable, intent(out) :: error

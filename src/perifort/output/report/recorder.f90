@@ -15,9 +15,10 @@ module pd_output_report_recorder
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
   use pd_output_report_balance, only: balance_type
-  use pd_output_report_columns, only: history_row, history_table_type, row_source_type
+  use pd_output_measures_fragments, only: fragment_type, fragments_of
+  use pd_output_measures_measure, only: measure_list_type, row_source_type
+  use pd_output_report_columns, only: history_row, history_table_type
   use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
-  use pd_output_report_probes, only: probe_type
   use pd_output_report_run_warnings, only: contact_warning, gradient_warning, &
     & rotation_warning, strain_warning
   use pd_output_report_schedule, only: due_at, iteration_due, schedule_type
@@ -30,7 +31,7 @@ module pd_output_report_recorder
     type(results_type) :: results
     type(schedule_type) :: schedule
     type(output_field_type), allocatable :: fields(:)  !! of every output
-    type(probe_type), allocatable :: probes(:)
+    type(measure_list_type) :: measures      !! of the history
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(team_type) :: team                  !! threads, whose number may change at any instant
@@ -47,6 +48,7 @@ module pd_output_report_recorder
     type(warnings_type) :: warnings
     logical :: turned = .false.              !! parts have rotated, which was reported
     logical :: quiet = .false.               !! warnings are kept, but not printed
+    logical :: fragments = .false.           !! of every output are listed
     type(checkpoint_type) :: checkpoint
     type(about_type) :: about                !! of the run, for its checkpoints
     integer :: more_rows = 0                 !! rows and outputs at the last instant that a run
@@ -227,7 +229,8 @@ contains
       about%strain = recorder%balance%energies%strain
       about%warnings = recorder%warnings
       call recorder%results%sync(error)
-      if (.not. allocated(error)) call recorder%checkpoint%write(about, system, error)
+      if (.not. allocated(error)) call recorder%checkpoint%write(about, system, &
+        & recorder%measures, error)
     end associate
     call recorder%timer%stop('checkpoints')
     if (.not. allocated(error)) return
@@ -259,6 +262,8 @@ contains
     real(wp), target, contiguous, intent(in) :: v(:, :)
     type(error_type), allocatable, intent(out) :: error
     type(row_source_type) :: now
+    type(measure_list_type) :: apart
+    real(wp), allocatable :: row(:)
     character(:), allocatable :: warning
 
     associate (balance => recorder%balance)
@@ -272,8 +277,14 @@ contains
       now%energies = balance%energies
     end associate
     recorder%rows = recorder%rows + 1
-    call recorder%results%add_row(history_row(recorder%columns, now, recorder%probes), &
-      & error)
+    if (recorder%more_rows == 0) then
+      call history_row(recorder%columns, now, recorder%measures, row)
+    else
+      ! a run that continues does not have this row: what goes from row to row does not see it
+      apart = recorder%measures
+      call history_row(recorder%columns, now, apart, row)
+    end if
+    call recorder%results%add_row(row, error)
     if (.not. recorder%turned) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0
@@ -314,8 +325,29 @@ contains
     if (allocated(error)) return
     call warn_if_any(recorder, 'gradient', gradient_warning(undefined, instant%time))
     call recorder%results%end_output(error)
+    if (recorder%fragments .and. .not. allocated(error)) &
+      & call list_fragments(recorder, now, error)
     recorder%outputs = recorder%outputs + 1
     recorder%output_step = instant%step
   end subroutine write_output
+
+  !> A line for each fragment.
+  subroutine list_fragments(recorder, now, error)
+    class(recorder_type), intent(inout) :: recorder
+    type(moment_type), intent(in) :: now
+    type(error_type), allocatable, intent(out) :: error
+    type(fragment_type), allocatable :: fragments(:)
+    real(wp), allocatable :: values(:, :)
+    integer :: i
+
+    call fragments_of(now, fragments)
+    allocate (values(12, size(fragments)))
+    do i = 1, size(fragments)
+      associate (f => fragments(i))
+        values(:, i) = [real(f%points, wp), f%mass, f%centre, f%velocity, f%spin, f%size]
+      end associate
+    end do
+    call recorder%results%add_fragments(values, error)
+  end subroutine list_fragments
 
 end module pd_output_report_recorder

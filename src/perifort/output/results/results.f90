@@ -26,7 +26,7 @@ module pd_output_results_results
   use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_empty, &
     & remove_file
   use pd_output_results_history, only: csv_type, history_type
-  use pd_output_results_iterations, only: iterations_type
+  use pd_output_results_lines, only: lines_type
   use pd_output_results_sink, only: sink_type
   use pd_output_results_types, only: column_type, field_type, kept_type, label_length
   use pd_output_results_vtkhdf, only: vtkhdf_file
@@ -46,7 +46,7 @@ module pd_output_results_results
     type(vtu_series) :: vtu
     type(history_type) :: history
     type(csv_type) :: csv
-    type(iterations_type) :: iterations
+    type(lines_type) :: iterations, fragments
     integer :: points = 0
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
@@ -78,6 +78,7 @@ module pd_output_results_results
     procedure :: end_output
     procedure :: add_row
     procedure :: add_iteration
+    procedure :: add_fragments
     procedure :: put_warnings
     procedure :: close => close_results
     procedure :: sync
@@ -145,7 +146,11 @@ contains
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
     call self%history%start(size(columns))
     allocate (self%times(0))
-    if (present(kept)) call self%history%restore(kept%rows, written=self%resumed)
+    if (present(kept)) then
+      ! rows with other columns, those of other probes for instance, cannot be continued
+      if (size(kept%rows, 1) == size(columns)) &
+        & call self%history%restore(kept%rows, written=self%resumed)
+    end if
     if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
     if (self%resumed) then
       if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
@@ -404,6 +409,7 @@ contains
     if (allocated(error)) return
     call remove_series(self%directory, self%stem, merge(1, 0, self%use_vtu))
     call remove_file(in_directory(self%directory, 'iterations.csv'))
+    call remove_file(in_directory(self%directory, 'fragments.csv'))
     if (size(self%columns) > 0) then
       call self%csv%open(in_directory(self%directory, 'history.csv'), self%columns, error)
     else
@@ -439,10 +445,47 @@ contains
 
     if (.not. (self%started .and. self%in_files) .or. self%failed) return
     if (.not. self%iterations%has_begun()) call self%iterations%begin( &
-      & in_directory(self%directory, 'iterations.csv'), self%resumed, last, error)
+      & in_directory(self%directory, 'iterations.csv'), 'step,load_step,time,iteration,solver,'// &
+      & 'residual,change,broken_bonds', self%resumed, last, error)
     if (.not. allocated(error)) call self%iterations%add(line, error)
     if (allocated(error)) call explain_need(self, 'iterations.csv', int(len(line), i8), error)
   end subroutine add_iteration
+
+  !> Add the fragments of the last complete output to `fragments.csv`. Of a run that continues,
+  !> those of outputs that the checkpoint counts stay.
+  subroutine add_fragments(self, values, error)
+    class(results_type), intent(inout) :: self  !! after an output
+    real(wp), intent(in) :: values(:, :)        !! (12, fragments): points, mass, centre, velocity,
+                                                !! spin, size
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: head = 'output,time,number,points,mass,centre_x,centre_y,'// &
+      & 'centre_z,velocity_x,velocity_y,velocity_z,spin_x,spin_y,spin_z,size'
+    character(24) :: numbers(12)
+    character(:), allocatable :: line
+    integer :: i, c
+
+    if (.not. (self%started .and. self%in_files) .or. self%failed) return
+    if (.not. self%fragments%has_begun()) call self%fragments%begin( &
+      & in_directory(self%directory, 'fragments.csv'), head, self%resumed, self%outputs - 2, error)
+    do i = 1, size(values, 2)
+      if (allocated(error)) exit
+      write (numbers(1), '(es24.16e3)') self%time
+      do c = 2, size(values, 1)
+        write (numbers(c), '(es24.16e3)') values(c, i)
+      end do
+      line = to_text(self%outputs - 1)//','//trim(adjustl(numbers(1)))//','//to_text(i)//','// &
+        & to_text(nint(values(1, i)))
+      do c = 2, size(values, 1)
+        line = line//','//trim(adjustl(numbers(c)))
+      end do
+      call self%fragments%add(line, error)
+    end do
+    if (allocated(error)) then
+      call explain_need(self, 'fragments.csv', 300_i8*size(values, 2), error)
+    else
+      call self%fragments%hand_over(error)
+    end if
+  end subroutine add_fragments
 
   !> Keep the warnings so far, a line for each, in place of those of an earlier call: at once in
   !> `warnings.txt`, and in the HDF5 file when the results are complete. What goes wrong with them
@@ -520,6 +563,7 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%sync(error)
     if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
     if (.not. allocated(error)) call self%iterations%sync(error)
+    if (.not. allocated(error)) call self%fragments%sync(error)
   end subroutine sync
 
   !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
@@ -588,6 +632,9 @@ contains
     if (self%use_vtu) call self%vtu%abandon()
     call self%iterations%close(ignored)
     if (allocated(ignored) .and. .not. self%failed) call move_alloc(ignored, error)
+    call self%fragments%close(ignored)
+    if (allocated(ignored) .and. .not. (self%failed .or. allocated(error))) &
+      & call move_alloc(ignored, error)
     if (.not. (self%failed .or. allocated(error))) then
       if (.not. self%started .and. self%history%has_rows()) call start_files(self, error)
       if (self%started .and. .not. allocated(error)) call write_rows(self, error)

@@ -83,6 +83,10 @@ contains
     end do
     call check_output(scene, error, source)
     if (allocated(error)) return
+    do i = 1, size(scene%tips)
+      call check_tip(scene, i, error, source)
+      if (allocated(error)) return
+    end do
     call check_studies(scene, error, source)
   end subroutine check_scene
 
@@ -180,6 +184,9 @@ contains
     if (allocated(error)) return
     call check_unique([character(name_length) :: (scene%probes(i)%name, &
       & i=1, size(scene%probes))], 'probe', error, source)
+    if (allocated(error)) return
+    call check_unique([character(name_length) :: (scene%tips(i)%name, &
+      & i=1, size(scene%tips))], 'tip', error, source)
   end subroutine check_names
 
   !> One `&no_fail`: a region or a shape.
@@ -233,6 +240,40 @@ contains
       end associate
     end do
   end subroutine check_output
+
+  !> One `&tip`: it has a name, begins somewhere and goes somewhere.
+  subroutine check_tip(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    associate (tip => scene%tips(number), dim => scene%header%dimension)
+      if (tip%name == '') then
+        call rule_fault(error, 'tip', number, '', "group &tip lacks the key 'name'", &
+          & 'its columns begin with it', source)
+        return
+      end if
+      call check_vector(tip%from, dim, 'from', 'tip', number, error, source)
+      if (allocated(error)) return
+      call check_vector(tip%direction, dim, 'direction', 'tip', number, error, source)
+      if (allocated(error)) return
+      if (.not. norm2(tip%direction(:dim)) > 0.0_wp) then
+        call rule_fault(error, 'tip', number, 'direction', "'direction' has no length", &
+          & 'expected a vector of growth', source)
+      else if (tip%across /= '' .and. dim < 3) then
+        call rule_fault(error, 'tip', number, 'across', "'across' is given in "//to_text(dim)// &
+          & 'D', 'only in 3D a crack has a front', source)
+      else if (tip%across /= '') then
+        associate (c => index('xyz', trim(tip%across)))
+          ! a front along the direction of growth has no projections to compare
+          if (abs(tip%direction(c)) > 0.9_wp*norm2(tip%direction)) call rule_fault(error, 'tip', &
+            & number, 'across', "'across' is the direction of growth", &
+            & 'expected an axis along which the front extends', source)
+        end associate
+      end if
+    end associate
+  end subroutine check_tip
 
   !> Every `&study` varies something, and where it measures a field in a region there is one.
   subroutine check_studies(scene, error, source)

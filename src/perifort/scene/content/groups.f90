@@ -7,7 +7,7 @@ module pd_scene_content_groups
   use pd_scene_content_types, only: scene_type, header_type, body_group, shape_group, &
     & region_group, no_fail_group, material_group, horizon_group, crack_group, initial_group, &
     & boundary_group, load_group, time_group, relaxation_group, output_group, probe_group, &
-    & study_group, group_table
+    & tip_group, study_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -57,6 +57,8 @@ contains
     call table%add('output', 'What is written, and how often.', once, output_group(), one=output)
     call table%add('probe', 'The values of the nearest point in every row of the history.', &
       & repeated, probe_group(), all=probes)
+    call table%add('tip', 'The tip of a crack in every row of the history: where it is, how '// &
+      & 'far and how fast it has come, and whether it branches.', repeated, tip_group(), all=tips)
     call table%add('study', 'A key that `perifort study` and `choose` vary. Several groups '// &
       & 'make the product of their values; measure and against are given in one of them '// &
       & 'only. `run` ignores it.', repeated, study_group(), all=studies)
@@ -203,6 +205,16 @@ contains
     if (.not. allocated(scene%probes)) allocate (scene%probes(0))
     groups => scene%probes
   end subroutine probes
+
+  subroutine tips(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%tips)) deallocate (scene%tips)
+    if (present(room)) allocate (scene%tips(room))
+    if (.not. allocated(scene%tips)) allocate (scene%tips(0))
+    groups => scene%tips
+  end subroutine tips
 
   subroutine studies(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

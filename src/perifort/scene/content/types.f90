@@ -24,12 +24,13 @@ module pd_scene_content_types
   use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
   use pd_scene_groups_study, only: study_group
   use pd_scene_groups_time, only: time_group
+  use pd_scene_groups_tip, only: tip_group
   implicit none (type, external)
   private
   public :: scene_type, header_type, body_group, shape_group, region_group, no_fail_group, &
     & material_group, horizon_group, crack_group, initial_group, boundary_group, load_group, &
-    & time_group, relaxation_group, output_group, probe_group, study_group, name_length, &
-    & path_length, unset, is_set
+    & time_group, relaxation_group, output_group, probe_group, tip_group, study_group, &
+    & name_length, path_length, unset, is_set
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -85,6 +86,7 @@ module pd_scene_content_types
     type(relaxation_group) :: relaxation
     type(output_group) :: output
     type(probe_group), allocatable :: probes(:)
+    type(tip_group), allocatable :: tips(:)
     type(study_group), allocatable :: studies(:)
     type(added_type), allocatable :: added(:)    !! groups of a table with more than these
     type(group_table), allocatable :: table      !! that table; without, the program's own

@@ -20,6 +20,7 @@ module pd_scene_groups_output
     character(name_length), allocatable :: fields(:)
     character(name_length) :: precision = 'double'   !! 'single'
     character(name_length) :: format = 'vtkhdf'      !! 'vtu', 'both'
+    logical :: fragments = .false.               !! in the history and in fragments.csv
     integer :: checkpoint_every = 0              !! steps (relaxation: iterations); 0 = none so
     real(wp) :: checkpoint_minutes = 15.0_wp     !! of wall time; 0 = not by time
   contains
@@ -45,6 +46,8 @@ contains
       & hidden=group%history_every == 0)
     call keys%list('fields', group%fields, 'fields to write', keys%field_names(), &
       & default="'displacement', 'velocity', 'damage'")
+    call keys%key('fragments', group%fragments, 'count the parts that intact bonds join, in '// &
+      & 'the history, and list them in fragments.csv at each output')
     call keys%key('precision', group%precision, 'of the fields in the file', &
       & allowed=[character(6) :: 'single', 'double'])
     call keys%key('format', group%format, 'vtkhdf: one HDF5 file, also VTK; vtu: a .pvd series', &
@@ -61,7 +64,8 @@ contains
     character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     change = change_harmless
-    if (any(key == [character(9) :: 'fields', 'precision', 'format'])) change = change_of_the_files
+    if (any(key == [character(9) :: 'fields', 'fragments', 'precision', 'format'])) &
+      & change = change_of_the_files
   end function change_of
 
 end module pd_scene_groups_output

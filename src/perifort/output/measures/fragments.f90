@@ -1,0 +1,214 @@
+!> Fragments: parts of the body that chains of intact bonds join. How many there are and the mass of
+!> the largest are columns of the history; each output has a table of all.
+module pd_output_measures_fragments
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_motion_static_pieces, only: find_pieces, pieces_type
+  use pd_motion_system, only: inverse_density, system_type
+  use pd_output_fields_field, only: moment_type
+  use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
+  use pd_output_results_types, only: column_type
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type
+  implicit none (type, external)
+  private
+  public :: add_fragments, fragment_type, fragments_of, spin_of
+
+  !> One fragment, at its present place.
+  type :: fragment_type
+    integer :: points = 0
+    real(wp) :: mass = 0.0_wp            !! [kg]
+    real(wp) :: centre(3) = 0.0_wp       !! of mass [m]
+    real(wp) :: velocity(3) = 0.0_wp     !! of the centre [m/s]
+    real(wp) :: spin(3) = 0.0_wp         !! angular velocity that has its angular momentum [rad/s]
+    real(wp) :: size = 0.0_wp            !! twice the greatest distance of a point from the centre,
+                                         !! and a spacing [m]
+  end type fragment_type
+
+  type, extends(measure_type) :: fragments_measure_type
+    integer(i8) :: broken = -1_i8        !! bonds, when they were counted last
+    integer :: number = 0                !! of fragments then
+    real(wp) :: mass = 0.0_wp            !! of the largest [kg]
+  contains
+    procedure :: begin => begin_fragments
+    procedure :: columns => columns_of_fragments
+    procedure :: row => row_of_fragments
+  end type fragments_measure_type
+
+contains
+
+  !> Count fragments if the scene asks for them.
+  subroutine add_fragments(scene, measures)
+    type(scene_type), intent(in) :: scene                !! a checked scene
+    type(measure_list_type), intent(inout) :: measures   !! added to
+
+    if (scene%output%fragments) call measures%add(fragments_measure_type())
+  end subroutine add_fragments
+
+  !> An error if no bond can break.
+  subroutine begin_fragments(measure, scene, system, error)
+    class(fragments_measure_type), intent(inout) :: measure
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(error_type), allocatable, intent(out) :: error
+
+    measure%broken = -1_i8
+    if (size(system%state%damage) == 0) then
+      call scene_fault(error, scene, 'output', 1, 'fragments', &
+        & 'there are no fragments: no bond can break', &
+        & 'expected a material with critical_stretch, or a &crack')
+    else if (associated(system%body%order%ranks)) then
+      call scene_fault(error, scene, 'output', 1, 'fragments', 'fragments cannot be found', &
+        & 'parts of the body are found by one process alone')
+    end if
+  end subroutine begin_fragments
+
+  !> How many, and the mass of the largest.
+  function columns_of_fragments(measure, dim) result(columns)
+    class(fragments_measure_type), intent(in) :: measure
+    integer, intent(in) :: dim
+    type(column_type), allocatable :: columns(:)
+
+    associate (unused_measure => measure, unused_dim => dim)
+    end associate
+    columns = [column_type('fragments', '1', 'run'), &
+      & column_type('largest_fragment_mass', 'kg', 'run')]
+  end function columns_of_fragments
+
+  !> They are found anew where bonds have broken since the last row.
+  subroutine row_of_fragments(measure, now, values)
+    class(fragments_measure_type), intent(inout) :: measure
+    type(row_source_type), intent(in) :: now
+    real(wp), intent(out) :: values(:)
+    type(pieces_type) :: pieces
+    integer :: p
+
+    if (now%system%broken /= measure%broken) then
+      call find_pieces(now%system%body, now%system%family, pieces)
+      measure%broken = now%system%broken
+      measure%number = pieces%number
+      measure%mass = 0.0_wp
+      do p = 1, pieces%number
+        measure%mass = max(measure%mass, mass_of(now%system, pieces, p))
+      end do
+    end if
+    values(:) = [real(measure%number, wp), measure%mass]
+  end subroutine row_of_fragments
+
+  !> The mass of a piece, summed in the order of its points [kg].
+  pure real(wp) function mass_of(system, pieces, piece) result(mass)
+    type(system_type), intent(in) :: system
+    type(pieces_type), intent(in) :: pieces
+    integer, intent(in) :: piece
+    integer :: i
+
+    mass = 0.0_wp
+    do i = pieces%start(piece), pieces%start(piece + 1) - 1
+      mass = mass + mass_at(system, pieces%slots(i))
+    end do
+  end function mass_of
+
+  !> The mass of a point [kg].
+  pure real(wp) function mass_at(system, k) result(mass)
+    type(system_type), intent(in) :: system
+    integer(i4), intent(in) :: k  !! its slot
+    mass = system%body%volume(k)/inverse_density(system%model, int(k))
+  end function mass_at
+
+  !> All fragments at an instant, in the order of their first points, as the field `fragment`
+  !> numbers them. Sums go in the order of points.
+  subroutine fragments_of(now, fragments)
+    type(moment_type), intent(in) :: now                             !! with velocities
+    type(fragment_type), allocatable, intent(out) :: fragments(:)    !! (any number)
+    type(pieces_type) :: pieces
+    integer :: p
+
+    call find_pieces(now%system%body, now%system%family, pieces)
+    allocate (fragments(pieces%number))
+    do p = 1, pieces%number
+      call describe(now, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), fragments(p))
+    end do
+  end subroutine fragments_of
+
+  !> What there is to know of one.
+  subroutine describe(now, slots, fragment)
+    type(moment_type), intent(in) :: now
+    integer(i4), intent(in) :: slots(:)  !! in the order of points
+    type(fragment_type), intent(out) :: fragment
+    real(wp) :: momentum(3), inertia(3, 3), r(3), v(3), mass
+    integer :: i, c
+
+    associate (body => now%system%body, dim => now%system%body%dim)
+      fragment%points = size(slots)
+      do i = 1, size(slots)
+        mass = mass_at(now%system, slots(i))
+        fragment%mass = fragment%mass + mass
+        fragment%centre(:dim) = fragment%centre(:dim) + mass*place(slots(i))
+        fragment%velocity(:dim) = fragment%velocity(:dim) + mass*now%v(slots(i), :)
+      end do
+      fragment%centre = fragment%centre/fragment%mass
+      fragment%velocity = fragment%velocity/fragment%mass
+      momentum = 0.0_wp
+      inertia = 0.0_wp
+      do i = 1, size(slots)
+        mass = mass_at(now%system, slots(i))
+        r = 0.0_wp
+        v = 0.0_wp
+        r(:dim) = place(slots(i)) - fragment%centre(:dim)
+        v(:dim) = now%v(slots(i), :) - fragment%velocity(:dim)
+        momentum = momentum + mass*[r(2)*v(3) - r(3)*v(2), r(3)*v(1) - r(1)*v(3), &
+          & r(1)*v(2) - r(2)*v(1)]
+        do c = 1, 3
+          inertia(:, c) = inertia(:, c) - mass*r*r(c)
+          inertia(c, c) = inertia(c, c) + mass*sum(r**2)
+        end do
+        fragment%size = max(fragment%size, 2*norm2(r) + body%spacing(slots(i)))
+      end do
+    end associate
+    fragment%spin = spin_of(momentum, inertia)
+
+  contains
+
+    !> Where a point is now (dim) [m].
+    pure function place(k) result(x)
+      integer(i4), intent(in) :: k
+      real(wp) :: x(now%system%body%dim)
+      x = now%system%body%x(k, :) + now%system%state%u(k, :)
+    end function place
+  end subroutine describe
+
+  !> The angular velocity that gives mass points of such inertia their angular momentum; 0 of a
+  !> single point, and about the line of points that stand in one line.
+  pure function spin_of(momentum, inertia) result(spin)
+    real(wp), intent(in) :: momentum(3)    !! about the centre of mass [kg m2/s]
+    real(wp), intent(in) :: inertia(3, 3)  !! about the centre of mass [kg m2]
+    real(wp) :: spin(3)                    !! [rad/s]
+    real(wp), parameter :: thin = 1.0e-9_wp  ! least of the moments over the largest
+    real(wp) :: a(3, 3), trace, determinant
+    integer :: c, d, e
+
+    spin = 0.0_wp
+    trace = inertia(1, 1) + inertia(2, 2) + inertia(3, 3)
+    if (.not. trace > 0.0_wp) return
+    a = inertia/trace
+    determinant = dot_product(a(:, 1), cross(a(:, 2), a(:, 3)))
+    ! of points in one line one moment is 0 and the others are half the trace
+    if (determinant <= thin) then
+      spin = momentum/(0.5_wp*trace)
+      return
+    end if
+    do c = 1, 3
+      d = mod(c, 3) + 1
+      e = mod(d, 3) + 1
+      spin(c) = dot_product(momentum/trace, cross(a(:, d), a(:, e)))/determinant
+    end do
+  end function spin_of
+
+  !> The vector product.
+  pure function cross(a, b) result(product)
+    real(wp), intent(in) :: a(3), b(3)
+    real(wp) :: product(3)
+    product = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
+  end function cross
+
+end module pd_output_measures_fragments
