@@ -12,6 +12,7 @@ program main
     & testsuite_type, unittest_type
   use test_base_clock, only: collect_base_clock
   use test_base_checksum, only: collect_base_checksum
+  use test_base_expression, only: collect_base_expression
   use test_base_interrupt, only: collect_base_interrupt
   use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
@@ -107,6 +108,7 @@ program main
 
   call register('base_clock', collect_base_clock)
   call register('base_checksum', collect_base_checksum)
+  call register('base_expression', collect_base_expression)
   call register('base_interrupt', collect_base_interrupt)
   call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
