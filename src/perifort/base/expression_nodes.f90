@@ -117,18 +117,21 @@ contains
         node%in_time = node%in_time .or. operand%in_time
       end associate
     end do
-    if (op == op_power .and. list%nodes(node%arg(2))%op == op_constant) then
-      exponent = list%nodes(node%arg(2))%value
-      if (abs(exponent) <= largest_whole .and. abs(exponent - anint(exponent)) <= 0.0_wp) then
-        node%op = op_whole_power
-        node%power = nint(exponent)
-        node%arg(2) = 0
-      else if (abs(exponent - 0.5_wp) <= 0.0_wp) then
-        node%op = op_sqrt
-        node%arg(2) = 0
+    if (op == op_power) then
+      if (list%nodes(node%arg(2))%op == op_constant) then
+        exponent = list%nodes(node%arg(2))%value
+        if (abs(exponent) <= largest_whole .and. abs(exponent - anint(exponent)) <= 0.0_wp) then
+          node%op = op_whole_power
+          node%power = nint(exponent)
+          node%arg(2) = 0
+        else if (abs(exponent - 0.5_wp) <= 0.0_wp) then
+          node%op = op_sqrt
+          node%arg(2) = 0
+        end if
       end if
     else if (op == op_if .and. list%nodes(a)%op == op_constant) then
-      number = merge(b, c, abs(list%nodes(a)%value) > 0.0_wp)
+      number = node%arg(3)
+      if (abs(list%nodes(a)%value) > 0.0_wp) number = node%arg(2)
       return
     end if
     if (constant) then
