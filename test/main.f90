@@ -79,6 +79,8 @@ program main
   use test_motion_energy_watch, only: collect_motion_energy_watch
   use test_scene_content_compare, only: collect_scene_content_compare
   use test_scene_content_defaults, only: collect_scene_content_defaults
+  use test_scene_content_expressions, only: collect_scene_content_expressions
+  use test_motion_expressions, only: collect_motion_expressions
   use test_scene_content_groups, only: collect_scene_content_groups
   use test_scene_format_elements, only: collect_scene_format_elements
   use test_scene_format_file, only: collect_scene_format_file
@@ -175,6 +177,8 @@ program main
   call register('motion_energy_watch', collect_motion_energy_watch)
   call register('scene_content_compare', collect_scene_content_compare)
   call register('scene_content_defaults', collect_scene_content_defaults)
+  call register('scene_content_expressions', collect_scene_content_expressions)
+  call register('motion_expressions', collect_motion_expressions)
   call register('scene_content_groups', collect_scene_content_groups)
   call register('scene_format_elements', collect_scene_format_elements)
   call register('scene_format_file', collect_scene_format_file)

@@ -8,7 +8,7 @@ module test_base_expression
   use pd_base_field, only: field_type, field_values, lanes, new_field
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: to_text
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -202,7 +202,7 @@ contains
       call field_values(field, t, values, at)
       if (at /= 0) call test_failed(error, text//': point '//to_text(at)//' is not finite')
       ! vector functions of the C library are right within 4 ulp
-      call expect_close(error, values, wanted, 10*rounding*max(1.0_wp, maxval(abs(wanted))), text)
+      call expect_close(error, values, wanted, 10*rounding*max(1.0_wp, max_abs(wanted)), text)
     end subroutine expect_field
 
   end subroutine test_at_points

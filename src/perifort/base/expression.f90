@@ -173,7 +173,7 @@ contains
     case ('t'); meaning = 'the time'
     case ('pi'); meaning = 'the number 3.14159...'
     case ('e'); meaning = 'the number 2.71828...'
-    case default
+    case default  ! a function, or a name that is free
       if (any(functions == name)) meaning = 'a function'
     end select
   end function reserved_meaning
@@ -210,7 +210,8 @@ contains
     case ('>='); op = op_at_least
     case ('=='); op = op_equal
     case ('/=', '!='); op = op_not_equal
-    case default; op = 0
+    case default  ! no comparison
+      op = 0
     end select
   end function comparison
 
@@ -225,7 +226,8 @@ contains
       select case (word(parser))
       case ('+'); op = op_add
       case ('-'); op = op_subtract
-      case default; return
+      case default  ! the sum or product ends here
+        return
       end select
       call advance(parser)
       call parse_product(parser, right)
@@ -245,7 +247,8 @@ contains
       select case (word(parser))
       case ('*'); op = op_multiply
       case ('/'); op = op_divide
-      case default; return
+      case default  ! the sum or product ends here
+        return
       end select
       call advance(parser)
       call parse_signed(parser, right)
