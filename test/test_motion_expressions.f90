@@ -282,7 +282,7 @@ contains
   end subroutine test_balance
 
   !> u' = b (L^2 - x^2)/2E for the body force b x, of which the support bears b L^2/2. Points at the
-  !> ends have fewer bonds: the displacement of the free end is off by some horizons over the length.
+  !> ends have fewer bonds: the displacement of the free end is off by some rows in 200.
   subroutine test_bar(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: n = 200
