@@ -80,7 +80,7 @@ contains
     logical, intent(inout), optional :: timed          !! becomes true if it depends on t
     type(named_value), allocatable :: names(:)
     type(expression_type) :: expression
-    character(:), allocatable :: variables, why
+    character(:), allocatable :: variables
     integer :: d
 
     if (allocated(error) .or. text == '') return
@@ -89,10 +89,8 @@ contains
     if (scan(allowed, 'xyz') > 0) variables = 'xyz'
     variables = variables(:min(d, len(variables)))
     if (index(allowed, 't') > 0) variables = variables//'t'
-    why = reason
-    if (len(why) == 0) why = 'a scene of dimension '//to_text(d)//' has no such direction'
     call names_of(scene, huge(1), names)
-    call check_text(text, names, group, number, key, variables, why, expression, error, source)
+    call check_text(text, names, group, number, key, variables, reason, expression, error, source)
     if (allocated(error)) return
     if (present(timed)) timed = timed .or. expression%in_time
   end subroutine check_expression
@@ -146,6 +144,10 @@ contains
     if (.not. allocated(fault)) return
     message = "'"//key//"': "//fault%message
     note = fault%note
+    ! the other variables are refused for a reason of their own
+    if (scan(variables, 'x') > 0 .and. scan(fault%message, 'yz') == 2 .and. &
+      & index(fault%message, 'cannot stand') > 0) note = 'the scene has dimension '// &
+      & trim(merge('2', '1', index(variables, 'y') > 0))
     entry = 0
     placed = present(source)
     if (placed) placed = .not. source%in_memory
