@@ -477,6 +477,8 @@ contains
     type(set_up_type) :: set_up
     type(diary_type) :: diary
     type(fault_type), allocatable :: fault
+    character(18), parameter :: keys(4) = [character(18) :: 'body_force_x', 'displacement_y', &
+      & 'velocity_y', 'temperature_change']
     integer :: i
 
     do i = 1, 5
@@ -511,7 +513,7 @@ contains
       if (allocated(error)) return
       diary = diary_type()
       call run_explicit(set_up%system, 'velocity_verlet', set_up%plan%step, 20, diary, fault)
-      call expect_parts(error, fault, 'has no finite value at point|t = |&')
+      call expect_parts(error, fault, trim(keys(i))//' of &|has no finite value at point|m, t = ')
       if (allocated(error)) return
       call check(error, fault%status, status_no_answer)
       if (allocated(error)) return

@@ -13,7 +13,7 @@ module pd_motion_conditions
   public :: motion_type, load_type, free_component, moved_by_displacement, moved_by_velocity
   public :: impose, remember_start, add_loads_to, number_of_loads, load_of
   public :: vary_in_time, advance_paths, keep_paths, accelerations_of, add_part, acts_along, &
-    & density_of, renew_motions, renew_load, condition_fault
+    & density_of, renew_motions, renew_load, condition_fault, note_fault
 
   integer, parameter :: free_component = 0
   integer, parameter :: moved_by_displacement = 1
@@ -346,9 +346,8 @@ contains
       associate (motion => motions(m))
         call places_at(motion, t, motion%place, motion%speed, at, c)
         motion%time = t
-        if (at == 0 .or. allocated(fault)) cycle
-        fault = condition_fault('boundary', trim(merge('displacement_', 'velocity_    ', &
-          & motion%kind(c) == moved_by_displacement))//xyz(c:c), m, motion%slots(at), t)
+        if (at > 0) call note_fault('boundary', m, trim(merge('displacement_', 'velocity_    ', &
+          & motion%kind(c) == moved_by_displacement))//xyz(c:c), motion%slots(at), t, fault)
       end associate
     end do
   end subroutine renew_motions
@@ -524,8 +523,25 @@ contains
     load%now = load%density
     call add_parts(load, t, load%now, at, part)
     load%time = t
-    if (at == 0 .or. allocated(fault)) return
-    fault = condition_fault('load', load%parts(part)%key, number, load%slots(at), t)
+    if (at > 0) call note_fault('load', number, load%parts(part)%key, load%slots(at), t, fault)
   end subroutine renew_load
+
+  !> Note the first value of a condition that is not finite.
+  pure subroutine note_fault(group, number, key, slot, t, fault)
+    character(*), intent(in) :: group  !! name of the group, without `&`
+    integer, intent(in) :: number      !! which group of this name
+    character(*), intent(in) :: key    !! that has the expression
+    integer(i4), intent(in) :: slot    !! of the point
+    real(wp), intent(in) :: t          !! time [s]
+    type(condition_fault), allocatable, intent(inout) :: fault  !! the first one stays
+
+    if (allocated(fault)) return
+    allocate (fault)
+    fault%group = group
+    fault%number = number
+    fault%key = key
+    fault%slot = slot
+    fault%time = t
+  end subroutine note_fault
 
 end module pd_motion_conditions

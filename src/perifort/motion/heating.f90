@@ -8,7 +8,7 @@ module pd_motion_heating
   use pd_base_archive, only: archive_type
   use pd_base_expression, only: derivative_in_time, expression_type
   use pd_base_field, only: field_type, field_values, new_field
-  use pd_motion_conditions, only: condition_fault
+  use pd_motion_conditions, only: condition_fault, note_fault
   use pd_motion_curve, only: curve_type
   implicit none (type, external)
   private
@@ -183,8 +183,8 @@ contains
       if (.not. heating%timed(i)%is_there .or. allocated(fault)) cycle
       allocate (values(size(heating%timed(i)%slots)))
       call field_values(heating%timed(i)%value, t, values, at)
-      if (at > 0) fault = condition_fault('initial', 'temperature_change', i, &
-        & heating%timed(i)%slots(at), t)
+      if (at > 0) call note_fault('initial', i, 'temperature_change', &
+        & heating%timed(i)%slots(at), t, fault)
       deallocate (values)
     end do
   end subroutine heating_fault

@@ -12,7 +12,7 @@ module pd_scene_content_expressions
   implicit none (type, external)
   private
   public :: check_definitions, check_expression, check_vector_expressions, expression_of, &
-    & varies_in_time, at_the_start, in_no_force
+    & varies_in_time, has_expressions, at_the_start, in_no_force
 
   character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyz_'
   character(*), parameter :: digits = '0123456789'
@@ -211,6 +211,26 @@ contains
     call compile_expression(trim(text), names, expression, fault)
     if (allocated(fault)) call internal_fault('an expression that was not checked: '//text)
   end subroutine expression_of
+
+  !> Whether an initial value, a boundary or a load of a scene is an expression.
+  pure logical function has_expressions(scene) result(has)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    integer :: i
+
+    has = .false.
+    do i = 1, size(scene%initial)
+      has = has .or. any(scene%initial(i)%displacement_text /= '') .or. &
+        & any(scene%initial(i)%velocity_text /= '') .or. scene%initial(i)%temperature_text /= ''
+    end do
+    do i = 1, size(scene%boundaries)
+      has = has .or. any(scene%boundaries(i)%displacement_text /= '') .or. &
+        & any(scene%boundaries(i)%velocity_text /= '')
+    end do
+    do i = 1, size(scene%loads)
+      has = has .or. any(scene%loads(i)%force_text /= '') .or. scene%loads(i)%pressure_text /= '' &
+        & .or. any(scene%loads(i)%body_force_text /= '')
+    end do
+  end function has_expressions
 
   !> Whether a text is an expression that depends on t.
   logical function varies_in_time(scene, text) result(varies)
