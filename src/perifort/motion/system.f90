@@ -2,7 +2,7 @@
 !> brings the forces up to date. Integrators and relaxation work on this type alone.
 module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_error, only: error_type, fail
+  use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_base_reduce, only: add_point, inner, new_running, running_type, total_of_running
   use pd_body_body, only: body_type, not_finite_text, share_halo
@@ -241,8 +241,12 @@ contains
     integer, intent(in) :: status               !! exit status of the program
     type(error_type), allocatable, intent(out) :: error
 
+    character(:), allocatable :: step
+
+    step = ''
+    if (status == status_no_answer) step = 'step '//to_text(system%memory%step)//': '
     associate (fault => system%fault)
-      call fail(error, fault%key//' of &'//fault%group//' number '//to_text(fault%number)//' '// &
+      call fail(error, step//fault%key//' of &'//fault%group//' number '//to_text(fault%number)//' '// &
         & not_finite_text(system%body, fault%slot, fault%time), status, fault%group, fault%number)
     end associate
     deallocate (system%fault)
@@ -449,7 +453,7 @@ contains
   contains
 
     subroutine put(density)
-      real(wp), intent(in) :: density(:, :)
+      real(wp), intent(in), contiguous :: density(:, :)
       real(wp) :: factor, by
       integer :: i, c, k
 
