@@ -246,8 +246,9 @@ contains
     step = ''
     if (status == status_no_answer) step = 'step '//to_text(system%memory%step)//': '
     associate (fault => system%fault)
-      call fail(error, step//fault%key//' of &'//fault%group//' number '//to_text(fault%number)//' '// &
-        & not_finite_text(system%body, fault%slot, fault%time), status, fault%group, fault%number)
+      call fail(error, step//fault%key//' of &'//fault%group//' number '// &
+        & to_text(fault%number)//' '//not_finite_text(system%body, fault%slot, fault%time), &
+        & status, fault%group, fault%number)
     end associate
     deallocate (system%fault)
   end subroutine explain_condition
