@@ -35,8 +35,8 @@ module perifort
   use pd_preview, only: check_scene, preview_scene
   use pd_scene_content_read, only: read_scene, read_scene_text
   use pd_scene_content_groups, only: list_groups
-  use pd_scene_content_types, only: body_group, boundary_group, crack_group, group_table, &
-    & header_type, horizon_group, initial_group, is_set, load_group, material_group, &
+  use pd_scene_content_types, only: body_group, boundary_group, crack_group, define_group, &
+    & group_table, header_type, horizon_group, initial_group, is_set, load_group, material_group, &
     & name_length, no_fail_group, output_group, path_length, probe_group, region_group, &
     & relaxation_group, scene_type, shape_group, study_group, time_group, &
     & tip_group, unset
@@ -50,9 +50,9 @@ module perifort
   public :: wp, program_version
   ! a scene: read it, fill it, complete and check it, write it
   public :: read_scene, read_scene_text, check_scene, scene_text
-  public :: scene_type, header_type, body_group, shape_group, region_group, material_group, &
-    & horizon_group, crack_group, no_fail_group, initial_group, boundary_group, load_group, &
-    & time_group, relaxation_group, output_group, probe_group, tip_group, study_group
+  public :: scene_type, header_type, define_group, body_group, shape_group, region_group, &
+    & material_group, horizon_group, crack_group, no_fail_group, initial_group, boundary_group, &
+    & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, study_group
   public :: unset, is_set, name_length, path_length
   ! own groups
   public :: group_table, group_type, keys_type, list_groups

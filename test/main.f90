@@ -12,6 +12,7 @@ program main
     & testsuite_type, unittest_type
   use test_base_clock, only: collect_base_clock
   use test_base_checksum, only: collect_base_checksum
+  use test_base_expression, only: collect_base_expression
   use test_base_interrupt, only: collect_base_interrupt
   use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
@@ -81,6 +82,8 @@ program main
   use test_motion_energy_watch, only: collect_motion_energy_watch
   use test_scene_content_compare, only: collect_scene_content_compare
   use test_scene_content_defaults, only: collect_scene_content_defaults
+  use test_scene_content_expressions, only: collect_scene_content_expressions
+  use test_motion_expressions, only: collect_motion_expressions
   use test_scene_content_groups, only: collect_scene_content_groups
   use test_scene_format_elements, only: collect_scene_format_elements
   use test_scene_format_file, only: collect_scene_format_file
@@ -111,6 +114,7 @@ program main
 
   call register('base_clock', collect_base_clock)
   call register('base_checksum', collect_base_checksum)
+  call register('base_expression', collect_base_expression)
   call register('base_interrupt', collect_base_interrupt)
   call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
@@ -180,6 +184,8 @@ program main
   call register('motion_energy_watch', collect_motion_energy_watch)
   call register('scene_content_compare', collect_scene_content_compare)
   call register('scene_content_defaults', collect_scene_content_defaults)
+  call register('scene_content_expressions', collect_scene_content_expressions)
+  call register('motion_expressions', collect_motion_expressions)
   call register('scene_content_groups', collect_scene_content_groups)
   call register('scene_format_elements', collect_scene_format_elements)
   call register('scene_format_file', collect_scene_format_file)

@@ -36,6 +36,7 @@ contains
       & new_unittest('long: a law with a history', test_plastic), &
       & new_unittest('a list, bonds that break late', test_list), &
       & new_unittest('temperatures that vary in time', test_heated), &
+      & new_unittest('conditions that are expressions of t', test_expressions), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
       & new_unittest('no row of a load step that has not converged', test_no_row), &
@@ -484,6 +485,53 @@ contains
       call expect_same_results(error, 'whole', 'pieces', 3)
     end do
   end subroutine test_heated
+
+  !> Imposed motion, loads and temperatures that are expressions of t, with paths that are summed.
+  subroutine test_expressions(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: names(3) = [character(16) :: 'velocity_verlet', 'runge_kutta', '']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    do i = 1, 3
+      if (allocated(error)) return
+      if (i < 3) then
+        call plate(scene)
+        scene%time%steps = 9
+        scene%time%integrator = names(i)
+        scene%boundaries(1)%velocity_text(2) = '-40*exp(1e5*t)*(1 + x)'
+        scene%boundaries(2)%displacement_text(2) = '40*t*cos(x) + 1e6*t^2'
+        scene%loads(1)%body_force_text(1) = '1e8*cos(1e6*t + 1000*y)'
+      else
+        call slow_plate(scene)
+        scene%relaxation%load_steps = 3
+        scene%boundaries(1)%velocity_text(2) = '-1e-5*t^2'
+        scene%boundaries(2)%displacement_text(2) = '1e-5*t^3'
+        scene%loads(1)%body_force_text(1) = '1e6*sin(t + x)'
+      end if
+      scene%boundaries(1)%velocity(2) = unset
+      scene%boundaries(1)%displacement(2) = unset
+      scene%boundaries(2)%velocity(2) = unset
+      scene%boundaries(2)%displacement(2) = unset
+      scene%loads(1)%body_force(1) = unset
+      if (allocated(scene%boundaries(1)%times)) deallocate (scene%boundaries(1)%times, &
+        & scene%boundaries(1)%values)
+      if (allocated(scene%boundaries(2)%times)) deallocate (scene%boundaries(2)%times, &
+        & scene%boundaries(2)%values)
+      deallocate (scene%initial)
+      allocate (scene%initial(1))
+      scene%initial(1)%temperature_text = merge('100*sin(1e6*t + 9*x)', '20*t^2 + 10*x       ', &
+        & i < 3)
+      scene%materials(1)%thermal_expansion = 1.0e-5_wp
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 2, 'it is not cut')
+      call expect_same_results(error, 'whole', 'pieces', merge(3, 4, i < 3))
+    end do
+  end subroutine test_expressions
 
   !> Two load steps, in the second of which bonds break and it relaxes again; cut after every
   !> iteration and every load step, with a load beside the imposed displacements.

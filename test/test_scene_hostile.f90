@@ -70,6 +70,8 @@ contains
           if (info%kind == 'real list') then
             ! tables may have numbers that are 0 but for rounding
             call refuse_all(info%name, pack(no_number, no_number /= '1e-31'))
+          else if (info%kind == 'real or expression') then
+            call refuse_all(info%name, pack(no_number, no_number /= "'1'"))
           else if (index(info%kind, 'real') == 1) then
             call refuse_all(info%name, no_number)
           else if (index(info%kind, 'integer') == 1) then

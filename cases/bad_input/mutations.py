@@ -25,7 +25,9 @@ WORDS = ["''", "'", '"', "'x", "''''", "/", "&", "=", ",", ",,", "!", "!'", "'..
          "'/dev/null'", "'/dev/zero'", "'.'", "'-rf'", "'a\x01b'", "'a\x00b'", "'a\tb'",
          "'$(touch pwned)'", "';touch pwned'", ".true.", ".false.", "T", "'größe'", "'点'", "\x00",
          "\x1b[2J", "\ufeff", "'" + 2000 * "a" + "'", 5000 * "9", 300 * "(", "'x_min'", "'z_max'",
-         "'relaxation'", "'explicit'", "'box'", "'all'"]
+         "'relaxation'", "'explicit'", "'box'", "'all'", "'t'", "'x*t'", "'1/x'", "'1/(t-t)'",
+         "'sqrt(x-0.01)'", "'if(x>0,1e300*t,-y)'", "'exp(1e9*t)'", "'x +'", "'((x)'", "'sin(x'",
+         "'x^y^z^t'", "'0/0'", "'1e999'", "'-'", "'" + 500 * "(" + "x'", "'" + 400 * "-" + "1'"]
 PIECES = [b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\r", b"\r\n", b"\t", b"\n\n", b"/", b"&", b"'",
           b'"', b"!", b"=", b",", b"*", b"(", b")", b"&end", b"&scene", b"$", b"\x7f", b"\xc3",
           b" " * 3000, b"\xf0\x9f\x92\xa5", b"1e999", b"9" * 400]

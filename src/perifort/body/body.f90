@@ -8,12 +8,13 @@
 !> A process owns a range of its points; the others, its halo, are copies of what other processes
 !> own. One process alone owns all.
 module pd_body_body
+  use pd_base_text, only: to_text
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_order, only: number_points, order_type, owns
   implicit none (type, external)
   private
-  public :: body_type, grid_type, allocate_points, append_points, keep_points, arrange, &
-    & gather, scatter, own_points, owned, share_halo
+  public :: body_type, not_finite_text, grid_type, allocate_points, append_points, keep_points, &
+    & arrange, gather, scatter, own_points, owned, share_halo
 
   !> A uniform grid: points at origin + (i - 1/2) spacing, i integer.
   type :: grid_type
@@ -302,5 +303,21 @@ contains
     real(wp), intent(inout) :: values(:, :)   !! (n_slots, components)
     if (associated(body%order%ranks)) call body%order%ranks%share(values)
   end subroutine share_vectors
+
+  !> Where and when a value is not finite.
+  function not_finite_text(body, slot, t) result(text)
+    type(body_type), intent(in) :: body  !! the points
+    integer(i4), intent(in) :: slot      !! of the point
+    real(wp), intent(in) :: t            !! time [s]
+    character(:), allocatable :: text
+    integer :: c
+
+    text = 'has no finite value at point '//to_text(int(body%point(slot)))//' at ('
+    do c = 1, body%dim
+      if (c > 1) text = text//', '
+      text = text//to_text(body%x(slot, c))
+    end do
+    text = text//') m, t = '//to_text(t)//' s'
+  end function not_finite_text
 
 end module pd_body_body

@@ -1,23 +1,27 @@
 !> Initial state (7.8): displacement, velocity and temperature change of every point.
 module pd_body_initial
-  use pd_base_kinds, only: wp, i2
+  use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: scene_type, is_given, is_set
   use pd_scene_format_file, only: resolve_path
+  use pd_scene_content_expressions, only: varies_in_time
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, scatter
-  use pd_body_generate, only: touch
-  use pd_body_shapes, only: inside
+  use pd_body_regions, only: in_region, values_on
   implicit none (type, external)
   private
   public :: initial_state
 
+  character(*), parameter :: xyz = 'xyz'
+
 contains
 
-  !> The groups are applied in order; each sets the values it gives. An error if a file of initial
-  !> values cannot be read or does not have a row for each point.
+  !> The groups are applied in order; each sets the values it gives. The temperature change of a
+  !> group in which it depends on t is 1 K: what it is multiplied with is the group's heating. An
+  !> error if a file of initial values cannot be read or does not have a row for each point, or if
+  !> the value of an expression is not finite.
   subroutine initial_state(scene, body, u, v, temperature_change, heated_by, error)
     type(scene_type), intent(in) :: scene  !! gives the groups and their regions
     type(body_type), intent(in) :: body                          !! arranged in slots
@@ -28,7 +32,9 @@ contains
                                                                  !! heats each slot, or 0
     type(error_type), allocatable, intent(out) :: error          !! of a file of initial values
     logical, allocatable :: chosen(:)
-    integer :: i, r
+    integer(i4), allocatable :: slots(:)
+    real(wp), allocatable :: values(:)
+    integer :: i, r, k
 
     allocate (u(body%n_slots, body%dim), v(body%n_slots, body%dim), source=0.0_wp)
     allocate (temperature_change(body%n_slots), source=0.0_wp)
@@ -43,34 +49,56 @@ contains
         chosen = body%point > 0
         do r = 1, size(scene%regions)
           if (group%region == '' .or. scene%regions(r)%name /= group%region) cycle
-          chosen = chosen .and. inside(scene%regions(r), body%x, &
-            & touch*minval(body%spacing, mask=body%point > 0))
+          chosen = chosen .and. in_region(scene, body, r)
         end do
-        call set_field(body, chosen, group%displacement, group%displacement_gradient, u)
-        call set_field(body, chosen, group%velocity, group%velocity_gradient, v)
-        if (.not. is_set(group%temperature_change)) cycle
-        where (chosen)
-          temperature_change = group%temperature_change
-          heated_by = int(i, i2)
-        end where
+        slots = pack([(int(k, i4), k=1, body%n_slots)], chosen)
+        call set_field(scene, i, 'displacement', body, slots, group%displacement, &
+          & group%displacement_text, group%displacement_gradient, u, error)
+        if (allocated(error)) return
+        call set_field(scene, i, 'velocity', body, slots, group%velocity, group%velocity_text, &
+          & group%velocity_gradient, v, error)
+        if (allocated(error)) return
+        if (.not. is_given(group%temperature_change, group%temperature_text)) cycle
+        heated_by(slots) = int(i, i2)
+        if (group%temperature_text == '') then
+          temperature_change(slots) = group%temperature_change
+        else if (varies_in_time(scene, group%temperature_text)) then
+          temperature_change(slots) = 1.0_wp
+        else
+          call values_on(scene, group%temperature_text, body, slots, 'initial', i, &
+            & 'temperature_change', values, error)
+          if (allocated(error)) return
+          temperature_change(slots) = values
+        end if
       end associate
     end do
   end subroutine initial_state
 
   !> Components that the group names become value + H x.
-  pure subroutine set_field(body, chosen, value, gradient, field)
+  subroutine set_field(scene, number, key, body, slots, value, text, gradient, field, error)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    character(*), intent(in) :: key
     type(body_type), intent(in) :: body
-    logical, intent(in) :: chosen(:)
+    integer(i4), intent(in) :: slots(:)
     real(wp), intent(in) :: value(3), gradient(3, 3)
+    character(*), intent(in) :: text(3)
     real(wp), intent(inout) :: field(:, :)
-    real(wp) :: constant
-    integer :: c, k
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer :: c, i
 
     do c = 1, body%dim
-      if (.not. is_set(value(c)) .and. all(abs(gradient(c, :)) <= 0.0_wp)) cycle
-      constant = merge(value(c), 0.0_wp, is_set(value(c)))
-      do k = 1, body%n_slots
-        if (chosen(k)) field(k, c) = constant + dot_product(gradient(c, :body%dim), body%x(k, :))
+      if (.not. is_given(value(c), text(c)) .and. all(abs(gradient(c, :)) <= 0.0_wp)) cycle
+      if (text(c) /= '') then
+        call values_on(scene, text(c), body, slots, 'initial', number, key//'_'//xyz(c:c), values, &
+          & error)
+        if (allocated(error)) return
+      else
+        values = spread(merge(value(c), 0.0_wp, is_set(value(c))), 1, size(slots))
+      end if
+      do i = 1, size(slots)
+        field(slots(i), c) = values(i) + dot_product(gradient(c, :body%dim), body%x(slots(i), :))
       end do
     end do
   end subroutine set_field

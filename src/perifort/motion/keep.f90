@@ -6,6 +6,7 @@ module pd_motion_keep
   use pd_base_checksum, only: checksum_type
   use pd_base_kinds, only: wp, i1, i8
   use pd_force_generic_points, only: keep_laws
+  use pd_motion_conditions, only: keep_paths
   use pd_motion_heating, only: keep_heating
   use pd_motion_memory, only: keep_memory
   use pd_motion_system, only: system_type
@@ -51,6 +52,7 @@ contains
     end do
     if (allocated(system%heating%curves)) &
       & call keep_heating(archive, system%heating, system%model%expansion)
+    call keep_paths(archive, system%motions)
     call system%terms%keep(archive)
     call keep_memory(archive, system%memory)
   end subroutine keep_system

@@ -2,8 +2,10 @@
 !> brings the forces up to date. Integrators and relaxation work on this type alone.
 module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_error, only: error_type, fail, status_no_answer
+  use pd_base_text, only: to_text
   use pd_base_reduce, only: add_point, inner, new_running, running_type, total_of_running
-  use pd_body_body, only: body_type, share_halo
+  use pd_body_body, only: body_type, not_finite_text, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
   use pd_force_generic_pass, only: renew_pulls
@@ -14,15 +16,17 @@ module pd_motion_system
   use pd_force_term, only: term_list_type, term_view_type
   use pd_force_workspace, only: workspace_type
   use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
-    & moved_by_velocity, number_of_loads, load_of
-  use pd_motion_heating, only: heating_type, heat, apply_factors
+    & number_of_loads, load_of, accelerations_of, acts_along, advance_paths, condition_fault, &
+    & density_of, renew_load, renew_motions
+  use pd_motion_heating, only: heating_type, heat, apply_factors, apply_rate, is_timed, &
+    & heating_fault
   use pd_motion_memory, only: memory_type
   use pd_motion_energy_watch, only: watch_type
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & renew_forces, break_now, account, energies_type, energies_of, add_loads, inverse_density, &
-    & velocities_now, view_of, stored_energy
+    & renew_forces, renew_conditions, explain_condition, break_now, account, energies_type, &
+    & energies_of, add_loads, inverse_density, velocities_now, view_of, stored_energy
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -59,6 +63,7 @@ module pd_motion_system
     real(wp) :: time = 0.0_wp                   !! of the present displacements [s]
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
     type(watch_type) :: watch                   !! over the energies
+    type(condition_fault), allocatable :: fault !! first value of a condition that is not finite
     real(wp) :: stable_step = 0.0_wp            !! the integrator's limit, 0: unknown [s]
   end type system_type
 
@@ -95,6 +100,7 @@ contains
       & system%model%breaking)), source=0.0_wp)
     call hold_components(system)
     call remember_start(system%motions, system%state%u)
+    call renew_conditions(system, 0.0_wp)
     call impose(system%motions, 0.0_wp, system%state%u, system%state%v)
     call view_of(system, 0.0_wp, view)
     call system%terms%begin(view)
@@ -165,6 +171,7 @@ contains
     early = breaking .and. system%model%breaking .and. .not. system%break_late
     late = breaking .and. system%model%breaking .and. system%break_late
     if (late) call settle_account(system)
+    call renew_conditions(system, t)
     call impose(system%motions, t, system%state%u, system%state%v)
     if (system%model%breaking) call share_halo(system%body, system%state%v)
     call bring_temperature(system, t)
@@ -211,6 +218,41 @@ contains
     call system%terms%add_force(view, system%state%force)
     call share_halo(system%body, system%state%force)
   end subroutine renew_forces
+
+  !> Bring conditions that are expressions of t to time `t`. The first value that is not finite is
+  !> noted in `fault` of the system; conditions go on without it.
+  subroutine renew_conditions(system, t)
+    type(system_type), intent(inout), target :: system
+      !! its motions and loads keep the values of this time
+    real(wp), intent(in) :: t  !! [s]; in relaxation 0 to 1 over the load steps
+    type(load_type), pointer :: load
+    integer :: l
+
+    call renew_motions(system%motions, t, system%fault)
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      call renew_load(load, l, t, system%fault)
+    end do
+    call heating_fault(system%heating, t, system%fault)
+  end subroutine renew_conditions
+
+  !> The error of a condition that is not finite; the fault is then taken note of.
+  subroutine explain_condition(system, status, error)
+    type(system_type), intent(inout) :: system  !! with a `fault`, without it on return
+    integer, intent(in) :: status               !! exit status of the program
+    type(error_type), allocatable, intent(out) :: error
+
+    character(:), allocatable :: step
+
+    step = ''
+    if (status == status_no_answer) step = 'step '//to_text(system%memory%step)//': '
+    associate (fault => system%fault)
+      call fail(error, step//fault%key//' of &'//fault%group//' number '// &
+        & to_text(fault%number)//' '//not_finite_text(system%body, fault%slot, fault%time), &
+        & status, fault%group, fault%number)
+    end associate
+    deallocate (system%fault)
+  end subroutine explain_condition
 
   !> Bring the thermal strains to time `t`.
   subroutine bring_temperature(system, t)
@@ -401,18 +443,32 @@ contains
     real(wp), intent(in) :: t, scale
     logical, intent(in) :: per_density
     real(wp), intent(inout) :: values(:, :)
-    real(wp) :: factor, by
-    integer :: i, c, k
+    real(wp), allocatable :: density(:, :)
 
-    factor = scale*load%curve%value(t)
-    do c = 1, size(values, 2)
-      do i = 1, size(load%slots)
-        k = load%slots(i)
-        by = factor
-        if (per_density) by = factor*inverse_density(model, k)
-        values(k, c) = values(k, c) + by*load%density(i, c)
+    if (allocated(load%parts)) then
+      call density_of(load, t, density)
+      call put(density)
+    else
+      call put(load%density)
+    end if
+
+  contains
+
+    subroutine put(density)
+      real(wp), intent(in), contiguous :: density(:, :)
+      real(wp) :: factor, by
+      integer :: i, c, k
+
+      factor = scale*load%curve%value(t)
+      do c = 1, size(values, 2)
+        do i = 1, size(load%slots)
+          k = load%slots(i)
+          by = factor
+          if (per_density) by = factor*inverse_density(model, k)
+          values(k, c) = values(k, c) + by*density(i, c)
+        end do
       end do
-    end do
+    end subroutine put
   end subroutine add_load
 
   !> 1/rho of slot `k` [m3/kg].
@@ -435,9 +491,9 @@ contains
       !! its work, reactions and the histories of its terms are those of this instant on return
     real(wp), intent(in) :: t                 !! time of the displacements [s]
     logical, intent(in), optional :: at_rest  !! nothing is accelerated; false by default
-    real(wp), allocatable :: applied(:, :)
+    real(wp), allocatable :: applied(:, :), acceleration(:), density(:, :)
     type(running_type) :: running
-    real(wp) :: force, acceleration, mass, work, totals(6)
+    real(wp) :: force, mass, work, factor, totals(6)
     logical :: first, moving
     type(load_type), pointer :: load
     type(term_view_type) :: view
@@ -458,9 +514,8 @@ contains
       associate (motion => system%motions(m))
         motion%reaction = 0.0_wp
         do c = 1, system%body%dim
-          acceleration = 0.0_wp
-          if (moving .and. motion%kind(c) == moved_by_velocity) &
-            & acceleration = motion%amplitude(c)*motion%curve%slope(t)
+          allocate (acceleration(size(motion%slots)), source=0.0_wp)
+          if (moving) call accelerations_of(motion, c, t, acceleration)
           call new_running(system%body%order, running)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
@@ -473,30 +528,36 @@ contains
             call add_work(system, n, first, work, system%state%u(k, c), force, mass, &
               & system%state%v(k, c))
             call add_point(system%body%order, system%body%point(k), &
-              & [mass*acceleration + force, work], running)
+              & [mass*acceleration(i) + force, work], running)
           end do
           totals = total_of_running(system%body%order, running)
           motion%reaction(c) = totals(1)
+          deallocate (acceleration)
           system%external_work = system%external_work + totals(2)
         end do
       end associate
     end do
     do l = 1, number_of_loads(system%terms)
       load => load_of(system%terms, l)
+      factor = load%curve%value(t)
+      if (allocated(load%parts)) call density_of(load, t, density)
       do c = 1, system%body%dim
-        if (all(abs(load%density(:, c)) <= 0.0_wp) .and. &
+        if (.not. acts_along(load, c) .and. &
           & .not. associated(system%body%order%ranks)) cycle
         call new_running(system%body%order, running)
         do i = 1, size(load%slots)
           k = load%slots(i)
+          force = load%density(i, c)
+          if (allocated(load%parts)) force = density(i, c)
           call add_work(system, n, first, work, system%state%u(k, c), &
-            & load%density(i, c)*load%curve%value(t)*system%body%volume(k))
+            & force*factor*system%body%volume(k))
           call add_point(system%body%order, system%body%point(k), [work], running)
         end do
         totals = total_of_running(system%body%order, running)
         system%external_work = system%external_work + totals(1)
       end do
     end do
+    call advance_paths(system%motions, t)
     if (system%model%generic) call commit(system)
     if (system%terms%number() == number_of_loads(system%terms)) return
     call view_of(system, t, view)
@@ -530,7 +591,9 @@ contains
         last = size(heating%curves(i)%times)
         rate = 0.0_wp
         ! past its last time a course is constant
-        if (t < heating%curves(i)%times(last) .or. &
+        if (is_timed(heating, i)) then
+          rate = rate_by_time()
+        else if (t < heating%curves(i)%times(last) .or. &
           & abs(heating%factors(i) - heating%last_factors(i)) > 0.0_wp) then
           rate = energy_at(heating%factors(i) + 0.5_wp) - energy_at(heating%factors(i) - 0.5_wp)
           call apply_factors(heating, heating%factors, system%model%expansion)
@@ -543,6 +606,20 @@ contains
     end associate
 
   contains
+
+    !> The rate of the strain energy that the temperature's rate makes at fixed displacements [W].
+    real(wp) function rate_by_time() result(rate)
+      real(wp) :: h
+
+      rate = 0.0_wp
+      call apply_rate(system%heating, i, t, 0.5_wp, system%model%expansion, h)
+      if (h > 0.0_wp) then
+        rate = strain_energy(system)
+        call apply_rate(system%heating, i, t, -0.5_wp, system%model%expansion, h)
+        rate = (rate - strain_energy(system))/h
+      end if
+      call apply_factors(system%heating, system%heating%factors, system%model%expansion)
+    end function rate_by_time
 
     !> Strain energy with another factor of the `i`-th course [J].
     real(wp) function energy_at(factor)

@@ -2,20 +2,27 @@
 module pd_set_up_conditions
   use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type
+  use pd_base_expression, only: constant_value, expression_type
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
+  use pd_scene_content_expressions, only: expression_of, varies_in_time
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, load_group, is_set
   use pd_scene_groups_course, only: ramp_of
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
+  use pd_body_regions, only: in_region, values_on
   use pd_body_shapes, only: inside
-  use pd_motion_conditions, only: motion_type, load_type, moved_by_displacement, moved_by_velocity
+  use pd_motion_conditions, only: motion_type, load_type, add_part, &
+    & moved_by_displacement, moved_by_velocity, &
+    & vary_in_time
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve
-  use pd_motion_heating, only: heating_type, new_heating
+  use pd_motion_heating, only: heating_type, new_heating, new_timed_heat, timed_heat_type
   implicit none (type, external)
   private
   public :: volume_of, motions_of_scene, loads_of_scene, heating_of_scene, region_mask, no_fail_mask, &
     & in_no_fail_zones
+
+  character(*), parameter :: xyz = 'xyz'
 
 contains
 
@@ -55,10 +62,57 @@ contains
             motion%amplitude(c) = group%displacement(c)
           end if
         end do
-        motion%curve = course(scene, group%ramp_time, group%times, group%values)
+        do c = 1, body%dim
+          call move_by_expression(scene, body, m, c, group%velocity_text(c), 'velocity', &
+            & moved_by_velocity, motion, error)
+          if (.not. allocated(error)) call move_by_expression(scene, body, m, c, &
+            & group%displacement_text(c), 'displacement', moved_by_displacement, motion, error)
+          if (allocated(error)) return
+        end do
+        motion%curve = course(scene, group%ramp_time, group%times, group%values, &
+          & any(motion%by_time))
       end associate
     end do
   end subroutine motions_of_scene
+
+  !> A component of an imposed motion that is given by an expression. What has no t is an amplitude,
+  !> of each point if it has x, y or z. An error is set if a value is not finite.
+  subroutine move_by_expression(scene, body, number, c, text, key, kind, motion, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: number               !! of the `&boundary`
+    integer, intent(in) :: c                    !! component
+    character(*), intent(in) :: text, key
+    integer, intent(in) :: kind
+    type(motion_type), intent(inout) :: motion  !! with its slots
+    type(error_type), allocatable, intent(out) :: error
+    type(expression_type) :: expression
+    real(wp), allocatable :: values(:)
+    integer :: i
+
+    if (text == '') return
+    motion%kind(c) = kind
+    call expression_of(scene, text, expression)
+    if (expression%in_time) then
+      call vary_in_time(motion, c, expression, body%x(motion%slots, :))
+      return
+    end if
+    call values_on(scene, text, body, motion%slots, 'boundary', number, key//'_'//xyz(c:c), &
+      & values, error)
+    if (allocated(error)) return
+    if (.not. expression%in_space) then
+      motion%amplitude(c) = constant_value(expression)
+      if (allocated(motion%profile)) motion%profile(:, c) = motion%amplitude(c)
+      return
+    end if
+    if (.not. allocated(motion%profile)) then
+      allocate (motion%profile(size(motion%slots), body%dim))
+      do i = 1, body%dim
+        motion%profile(:, i) = motion%amplitude(i)
+      end do
+    end if
+    motion%profile(:, c) = values
+  end subroutine move_by_expression
 
   !> Force densities of every `&load`: pressure, total force and body force of a group add up. An
   !> error is set if one holds no point.
@@ -100,10 +154,71 @@ contains
           load%density(:, axis) = load%density(:, axis) &
             & - group%pressure*outward/body%spacing(load%slots)
         end if
-        load%curve = course(scene, group%ramp_time, group%times, group%values)
+        call load_by_expressions(scene, body, l, load, error)
+        if (allocated(error)) return
+        load%curve = course(scene, group%ramp_time, group%times, group%values, timed_load(scene, &
+          & group))
       end associate
     end do
   end subroutine loads_of_scene
+
+  !> Whether a load depends on t by an expression.
+  logical function timed_load(scene, group) result(timed)
+    type(scene_type), intent(in) :: scene
+    type(load_group), intent(in) :: group
+    integer :: c
+
+    timed = varies_in_time(scene, group%pressure_text)
+    do c = 1, 3
+      timed = timed .or. varies_in_time(scene, group%force_text(c)) .or. &
+        & varies_in_time(scene, group%body_force_text(c))
+    end do
+  end function timed_load
+
+  !> The parts of a load that are given by expressions. Those without t add to its densities. An
+  !> error is set if a value is not finite.
+  subroutine load_by_expressions(scene, body, number, load, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: number            !! of the `&load`
+    type(load_type), intent(inout) :: load   !! with its slots and its densities by numbers
+    type(error_type), allocatable, intent(out) :: error
+    real(wp) :: outward
+    integer :: c, axis
+
+    associate (group => scene%loads(number), n => size(load%slots))
+      do c = 1, body%dim
+        call add(group%body_force_text(c), 'body_force_'//xyz(c:c), c, spread(1.0_wp, 1, n))
+        call add(group%force_text(c), 'force_'//xyz(c:c), c, &
+          & spread(1/volume_of(body, load%slots), 1, n))
+      end do
+      if (group%pressure_text == '') return
+      axis = index('xyz', group%side(1:1))
+      outward = merge(-1.0_wp, 1.0_wp, group%side(3:5) == 'min')
+      call add(group%pressure_text, 'pressure', axis, -outward/body%spacing(load%slots))
+    end associate
+
+  contains
+
+    !> One part.
+    subroutine add(text, key, c, weight)
+      character(*), intent(in) :: text, key
+      integer, intent(in) :: c
+      real(wp), intent(in) :: weight(:)
+      type(expression_type) :: expression
+      real(wp), allocatable :: values(:)
+
+      if (allocated(error) .or. text == '') return
+      call expression_of(scene, text, expression)
+      if (expression%in_time) then
+        call add_part(load, key, c, expression, body%x(load%slots, :), weight)
+      else
+        call values_on(scene, text, body, load%slots, 'load', number, key, values, error)
+        if (.not. allocated(error)) load%density(:, c) = load%density(:, c) + values*weight
+      end if
+    end subroutine add
+
+  end subroutine load_by_expressions
 
   !> The volume of points, whose slots stand in the order of the points [m3].
   real(wp) function volume_of(body, slots) result(volume)
@@ -122,21 +237,34 @@ contains
   end function volume_of
 
   !> Courses of the temperature changes of every `&initial`.
-  subroutine heating_of_scene(scene, heated_by, expansion, heating)
+  subroutine heating_of_scene(scene, body, heated_by, expansion, heating)
     type(scene_type), intent(in) :: scene       !! a checked scene
+    type(body_type), intent(in) :: body         !! its points
     integer(i2), intent(in) :: heated_by(:)     !! number of the group that heats each slot, or 0
     real(wp), intent(in) :: expansion(:)        !! alpha dT of each slot at factor 1 [-]
     type(heating_type), intent(out) :: heating  !! empty if the temperature is constant in time
     type(curve_type), allocatable :: curves(:)
+    type(timed_heat_type), allocatable :: timed(:)
+    type(expression_type) :: expression
+    integer(i4), allocatable :: slots(:)
     integer :: i
 
-    allocate (curves(size(scene%initial)))
+    allocate (curves(size(scene%initial)), timed(size(scene%initial)))
     do i = 1, size(curves)
       associate (group => scene%initial(i))
-        curves(i) = course(scene, group%ramp_time, group%times, group%values)
+        curves(i) = course(scene, group%ramp_time, group%times, group%values, &
+          & varies_in_time(scene, group%temperature_text))
+        if (.not. varies_in_time(scene, group%temperature_text)) cycle
+        call expression_of(scene, group%temperature_text, expression)
+        slots = slots_where(body, heated_by == i)
+        call new_timed_heat(expression, slots, body%x(slots, :), timed(i))
       end associate
     end do
-    call new_heating(expansion, heated_by, curves, heating)
+    if (any(timed%is_there)) then
+      call new_heating(expansion, heated_by, curves, heating, timed)
+    else
+      call new_heating(expansion, heated_by, curves, heating)
+    end if
   end subroutine heating_of_scene
 
   !> Slots in the region of this name.
@@ -150,8 +278,7 @@ contains
     allocate (mask(body%n_slots), source=.false.)
     do r = 1, size(scene%regions)
       if (scene%regions(r)%name /= name) cycle
-      mask = inside(scene%regions(r), body%x, touch*minval(body%spacing, mask=body%point > 0)) &
-        & .and. body%point > 0
+      mask = in_region(scene, body, r)
     end do
   end function region_mask
 
@@ -214,21 +341,23 @@ contains
   end function body_number
 
   !> How a condition varies in time.
-  function course(scene, ramp_time, times, values) result(curve)
+  function course(scene, ramp_time, times, values, timed) result(curve)
     type(scene_type), intent(in) :: scene
     real(wp), intent(in) :: ramp_time
     real(wp), allocatable, intent(in) :: times(:), values(:)
+    logical, intent(in) :: timed  !! an expression of t is the course
     type(curve_type) :: curve
     real(wp) :: length
     logical :: tabulated
 
+    curve = constant_curve()
+    if (timed) return
     tabulated = allocated(times)
     if (tabulated) tabulated = size(times) > 0
     if (tabulated) then
       curve = table_curve(times, values)
     else
       length = ramp_of(scene%time%method, ramp_time)
-      curve = constant_curve()
       if (is_set(length)) curve = ramp(length)
     end if
   end function course

@@ -104,8 +104,9 @@ contains
     type(error_type), allocatable :: ignored
     integer :: m
 
-    if (.not. any(is_set(scene%initial%temperature_change) .and. &
-      & abs(scene%initial%temperature_change) > 0.0_wp)) return
+    if (.not. any((is_set(scene%initial%temperature_change) .and. &
+      & abs(scene%initial%temperature_change) > 0.0_wp) .or. &
+      & scene%initial%temperature_text /= '')) return
     if (.not. allocated(scene%text)) return
     if (len(scene%text) == 0) return
     call scan_scene(scene, source, ignored)

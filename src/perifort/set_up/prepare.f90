@@ -2,12 +2,13 @@
 module pd_set_up_prepare
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_clock, only: phase_timer_type
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, status_input
   use pd_base_text, only: to_text
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
   use pd_body_generate, only: generate_body
   use pd_body_initial, only: initial_state
+  use pd_body_regions, only: check_regions
   use pd_body_layers, only: layer_count_type, layer_count_text
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
@@ -20,7 +21,7 @@ module pd_set_up_prepare
   use pd_force_model, only: new_model
   use pd_force_term, only: term_list_type
   use pd_motion_conditions, only: add_loads_to, load_type
-  use pd_motion_system, only: system_type, start_system
+  use pd_motion_system, only: system_type, start_system, explain_condition
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type
   use pd_set_up_bounds, only: check_bounds
@@ -101,13 +102,15 @@ contains
       call timer%stop('threads')
 
       call timer%start('conditions')
+      call check_regions(scene, system%body, error)
+      if (allocated(error)) return
       call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
         & heated_by, error)
       if (allocated(error)) return
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
         & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
-      if (system%model%thermal) call heating_of_scene(scene, heated_by, system%model%expansion, &
-        & system%heating)
+      if (system%model%thermal) call heating_of_scene(scene, system%body, heated_by, &
+        & system%model%expansion, system%heating)
       call check_laws(scene, system, error)
       if (allocated(error)) return
       call motions_of_scene(scene, system%body, system%motions, error)
@@ -151,6 +154,11 @@ contains
       call timer%start('time step')
       system%break_late = scene%time%breaking == 'after_forces'
       call start_system(system)
+      if (allocated(system%fault)) then
+        call explain_condition(system, status_input, error)
+        call place_fault(error, scene, 'scene', 1, '')
+        return
+      end if
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return
       call check_bounds(scene, system, set_up%plan, error)

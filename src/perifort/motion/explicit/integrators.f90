@@ -16,7 +16,7 @@ module pd_motion_explicit_integrators
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_energy_watch, only: watch_type
   use pd_motion_system, only: system_type, energies_type, energies_of, pairing_type, evaluate, &
-    & account, add_loads, inverse_density, velocities_now
+    & account, add_loads, inverse_density, velocities_now, explain_condition
   implicit none (type, external)
   private
   public :: run_explicit, begin_memory
@@ -67,6 +67,11 @@ contains
       if (n > seen) then
         call evaluate(system, instant%time, breaking=.true., &
           & pairing=pairing_of(integrator, n, dt, system%break_late))
+        if (allocated(system%fault)) then
+          call explain_condition(system, status_no_answer, error)
+          call show_good(good, system, observer, error)
+          return
+        end if
         ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
         instant%kick = 0.0_wp
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2

@@ -20,7 +20,7 @@ module pd_motion_static_relaxation
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_static_start, only: move_along, loose_text
   use pd_motion_system, only: system_type, bring_temperature, evaluate, break_now, account, &
-    & add_loads
+    & add_loads, explain_condition, renew_conditions
   implicit none (type, external)
   private
   public :: relaxation_type, run_relaxation, fill_memory
@@ -78,6 +78,9 @@ contains
     if (allocated(error)) return
     call find_free_motions(system, rigid)
     do i = max(1, system%memory%load_step), relaxation%load_steps
+      call renew_conditions(system, real(i, wp)/relaxation%load_steps)
+      if (allocated(system%fault)) call explain_condition(system, status_input, error)
+      if (allocated(error)) return
       call check_balance(system, rigid, real(i, wp)/relaxation%load_steps, merge(status_input, &
         & status_no_answer, system%memory%step == not_begun), error)
       if (allocated(error)) return

@@ -5,15 +5,17 @@
 !> there. The scene is read anew afterwards: a changed scene obeys the same rules as any.
 module pd_scene_content_change
   use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp
   use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_format_elements, only: find_elements, growing
   use pd_scene_content_groups, only: list_groups, table_of
   use pd_scene_content_types, only: group_table, name_length, path_length, scene_type
   use pd_scene_format_file, only: line_type
   use pd_scene_format_find, only: find_section
-  use pd_scene_format_keys, only: keys_type
+  use pd_scene_format_keys, only: keys_type, real_or_expression
   use pd_scene_format_source, only: add_option, check_text, entry_type, scan_source, section_type, &
     & source_fault, source_type, token_type
+  use pd_scene_format_values, only: parse_real
   implicit none (type, external)
   private
   public :: target_type, find_target, change_key, words_of, full_name, apply_changes, scan_scene
@@ -104,10 +106,18 @@ contains
     type(source_type) :: inside
     type(error_type), allocatable :: fault
     type(token_type) :: token
+    character(:), allocatable :: note
+    real(wp) :: number
+    logical :: plain
     integer :: last, i, next, first
 
     last = len_trim(value)
-    if (index(target%kind, 'text') == 1 .and. value(:1) /= "'" .and. value(:1) /= '"') then
+    plain = index(target%kind, 'text') == 1
+    if (target%kind == real_or_expression) then
+      call parse_real(trim(value), number, note)
+      plain = len(note) > 0
+    end if
+    if (plain .and. value(:1) /= "'" .and. value(:1) /= '"') then
       allocate (tokens(0))
       first = 1
       do while (first <= last)

@@ -7,6 +7,7 @@ module pd_scene_content_check
   use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
   use pd_scene_content_check_bodies, only: check_body, check_shape, check_material, check_crack
   use pd_scene_content_defaults, only: fill_defaults
+  use pd_scene_content_expressions, only: at_the_start, check_definitions, check_expression
   use pd_scene_content_groups, only: default_fields, default_probe_fields, table_of
   use pd_scene_content_rules, only: rule_fault, given, check_known, check_unique, check_vector
   use pd_scene_format_source, only: source_type
@@ -30,6 +31,8 @@ contains
     integer :: i
 
     call allocate_groups(scene)
+    call check_definitions(scene, error, source)
+    if (allocated(error)) return
     call fill_defaults(scene, error, source)
     if (allocated(error)) return
     call check_numbers(scene, error, source)
@@ -52,7 +55,10 @@ contains
         if (allocated(error)) return
       end do
       do i = 1, size(scene%regions)
-        call check_shape(scene%regions(i), d, 'region', i, error, source)
+        if (scene%regions(i)%where == '' .or. scene%regions(i)%shape /= '') &
+          & call check_shape(scene%regions(i), d, 'region', i, error, source)
+        call check_expression(scene, scene%regions(i)%where, 'region', i, 'where', 'xyz', &
+          & at_the_start, error, source)
         if (allocated(error)) return
       end do
       do i = 1, size(scene%cracks)

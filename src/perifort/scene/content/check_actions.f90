@@ -4,10 +4,12 @@ module pd_scene_content_check_actions
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_content_check_bodies, only: check_file
+  use pd_scene_content_expressions, only: at_the_start, check_expression, &
+    & check_vector_expressions, in_no_force
   use pd_scene_content_rules, only: rule_fault, check_known, check_components, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_course, only: ramp_of
-  use pd_scene_content_types, only: load_group, scene_type, is_set, name_length
+  use pd_scene_content_types, only: load_group, scene_type, is_given, is_set, name_length
   implicit none (type, external)
   private
   public :: check_initial, check_boundary, check_load
@@ -22,13 +24,22 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: d
+    logical :: timed
 
     d = scene%header%dimension
+    timed = .false.
     associate (initial => scene%initial(number))
       call check_components(initial%displacement, d, 'displacement', 'initial', number, error, &
         & source)
       if (allocated(error)) return
       call check_components(initial%velocity, d, 'velocity', 'initial', number, error, source)
+      if (allocated(error)) return
+      call check_vector_expressions(scene, initial%displacement_text, 'initial', number, &
+        & 'displacement', 'xyz', at_the_start, error, source)
+      call check_vector_expressions(scene, initial%velocity_text, 'initial', number, 'velocity', &
+        & 'xyz', at_the_start, error, source)
+      call check_expression(scene, initial%temperature_text, 'initial', number, &
+        & 'temperature_change', 'xyzt', '', error, source, timed)
       if (allocated(error)) return
       call check_gradient(initial%displacement_gradient, 'displacement_gradient')
       call check_gradient(initial%velocity_gradient, 'velocity_gradient')
@@ -39,10 +50,15 @@ contains
       if (initial%file /= '' .and. initial%region /= '') then
         call rule_fault(error, 'initial', number, 'region', "'file' and 'region' are both given", &
           & 'the file has a row for every point', source)
+      else if (initial%file /= '' .and. (any(initial%displacement_text /= '') .or. &
+        & any(initial%velocity_text /= '') .or. initial%temperature_text /= '')) then
+        call rule_fault(error, 'initial', number, 'file', "'file' beside an expression", &
+          & 'give the expression in another group', source)
       else if (initial%file /= '') then
         call check_file(initial%file, scene%file, 'initial', number, error, source)
-      else if (.not. (any(is_set(initial%displacement)) .or. any(is_set(initial%velocity)) .or. &
-        & is_set(initial%temperature_change) .or. &
+      else if (.not. (any(is_given(initial%displacement, initial%displacement_text)) .or. &
+        & any(is_given(initial%velocity, initial%velocity_text)) .or. &
+        & is_given(initial%temperature_change, initial%temperature_text) .or. &
         & any(abs(initial%displacement_gradient) > 0.0_wp) .or. &
         & any(abs(initial%velocity_gradient) > 0.0_wp))) then
         call rule_fault(error, 'initial', number, '', 'group &initial is empty', &
@@ -50,7 +66,8 @@ contains
           & source)
       end if
       if (allocated(error)) return
-      if (.not. is_set(initial%temperature_change) .and. initial%file == '') then
+      if (.not. is_given(initial%temperature_change, initial%temperature_text) .and. &
+        & initial%file == '') then
         if (allocated(initial%times) .or. is_set(initial%ramp_time)) call rule_fault(error, &
           & 'initial', number, merge('times    ', 'ramp_time', allocated(initial%times)), &
           & 'a course in time without a temperature_change', &
@@ -58,7 +75,7 @@ contains
         return
       end if
       call check_course(scene, initial%ramp_time, initial%times, initial%values, 'initial', &
-        & number, error, source)
+        & number, timed, error, source)
     end associate
 
   contains
@@ -87,8 +104,10 @@ contains
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
     integer :: i, d
+    logical :: timed
 
     d = scene%header%dimension
+    timed = .false.
     associate (boundary => scene%boundaries(number))
       call check_place(scene, boundary%body, boundary%side, boundary%region, 'boundary', number, &
         & error, source)
@@ -98,17 +117,23 @@ contains
       if (allocated(error)) return
       call check_components(boundary%velocity, d, 'velocity', 'boundary', number, error, source)
       if (allocated(error)) return
+      call check_vector_expressions(scene, boundary%displacement_text, 'boundary', number, &
+        & 'displacement', 'xyzt', '', error, source, timed)
+      call check_vector_expressions(scene, boundary%velocity_text, 'boundary', number, &
+        & 'velocity', 'xyzt', '', error, source, timed)
+      if (allocated(error)) return
       if (boundary%absorbing) then
         call check_absorbing(scene, number, error, source)
         if (allocated(error)) return
-      else if (.not. any(is_set(boundary%displacement)) .and. &
-        & .not. any(is_set(boundary%velocity))) then
+      else if (.not. any(is_given(boundary%displacement, boundary%displacement_text)) .and. &
+        & .not. any(is_given(boundary%velocity, boundary%velocity_text))) then
         call rule_fault(error, 'boundary', number, '', 'group &boundary imposes nothing', &
           & 'expected displacement_x.. or velocity_x.., or absorbing', source)
         return
       end if
       do i = 1, d
-        if (.not. is_set(boundary%displacement(i)) .or. .not. is_set(boundary%velocity(i))) cycle
+        if (.not. is_given(boundary%displacement(i), boundary%displacement_text(i)) .or. &
+          & .not. is_given(boundary%velocity(i), boundary%velocity_text(i))) cycle
         call rule_fault(error, 'boundary', number, 'velocity_'//directions(i:i), &
           & "'displacement_"//directions(i:i)//"' and 'velocity_"//directions(i:i)// &
           & "' are both imposed", 'give one of them; each follows from the other', source)
@@ -122,7 +147,7 @@ contains
         return
       end do
       call check_course(scene, boundary%ramp_time, boundary%times, boundary%values, 'boundary', &
-        & number, error, source)
+        & number, timed, error, source)
     end associate
   end subroutine check_boundary
 
@@ -140,11 +165,12 @@ contains
       if (boundary%side == '') then
         key = 'region'
         note = 'its layer takes in waves that meet a side: give a side instead'
-      else if (any(is_set(boundary%displacement))) then
-        key = 'displacement_'//first_of(boundary%displacement)
+      else if (any(is_given(boundary%displacement, boundary%displacement_text))) then
+        key = 'displacement_'//first_of(is_given(boundary%displacement, &
+          & boundary%displacement_text))
         note = 'its layer is free: leave out displacement and velocity'
-      else if (any(is_set(boundary%velocity))) then
-        key = 'velocity_'//first_of(boundary%velocity)
+      else if (any(is_given(boundary%velocity, boundary%velocity_text))) then
+        key = 'velocity_'//first_of(is_given(boundary%velocity, boundary%velocity_text))
         note = 'its layer is free: leave out displacement and velocity'
       else if (is_set(boundary%ramp_time) .or. allocated(boundary%times)) then
         key = merge('times    ', 'ramp_time', allocated(boundary%times))
@@ -163,12 +189,12 @@ contains
   contains
 
     !> The first direction that is given.
-    pure character(1) function first_of(value) result(direction)
-      real(wp), intent(in) :: value(3)
+    pure character(1) function first_of(given) result(direction)
+      logical, intent(in) :: given(3)
       character(*), parameter :: directions = 'xyz'
       integer :: c
 
-      c = findloc(is_set(value), .true., dim=1)
+      c = findloc(given, .true., dim=1)
       direction = directions(c:c)
     end function first_of
   end subroutine check_absorbing
@@ -199,8 +225,9 @@ contains
   pure logical function loads_anything(load)
     type(load_group), intent(in) :: load
 
-    loads_anything = is_set(load%pressure) .or. any(is_set(load%force)) .or. &
-      & any(is_set(load%body_force))
+    loads_anything = is_given(load%pressure, load%pressure_text) .or. &
+      & any(is_given(load%force, load%force_text)) .or. &
+      & any(is_given(load%body_force, load%body_force_text))
   end function loads_anything
 
   !> One `&load`; the only body and, in relaxation, the ramp over the load steps are defaults. An
@@ -211,8 +238,10 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
     integer :: d
+    logical :: timed
 
     d = scene%header%dimension
+    timed = .false.
     associate (load => scene%loads(number))
       if (load%side /= '' .and. load%body == '') then
         if (size(scene%bodies) > 1) then
@@ -228,6 +257,13 @@ contains
       if (allocated(error)) return
       call check_components(load%body_force, d, 'body_force', 'load', number, error, source)
       if (allocated(error)) return
+      call check_expression(scene, load%pressure_text, 'load', number, 'pressure', 'xyzt', '', &
+        & error, source, timed)
+      call check_vector_expressions(scene, load%force_text, 'load', number, 'force', 't', &
+        & in_no_force, error, source, timed)
+      call check_vector_expressions(scene, load%body_force_text, 'load', number, 'body_force', &
+        & 'xyzt', '', error, source, timed)
+      if (allocated(error)) return
       if (any(is_set(load%stiffness))) then
         call check_springs(scene, number, error, source)
         if (allocated(error)) return
@@ -236,13 +272,13 @@ contains
           & 'expected pressure, force_x.., body_force_x.. or stiffness', source)
         return
       end if
-      if (is_set(load%pressure) .and. load%region /= '') then
+      if (is_given(load%pressure, load%pressure_text) .and. load%region /= '') then
         call rule_fault(error, 'load', number, 'pressure', "'pressure' with a region", &
           & "a pressure needs a 'side'; a region takes force_x.. or body_force_x..", source)
         return
       end if
       if (loads_anything(load)) call check_course(scene, load%ramp_time, load%times, load%values, &
-        & 'load', number, error, source)
+        & 'load', number, timed, error, source)
     end associate
   end subroutine check_load
 
@@ -293,14 +329,16 @@ contains
 
   !> At once, by a ramp, or by times and values. In relaxation, where time runs from 0 to 1 over the
   !> load steps, the default course is a ramp over all of them, and times must not exceed 1, since
-  !> later values would never act.
-  subroutine check_course(scene, ramp_time, times, values, group, number, error, source)
+  !> later values would never act. Expressions of t are courses of their own: none is given beside
+  !> them, and none is the default.
+  subroutine check_course(scene, ramp_time, times, values, group, number, timed, error, source)
     type(scene_type), intent(in) :: scene                 !! for its method
     real(wp), intent(inout) :: ramp_time                  !! length of the ramp [s]
     real(wp), allocatable, intent(in) :: times(:)         !! of the table [s]
     real(wp), allocatable, intent(in) :: values(:)        !! factors at `times` [-]
     character(*), intent(in) :: group                     !! name of the group, for messages
     integer, intent(in) :: number                         !! which group of this name
+    logical, intent(in) :: timed                          !! an expression of the group has t
     type(error_type), allocatable, intent(out) :: error   !! the broken rule
     type(source_type), intent(in), optional :: source     !! the scanned file, for places
     character(*), parameter :: load_time = 'in relaxation time runs from 0 to 1 over the load steps'
@@ -308,6 +346,16 @@ contains
     integer :: i
 
     relaxes = scene%time%method == 'relaxation'
+    if (timed) then
+      if (allocated(times)) then
+        call refuse('times')
+      else if (allocated(values)) then
+        call refuse('values')
+      else if (is_set(ramp_time)) then
+        call refuse('ramp_time')
+      end if
+      return
+    end if
     if (allocated(times) .neqv. allocated(values)) then
       if (allocated(times)) then
         call rule_fault(error, group, number, 'times', "'times' without 'values'", &
@@ -342,6 +390,17 @@ contains
         & "the time "//to_text(maxval(times))//" of 'times' is never reached", load_time// &
         & '; expected at most 1', source)
     end if
+
+  contains
+
+    !> A course beside an expression of t.
+    subroutine refuse(key)
+      character(*), intent(in) :: key
+      call rule_fault(error, group, number, key, "'"//key//"' beside an expression of t", &
+        & 'an expression of t is a course in time of its own; use another group for the rest', &
+        & source)
+    end subroutine refuse
+
   end subroutine check_course
 
   !> The names of all regions.

@@ -211,7 +211,8 @@ contains
       call need_radius()
     case default
       call rule_fault(error, group, number, 'shape', 'group &'//group//" lacks the key 'shape'", &
-        & "expected 'box', 'sphere' or 'cylinder'", source)
+        & "expected 'box', 'sphere' or 'cylinder'"//trim(merge(", or 'where'", &
+          & '            ', group == 'region')), source)
     end select
     if (allocated(error)) return
     call check_finite_box(shape%lower, shape%upper, group, number, error, source)

@@ -15,8 +15,9 @@ module pd_scene_content_defaults
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
   use pd_base_text, only: join
+  use pd_scene_content_expressions, only: varies_in_time
   use pd_scene_content_rules, only: rule_fault
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: scene_type, is_given, is_set
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_header, only: known_defaults, own_defaults
   implicit none (type, external)
@@ -51,7 +52,10 @@ contains
       & scene%output%history_every = max(1, scene%relaxation%maximum_iterations/rows_wanted)
     do i = 1, size(scene%initial)
       associate (initial => scene%initial(i))
-        if (.not. is_set(initial%temperature_change) .and. initial%file == '') cycle
+        if (.not. is_given(initial%temperature_change, initial%temperature_text) .and. &
+          & initial%file == '') cycle
+        ! what depends on t has a course of its own
+        if (varies_in_time(scene, initial%temperature_text)) cycle
         if (is_set(initial%ramp_time) .or. allocated(initial%times) .or. &
           & allocated(initial%values)) cycle
         initial%times = [0.0_wp, 1.0_wp]

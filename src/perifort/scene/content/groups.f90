@@ -4,10 +4,10 @@
 !> in the scene is `scene%added`; a component of `scene_type` also needs a procedure below that
 !> returns it.
 module pd_scene_content_groups
-  use pd_scene_content_types, only: scene_type, header_type, body_group, shape_group, &
-    & region_group, no_fail_group, material_group, horizon_group, crack_group, initial_group, &
-    & boundary_group, load_group, time_group, relaxation_group, output_group, probe_group, &
-    & tip_group, study_group, group_table
+  use pd_scene_content_types, only: scene_type, header_type, define_group, body_group, &
+    & shape_group, region_group, no_fail_group, material_group, horizon_group, crack_group, &
+    & initial_group, boundary_group, load_group, time_group, relaxation_group, output_group, &
+    & probe_group, tip_group, study_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -28,12 +28,14 @@ contains
 
     call table%add('scene', 'The problem as a whole: its title, its dimension and the '// &
       & 'assumptions that come with it.', once, header_type(), one=header)
+    call table%add('define', 'A name for a number, to be used in expressions.', repeated, &
+      & define_group(), all=definitions)
     call table%add('body', 'Material points: a lattice that fills a box, or a cloud read from '// &
       & 'a file.', repeated, body_group(), all=bodies)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
       & 'it are left out.', repeated, shape_group(), all=removed)
-    call table%add('region', 'A named shape; other groups use the points inside it by its '// &
-      & 'name.', repeated, region_group(), all=regions)
+    call table%add('region', 'A named part of space, by a shape or an expression; other '// &
+      & 'groups use the points inside it by its name.', repeated, region_group(), all=regions)
     call table%add('material', 'A material: how its bonds carry force and when they break.', &
       & repeated, material_group(), all=materials)
     call table%add('horizon', 'How far points interact, and how the sums over families are '// &
@@ -105,6 +107,16 @@ contains
     class(group_type), pointer, intent(out) :: group
     group => scene%output
   end subroutine output
+
+  subroutine definitions(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%definitions)) deallocate (scene%definitions)
+    if (present(room)) allocate (scene%definitions(room))
+    if (.not. allocated(scene%definitions)) allocate (scene%definitions(0))
+    groups => scene%definitions
+  end subroutine definitions
 
   subroutine bodies(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

@@ -7,11 +7,13 @@ module pd_scene_content_types
   use pd_base_error, only: internal_fault
   use pd_law_laws, only: all_laws, law_table_type
   use pd_scene_format_file, only: line_type
-  use pd_scene_format_given, only: is_set, name_length, path_length, unset
+  use pd_scene_format_given, only: is_given, is_set, name_length, path_length, &
+    & text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
   use pd_scene_groups_body, only: body_group
   use pd_scene_groups_boundary, only: boundary_group
   use pd_scene_groups_crack, only: crack_group
+  use pd_scene_groups_define, only: define_group
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_header, only: header_type
   use pd_scene_groups_horizon, only: horizon_group
@@ -27,10 +29,10 @@ module pd_scene_content_types
   use pd_scene_groups_tip, only: tip_group
   implicit none (type, external)
   private
-  public :: scene_type, header_type, body_group, shape_group, region_group, no_fail_group, &
-    & material_group, horizon_group, crack_group, initial_group, boundary_group, load_group, &
-    & time_group, relaxation_group, output_group, probe_group, tip_group, study_group, &
-    & name_length, path_length, unset, is_set
+  public :: scene_type, header_type, define_group, body_group, shape_group, region_group, &
+    & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
+    & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, study_group, &
+    & name_length, path_length, text_length, unset, is_set, is_given
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -72,6 +74,7 @@ module pd_scene_content_types
     character(:), allocatable :: text            !! the file's text
     type(line_type), allocatable :: changes(:)   !! `group%key=value`: what `--set` changes in it
     type(header_type) :: header
+    type(define_group), allocatable :: definitions(:)
     type(body_group), allocatable :: bodies(:)
     type(shape_group), allocatable :: removed(:)
     type(region_group), allocatable :: regions(:)

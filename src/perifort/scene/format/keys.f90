@@ -14,11 +14,14 @@ module pd_scene_format_keys
     & real_range, integer_range, unit_note
   use pd_scene_format_elements, only: find_elements, growing
   use pd_scene_format_source, only: source_type, source_fault
-  use pd_scene_format_given, only: is_set, name_length
+  use pd_scene_format_given, only: is_set, name_length, unset
   use pd_scene_format_values, only: exact_text, list_text, quoted_text, vector_text
   implicit none (type, external)
   private
-  public :: keys_type, key_info, mode_read, mode_describe, mode_write
+  public :: keys_type, key_info, mode_read, mode_describe, mode_write, real_or_expression
+
+  !> Kind of a key that may be a number or an expression.
+  character(*), parameter :: real_or_expression = 'real or expression'
 
   enum, bind(c)
     enumerator :: mode_read, mode_describe, mode_write
@@ -214,9 +217,10 @@ contains
     call keys%complain(slots(1), message, note)
   end subroutine integer_key
 
-  !> A real within the open bounds `above`, `below` and the closed ones `at_least`, `at_most`.
+  !> A real within the open bounds `above`, `below` and the closed ones `at_least`, `at_most`. With
+  !> `text` it may be an expression in quotes instead, which bounds do not hold for.
   subroutine real_key(keys, name, value, unit, meaning, required, above, below, at_least, at_most, &
-      & default, hidden)
+      & default, hidden, text)
     class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
                                                    !! what is wrong with it
     character(*), intent(in) :: name               !! of the key, in lower case
@@ -232,20 +236,37 @@ contains
     character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
                                                    !! by the value
     logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
+    ! allow(C072): a text is assigned only after its length has been checked.
+    character(*), intent(inout), optional :: text
+      !! component of the group for an expression, '' where there is a number; absent: only numbers
     integer, allocatable :: slots(:)
-    character(:), allocatable :: shown, message, note
+    character(:), allocatable :: shown, kind, message, note
 
     shown = ''
     if (is_set(value)) shown = exact_text(value)
+    kind = 'real'
+    if (present(text)) then
+      if (text /= '') shown = quoted_text(trim(text))
+      kind = real_or_expression
+    end if
     if (present(hidden)) then
       if (hidden) shown = ''
     end if
-    call keys%note_key(name, 'real', unit, meaning, shown, &
+    call keys%note_key(name, kind, unit, meaning, shown, &
       & real_range(above, below, at_least, at_most), required, default)
     if (keys%mode /= mode_read) return
     call keys%find(name, [integer ::], slots)
     call keys%note_missing(name, size(slots) == 0, required)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
+    if (present(text)) then
+      if (keys%source%tokens(slots(1))%quoted) then
+        call to_string(keys%source%tokens(slots(1)), name, text, message, note)
+        call keys%complain(slots(1), message, note)
+        value = unset
+        return
+      end if
+      text = ''
+    end if
     call to_real(keys%source%tokens(slots(1)), name, unit, value, message, note, above, below, &
       & at_least, at_most)
     call keys%complain(slots(1), message, note)
@@ -366,7 +387,7 @@ contains
   end subroutine matrix_key
 
   !> Three keys `<name>_x`, `<name>_y`, `<name>_z` for the components of one vector.
-  subroutine triple(keys, name, value, unit, meaning, default)
+  subroutine triple(keys, name, value, unit, meaning, default, text)
     class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
                                                    !! what is wrong with it
     character(*), intent(in) :: name               !! what the three names begin with
@@ -375,10 +396,18 @@ contains
     character(*), intent(in) :: meaning  !! what the reference says of them, before `along x`
     character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
                                                    !! by the value
+    ! allow(C072): a text is assigned only after its length has been checked.
+    character(*), intent(inout), optional :: text(3)
+      !! (3) for expressions, as in `real_key`; absent: only numbers
     character(*), parameter :: directions = 'xyz'
     integer :: i
 
     do i = 1, 3
+      if (present(text)) then
+        call keys%key(name//'_'//directions(i:i), value(i), unit, meaning//' along '// &
+          & directions(i:i), default=default, text=text(i))
+        cycle
+      end if
       call keys%key(name//'_'//directions(i:i), value(i), unit, meaning//' along '// &
         & directions(i:i), default=default)
     end do

@@ -1,7 +1,7 @@
 !> The group `&boundary`: imposed motion.
 module pd_scene_groups_boundary
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_given, only: name_length, text_length, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_course, only: sides, visit_course
   use pd_scene_groups_group, only: group_type
@@ -17,6 +17,8 @@ module pd_scene_groups_boundary
     character(name_length) :: region = ''        !! existing points instead
     real(wp) :: displacement(3) = unset          !! imposed, unset = free [m]
     real(wp) :: velocity(3) = unset              !! imposed, unset = free [m/s]
+    character(text_length) :: displacement_text(3) = ''  !! instead: expressions of x, y, z, t
+    character(text_length) :: velocity_text(3) = ''
     logical :: absorbing = .false.               !! the layer takes in waves
     real(wp) :: ramp_time = unset                !! [s]
     real(wp), allocatable :: times(:)            !! [s]
@@ -38,8 +40,10 @@ contains
     call keys%key('side', group%side, 'adds a layer as wide as the horizon outside this side', &
       & allowed=sides)
     call keys%key('region', group%region, 'name of a region, instead of side')
-    call keys%triple('displacement', group%displacement, 'm', 'imposed displacement', 'free')
-    call keys%triple('velocity', group%velocity, 'm/s', 'imposed velocity', 'free')
+    call keys%triple('displacement', group%displacement, 'm', 'imposed displacement', 'free', &
+      & group%displacement_text)
+    call keys%triple('velocity', group%velocity, 'm/s', 'imposed velocity', 'free', &
+      & group%velocity_text)
     call keys%key('absorbing', group%absorbing, 'side: the layer is free and takes in waves that '// &
       & 'meet the side')
     call visit_course(keys, group%ramp_time, group%times, group%values)

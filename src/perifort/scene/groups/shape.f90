@@ -1,7 +1,7 @@
 !> Shapes: the group `&remove`, and the keys that `&region` and `&no_fail` add.
 module pd_scene_groups_shape
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: name_length, unset
+  use pd_scene_format_given, only: name_length, text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_write
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
@@ -27,6 +27,7 @@ module pd_scene_groups_shape
   !> `&region`
   type, extends(shape_group) :: region_group
     character(name_length) :: name = ''
+    character(text_length) :: where = ''         !! an expression of x, y, z: inside if not 0
   contains
     procedure :: visit => visit_region
   end type region_group
@@ -54,7 +55,9 @@ contains
     type(keys_type), intent(inout) :: keys       !! the visitor: reads, describes, writes
 
     call keys%key('name', group%name, 'name used elsewhere', required=.true., word=.true.)
-    call visit_shape(group, keys, required=.true.)
+    call keys%key('where', group%where, 'expression of x, y, z that is not 0 inside; with a '// &
+      & 'shape both must hold')
+    call visit_shape(group, keys, required=.false.)
   end subroutine visit_region
 
   !> The keys of `&no_fail`.

@@ -6,6 +6,7 @@ module pd_study_bench_bench
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text, with_unit
   use pd_output_results_files, only: rename_file
+  use pd_study_bench_expressions, only: expression_row
   use pd_study_bench_kernels, only: bytes_needed, kernel_type, measure_kernel, timing_type
   use pd_base_system, only: available_memory
   use pd_study_bench_machine, only: machine_type, measure_machine
@@ -86,6 +87,7 @@ contains
     if (.not. allocated(error) .and. done == 0) &
       & call fail(error, 'no body fits into the free memory of '// &
       & with_unit(real(available_memory(), wp), 'B', 3)//'; ask for fewer --points')
+    if (.not. allocated(error)) write (out, '(a)') '', expression_row()
     if (busy < 0.9_wp) write (out, '(a)') '', 'Warning: other programs used the '// &
       & 'machine: a thread had only '//to_text(100*busy, 2)//' % of a core at times. '// &
       & 'The column cpu is not affected.'

@@ -10,6 +10,7 @@ module pd_study_trade_analytic
   use pd_law_laws, only: law_table_type
   use pd_family_volume, only: reach, volume_correction, volume_rule_number, volume_rule_type
   use pd_motion_system, only: system_type
+  use pd_scene_content_expressions, only: has_expressions
   use pd_scene_content_groups, only: closed_forms
   use pd_scene_content_types, only: boundary_group, initial_group, is_set, laws_of, scene_type
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, form_chain, form_hole, &
@@ -110,6 +111,8 @@ contains
       reason = 'it is for an elastic bond law'
     else if (size(scene%cracks) > 0) then
       reason = 'the scene has a crack'
+    else if (has_expressions(scene)) then
+      reason = 'an initial value, a boundary or a load is an expression'
     else if (any(is_set(scene%initial%temperature_change))) then
       reason = 'the scene has a temperature change'
     else if (any(is_set(scene%header%gravity))) then

@@ -1,0 +1,96 @@
+!> Regions and expressions of a scene on the points of its bodies.
+module pd_body_regions
+  use pd_base_error, only: error_type
+  use pd_base_expression, only: expression_type
+  use pd_base_field, only: field_type, field_values, new_field
+  use pd_base_kinds, only: wp, i4
+  use pd_body_body, only: body_type, not_finite_text
+  use pd_body_generate, only: touch
+  use pd_body_shapes, only: inside
+  use pd_scene_content_expressions, only: expression_of
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type
+  implicit none (type, external)
+  private
+  public :: check_regions, in_region, field_on, values_on
+
+contains
+
+  !> An error is set if the expression of a region has no finite value at a point of the bodies.
+  subroutine check_regions(scene, body, error)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    type(body_type), intent(in) :: body    !! its points, layers included
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(i4), allocatable :: slots(:)
+    integer :: r, k
+
+    slots = pack([(int(k, i4), k=1, body%n_slots)], body%point > 0)
+    do r = 1, size(scene%regions)
+      if (scene%regions(r)%where == '') cycle
+      call values_on(scene, scene%regions(r)%where, body, slots, 'region', r, 'where', values, &
+        & error)
+      if (allocated(error)) return
+    end do
+  end subroutine check_regions
+
+  !> The slots with points in a region: inside its shape, and where its expression is not 0.
+  function in_region(scene, body, number) result(mask)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    type(body_type), intent(in) :: body    !! its points, arranged in slots
+    integer, intent(in) :: number          !! of the `&region`
+    logical, allocatable :: mask(:)
+    type(field_type) :: field
+    real(wp), allocatable :: values(:)
+    integer(i4), allocatable :: slots(:)
+    integer :: k, at
+
+    associate (region => scene%regions(number))
+      mask = body%point > 0
+      if (region%shape /= '' .or. region%where == '') mask = mask .and. inside(region, body%x, &
+        & touch*minval(body%spacing, mask=body%point > 0))
+      if (region%where == '') return
+      slots = pack([(int(k, i4), k=1, body%n_slots)], mask)
+      call field_on(scene, region%where, body, slots, field)
+      allocate (values(size(slots)))
+      call field_values(field, 0.0_wp, values, at)
+      ! check_regions refuses what is not finite
+      mask(slots) = abs(values) > 0.0_wp
+    end associate
+  end function in_region
+
+  !> An expression of a checked scene at some points.
+  subroutine field_on(scene, text, body, slots, field)
+    type(scene_type), intent(in) :: scene    !! a checked scene
+    character(*), intent(in) :: text         !! the expression
+    type(body_type), intent(in) :: body      !! the points
+    integer(i4), intent(in) :: slots(:)      !! (points) of them
+    type(field_type), intent(out) :: field   !! ready for `field_values`
+    type(expression_type) :: expression
+
+    call expression_of(scene, text, expression)
+    call new_field(expression, body%x(slots, :), field)
+  end subroutine field_on
+
+  !> The values of an expression at t = 0. An error is set at its key if one is not finite.
+  subroutine values_on(scene, text, body, slots, group, number, key, values, error)
+    type(scene_type), intent(in) :: scene      !! a checked scene
+    character(*), intent(in) :: text           !! the expression
+    type(body_type), intent(in) :: body        !! the points
+    integer(i4), intent(in) :: slots(:)        !! (points) of them
+    character(*), intent(in) :: group          !! name of the group that has it, without `&`
+    integer, intent(in) :: number              !! which group of this name
+    character(*), intent(in) :: key            !! that has it
+    real(wp), allocatable, intent(out) :: values(:)  !! (points)
+    type(error_type), allocatable, intent(out) :: error
+    type(field_type) :: field
+    integer :: at
+
+    call field_on(scene, text, body, slots, field)
+    allocate (values(size(slots)))
+    call field_values(field, 0.0_wp, values, at)
+    if (at > 0) call scene_fault(error, scene, group, number, key, "'"//key//"' "// &
+      & not_finite_text(body, slots(at), 0.0_wp), trim(text))
+  end subroutine values_on
+
+end module pd_body_regions
