@@ -197,7 +197,7 @@ contains
     if (.not. self%use_xdmf) return
     self%use_xdmf = self%vtkhdf%has_views()
     if (self%use_xdmf) return
-    if (self%started) then
+    if (self%started .or. self%resumed) then
       call self%xdmf%give_up()
     else
       call self%xdmf%abandon()  ! an earlier run's list stays until the first output is complete

@@ -14,7 +14,7 @@ module pd_output_results_views
 
   character(*), parameter :: folder = '/outputs'
 
-  !> A view costs about 500 bytes and half a millisecond before the first output.
+  !> A view costs about 500 bytes and a tenth of a millisecond before the first output.
   integer(i8), parameter :: most_views = 50000_i8
 
   !> What a file shows of a field.
