@@ -301,10 +301,11 @@ contains
   pure integer(i8) function fixed_bytes(self)
     class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
 
-    ! a view has a record and a place in the index of its group
-    fixed_bytes = merge(500_i8, 0_i8, views_fit(self%fields, self%capacity))*self%capacity &
-      & *size(views_of(self%fields)) + self%points*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
+    fixed_bytes = self%points*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
       & + self%row_capacity*8*size(self%columns)
+    ! a view has a record and a place in the index of its group
+    if (views_fit(self%fields, self%capacity)) &
+      & fixed_bytes = fixed_bytes + 500*self%capacity*size(views_of(self%fields))
   end function fixed_bytes
 
   !> Write `values(n, components)` as rows of components from row `at` on, turned block by block.

@@ -1,9 +1,10 @@
 !> Views of single outputs: what the results file holds of one output, as datasets of their own.
 !>
 !> `/VTKHDF/PointData/FIELD` holds the outputs one behind the other. Programs that take a whole
-!> dataset for the values of one time see `/outputs/FIELD/000012`, a virtual dataset of HDF5 that has
-!> no values of its own. Tensors have one for each component, `/outputs/stress/xy/000012`, with one
-!> value a point: readers name components of vectors alone, and do not agree on the order of tensors.
+!> dataset for the values of one time see `/outputs/FIELD/000012`, a virtual dataset of HDF5 that
+!> has no values of its own. Tensors have one for each component, `/outputs/stress/xy/000012`, with
+!> one value a point: readers of XDMF take other numbers of components than 1, 3, 6 and 9 in
+!> different ways, do not agree on the order of 6, and have no names for them.
 module pd_output_results_views
   use pd_base_kinds, only: i8
   use pd_base_text, only: to_text

@@ -278,9 +278,11 @@ contains
   !> Leave the list as it is, to be continued another time.
   subroutine leave(self)
     class(xdmf_file), intent(inout) :: self  !! open or not; not open on return
-    integer :: ignored
+    integer :: status
 
-    if (self%is_open) close (self%unit, iostat=ignored)
+    if (.not. self%is_open) return
+    close (self%unit, iostat=status)
+    if (status /= 0) self%unit = 0  ! all was flushed before
     self%is_open = .false.
   end subroutine leave
 
