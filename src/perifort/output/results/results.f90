@@ -20,7 +20,7 @@ module pd_output_results_results
   use pd_base_text, only: join, lower_case, to_text, with_unit
   use pd_output_checkpoint_checkpoint, only: remove_checkpoints
   use pd_output_results_answer, only: answer_type, values_type
-  use pd_output_results_description, only: check_description
+  use pd_output_results_description, only: check_description, has_list
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
   use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_empty, &
@@ -145,8 +145,8 @@ contains
     single = lower_case(precision) == 'single'
     self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
-    ! XDMF separates the name of the file from a path in it by a colon
-    self%use_xdmf = self%use_vtkhdf .and. index(stem, ':') == 0
+    ! room for one output at least; whether there are too many shows with the file
+    self%use_xdmf = self%use_vtkhdf .and. has_list(stem, format, fields, 1)
     call self%history%start(size(columns))
     allocate (self%times(0))
     if (present(kept)) call self%history%restore(kept%rows, written=self%resumed)
