@@ -4,6 +4,7 @@ module test_output_results_xdmf
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: newline, to_text
   use pd_output_results_datasets, only: get_shape, read_rows
+  use pd_output_results_description, only: names_of_files
   use pd_output_results_files, only: file_bytes, file_exists
   use pd_output_results_hdf5, only: close_file, hdf5_file, object_exists, open_file
   use pd_output_results_results, only: column_type, field_type, results_type
@@ -35,7 +36,8 @@ contains
       & new_unittest('a run without outputs', no_output), &
       & new_unittest('names that XML does not take as they are', strange_names), &
       & new_unittest('an older list goes with its results', older_list), &
-      & new_unittest('too many outputs for views', too_many)]
+      & new_unittest('too many outputs for views', too_many), &
+      & new_unittest('names of the files', names)]
   end subroutine collect_output_results_xdmf
 
   !> Value of component `c` at point `i` in output `k`.
@@ -595,5 +597,23 @@ contains
     call accept(error, failure)
     call check_list(error, 'grown', 4, .true.)
   end subroutine too_many
+
+  !> What is announced is what is written.
+  subroutine names(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(field_type) :: fields(1)
+
+    fields = [field_type('damage', 1, '1')]
+    call check(error, names_of_files('a', 'vtkhdf', fields, 10), &
+      & 'a.vtkhdf, a.xdmf (opens in ParaView and pyvista), history.csv')
+    if (allocated(error)) return
+    call check(error, names_of_files('a', 'VTU', fields, 10), 'a.pvd with .vtu files, history.csv')
+    if (allocated(error)) return
+    call check(error, names_of_files('a:b', 'both', fields, 10), &
+      & 'a:b.vtkhdf, a:b.pvd with .vtu files, history.csv')
+    if (allocated(error)) return
+    call check(error, names_of_files('a', 'vtkhdf', fields, 1000000), &
+      & 'a.vtkhdf, no a.xdmf for so many outputs, history.csv')
+  end subroutine names
 
 end module test_output_results_xdmf
