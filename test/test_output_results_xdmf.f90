@@ -210,7 +210,7 @@ contains
     logical, intent(in), optional :: single
     type(failure_type), allocatable :: failure
     type(hdf5_file) :: file
-    character(:), allocatable :: text, plain, fault, path, precision
+    character(:), allocatable :: text, plain, fault, precision
     real(wp) :: time
     integer :: k, c, at, length
     character(2), parameter :: labels(4) = ['xx', 'yy', 'zz', 'xy']
