@@ -18,6 +18,8 @@ from pathlib import Path
 
 import h5py
 
+from check_vtk import check_list
+
 failures = []
 
 
@@ -51,6 +53,7 @@ def outputs(path):
             assert len(data[:number * points]) == number * points, f"{path} is too short"
         rows = int(file["history"].attrs["rows"])
         assert all(len(column[:rows]) == rows for column in file["history"].values())
+    check_list(path.with_suffix(".xdmf"), path, partial=True)
     return number
 
 
@@ -65,7 +68,7 @@ def full_disk(program, scene, top):
     """A tmpfs with room for some outputs: those are there, and older results survive."""
     disk = top / "disk"
     disk.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)]
+    command = ["mount", "-t", "tmpfs", "-o", "size=1500k", "tmpfs", str(disk)]
     if os.geteuid() != 0 or subprocess.run(command, check=False, capture_output=True).returncode:
         print("skip  full disk: only root can mount a small one")
         return

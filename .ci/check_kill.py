@@ -19,7 +19,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from check_vtk import check_hdf, check_series
+from check_vtk import check_hdf, check_list, check_series
 
 
 def read(path):
@@ -63,7 +63,7 @@ def main():
     parser.add_argument("command", nargs=argparse.REMAINDER)
     options = parser.parse_args()
     path, folder = options.file, options.file.parent
-    series = path.with_suffix(".pvd")
+    series, listing = path.with_suffix(".pvd"), path.with_suffix(".xdmf")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
     shutil.rmtree(folder, ignore_errors=True)
@@ -75,7 +75,7 @@ def main():
     assert all_steps > 1, "the command writes too little to be interrupted"
 
     moments = random.Random(options.seed)
-    cut_short, none_yet = set(), 0
+    cut_short, none_yet, unlisted = set(), 0, 0
     for number in range(1, options.times + 1):
         fresh = number % 2 == 1
         if fresh:
@@ -96,12 +96,19 @@ def main():
         check_table(folder / "history.csv", table, what)
         if steps > 0:
             check_hdf(path, partial=True)
+        if listing.exists():
+            check_list(listing, path, partial=True)
+        else:
+            # the list comes after the first output; an older one goes before the older outputs
+            assert steps <= 1 or older, f"{what}: no {listing.name} with {steps} outputs"
+            unlisted += 1
         if series.exists():
             check_series(series, partial=True)
         if steps < all_steps:
             cut_short.add(steps)
         print(f"{what}: {steps} of {all_steps} outputs, {rows} of {all_rows} rows, all intact")
-    print(f"{options.times} kills, {none_yet} before the first output, "
+    print(f"{options.times} kills, {none_yet} before the first output, {unlisted} before the list of "
+          f"outputs, "
           f"{len(cut_short)} different stages of a file")
     if not cut_short:
         sys.exit("no kill met a file under way: the test shows nothing; write more or kill more "

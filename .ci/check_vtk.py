@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Open results as other programs do and step through their times.
 
-    check_vtk.py NAME.vtkhdf [NAME.pvd] [--partial]
+    check_vtk.py NAME.vtkhdf [NAME.pvd] [--partial] [--pyvista]
 
-The HDF5 file is read with h5py and with VTK's own reader, the .pvd series with VTK's XML reader;
-where both are given their values must agree. --partial: the file's writer did not live to close it.
+The HDF5 file is read with h5py and with VTK's own reader, NAME.xdmf beside it with VTK's reader of
+XDMF, the .pvd series with VTK's XML reader; their values must agree with h5py's. --partial: the
+file's writer did not live to close it. --pyvista: NAME.xdmf also by the lines of the user guide.
 """
+import re
 import sys
 import xml.etree.ElementTree as tree
 from pathlib import Path
@@ -15,6 +17,7 @@ import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as pipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
+from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 
@@ -82,6 +85,93 @@ def check_hdf(path, partial):
     return times, points, fields
 
 
+def shown_arrays(path):
+    """What the .xdmf file beside an HDF5 file shows of it: {name: values of every output}."""
+    shown = {}
+    with h5py.File(path, "r") as file:
+        root = file["VTKHDF"]
+        count = int(root["Steps"].attrs["NSteps"]) * len(root["Points"])
+        for name, data in root["PointData"].items():
+            values = data[:count]
+            labels = data.attrs.get("components", b"")
+            labels = (labels.decode() if isinstance(labels, bytes) else labels).strip()
+            if values.ndim == 1 or values.shape[1] == 3 and labels in ("", "x y z"):
+                shown[name] = values
+            else:
+                shown.update({f"{name}_{label}": values[:, at]
+                              for at, label in enumerate(labels.split())})
+    return shown
+
+
+def check_references(path, hdf_path):
+    """The .xdmf file is well formed, and what it refers to is there; returns its times."""
+    grids = tree.parse(path).getroot().findall("Domain/Grid/Grid")
+    with h5py.File(hdf_path, "r") as file:
+        for grid in grids:
+            items = list(grid.iter("DataItem"))
+            assert len(items) > 2, f"{path}: an output without fields"
+            for item in items:
+                name, inside = item.text.strip().split(":")
+                assert name == hdf_path.name, f"{path} refers to {name}"
+                data = file[inside]
+                shape = tuple(int(number) for number in item.get("Dimensions").split())
+                assert data.shape == shape, f"{path}: {inside} has the shape {data.shape}"
+                assert data.dtype.itemsize == int(item.get("Precision")), f"{path}: {inside}"
+    return [float(grid.find("Time").get("Value")) for grid in grids]
+
+
+def check_list(path, hdf_path, partial=False):
+    """Check the .xdmf file: all outputs of the HDF5 file, or at most one less if it is partial, with
+    the times and values that h5py finds. Returns the number of outputs."""
+    with h5py.File(hdf_path, "r") as file:
+        steps = int(file["VTKHDF/Steps"].attrs["NSteps"])
+        times = file["VTKHDF/Steps/Values"][:steps]
+        points = file["VTKHDF/Points"][:]
+    listed = check_references(path, hdf_path)
+    assert len(listed) == steps or partial and len(listed) == steps - 1, \
+        f"{path} lists {len(listed)} of {steps} outputs"
+    assert np.array_equal(listed, times[:len(listed)]), f"{path} has other times"
+    if not partial:
+        assert not re.search(r"<\?later", path.read_text()), f"{path} is not a finished list"
+    shown = shown_arrays(hdf_path)
+
+    reader = vtkXdmfReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    seen = reader.GetOutputInformation(0).Get(pipeline.TIME_STEPS())
+    assert np.array_equal(seen, listed), f"VTK sees other times in {path}: {seen}"
+    n = len(points)
+    for step, time in enumerate(seen):
+        reader.UpdateTimeStep(time)
+        output = reader.GetOutputDataObject(0)
+        assert output.GetNumberOfPoints() == n and output.GetNumberOfCells() == n, path
+        assert np.array_equal(vtk_to_numpy(output.GetPoints().GetData()), points), path
+        found = arrays_of(output)
+        assert found.keys() == shown.keys(), f"{path} shows {list(found)}, not {list(shown)}"
+        for name, values in shown.items():
+            assert np.array_equal(found[name], values[step * n:(step + 1) * n]), \
+                f"{path}: {name}, step {step}"
+    print(f"{path}: {len(listed)} outputs, {', '.join(shown)}")
+    return len(listed)
+
+
+def check_pyvista(path, hdf_path):
+    """The lines of the user guide give all times and values."""
+    import pyvista
+    reader = pyvista.get_reader(path)
+    with h5py.File(hdf_path, "r") as file:
+        assert np.array_equal(reader.time_values, file["VTKHDF/Steps/Values"][:]), \
+            "pyvista sees other times"
+    shown = shown_arrays(hdf_path)
+    for step, time in enumerate(reader.time_values):
+        reader.set_active_time_value(time)
+        mesh = reader.read()
+        for name, values in shown.items():
+            part = values[step * mesh.n_points:(step + 1) * mesh.n_points]
+            assert np.array_equal(mesh[name], part), f"pyvista: {name}, step {step}"
+    print(f"{path}: {len(reader.time_values)} outputs in pyvista {pyvista.__version__}")
+
+
 def check_series(path, partial, hdf=None):
     """Check a .pvd series, against the HDF5 file of the same run if there is one."""
     files = [(float(entry.get("timestep")), path.parent / entry.get("file"))
@@ -116,8 +206,14 @@ def main(arguments):
     for path in sorted(paths, key=lambda path: path.suffix == ".pvd"):
         if path.suffix == ".pvd":
             check_series(path, partial, hdf)
-        else:
-            hdf = check_hdf(path, partial)
+            continue
+        hdf = check_hdf(path, partial)
+        beside = path.with_suffix(".xdmf")
+        assert partial or beside.exists(), f"there is no {beside}"
+        if beside.exists():
+            check_list(beside, path, partial)
+        if "--pyvista" in arguments:
+            check_pyvista(beside, path)
 
 
 if __name__ == "__main__":

@@ -75,6 +75,7 @@ program main
   use test_output_report_overview, only: collect_output_report_overview
   use test_output_checkpoint_restart, only: collect_output_checkpoint_restart
   use test_output_results_results, only: collect_output_results_results
+  use test_output_results_xdmf, only: collect_output_results_xdmf
   use test_ranks, only: collect_ranks
   use test_scene_content_change, only: collect_scene_content_change
   use test_scene_content_check, only: collect_scene_content_check
@@ -177,6 +178,7 @@ program main
   call register('output_report_overview', collect_output_report_overview)
   call register('output_checkpoint_restart', collect_output_checkpoint_restart)
   call register('output_results_results', collect_output_results_results)
+  call register('output_results_xdmf', collect_output_results_xdmf)
   call register('ranks', collect_ranks)
   call register('scene_content_change', collect_scene_content_change)
   call register('scene_content_check', collect_scene_content_check)

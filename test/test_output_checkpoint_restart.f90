@@ -183,6 +183,7 @@ contains
     call expect_same_file(error, here//'/'//first//'/history.csv', here//'/'//second// &
       & '/history.csv')
     call expect_same_file(error, here//'/'//first//'/plate.pvd', here//'/'//second//'/plate.pvd')
+    call expect_same_file(error, here//'/'//first//'/plate.xdmf', here//'/'//second//'/plate.xdmf')
     do i = 0, outputs - 1
       write (number, '(i4.4)') i
       call expect_same_file(error, here//'/'//first//'/plate_00'//number//'.vtu', &

@@ -114,7 +114,8 @@ class Subject:
         if outputs != self.outputs or len(found["history/step"]) != len(
                 self.reference["history/step"]):
             fault = fault or "number of outputs or rows"
-        tables = (path for kind in ("*.csv", "*.vtu", "*.pvd") for path in self.whole.glob(kind))
+        tables = (path for kind in ("*.csv", "*.vtu", "*.pvd", "*.xdmf")
+                  for path in self.whole.glob(kind))
         for path in tables:
             if (folder / path.name).read_bytes() != path.read_bytes():
                 fault = fault or path.name

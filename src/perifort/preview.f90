@@ -4,12 +4,12 @@ module pd_preview
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_error, only: error_type
   use pd_base_kinds, only: i8
-  use pd_base_text, only: newline
+  use pd_base_text, only: labelled_line, newline
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_bytes, new_about
   use pd_output_fields_check, only: check_names
   use pd_output_fields_table, only: field_table_type
   use pd_output_report_before, only: foresee_output
-  use pd_output_report_begin, only: fields_of, run_options_type
+  use pd_output_report_begin, only: fields_of, run_options_type, stem_of
   use pd_output_report_columns, only: history_columns
   use pd_output_report_estimate, only: estimate
   use pd_output_report_overview, only: overview
@@ -17,6 +17,8 @@ module pd_preview
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of, schedule_type
   use pd_output_report_say, only: say
   use pd_output_report_summary, only: checkpoint_line, summary_before
+  use pd_output_results_description, only: names_of_files
+  use pd_output_results_types, only: field_type
   use pd_scene_content_complete, only: complete_scene
   use pd_scene_content_types, only: scene_type
   use pd_scene_content_write, only: scene_text
@@ -88,6 +90,7 @@ contains
       call estimate(scene, fields_of(options), system, plan, &
         & schedule_of(scene, plan, system%family%n_bonds), set_up%timer%total(), times)
       call tell_lines(times)
+      call tell_lines(labelled_line('files', trim(files(scene, fields_of(options), set_up))))
       call tell(checkpoint_line(scene, bytes_of_checkpoint(scene, set_up, measures)))
     end associate
 
@@ -106,6 +109,27 @@ contains
       if (len(lines) > 0) call tell(lines(:len(lines) - 1))
     end subroutine tell_lines
   end subroutine examine
+
+  !> Names of the files that the run will write.
+  function files(scene, table, set_up) result(text)
+    type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table
+    type(set_up_type), intent(in) :: set_up
+    character(:), allocatable :: text
+    type(field_type), allocatable :: fields(:)
+    integer :: f
+
+    associate (system => set_up%system, plan => set_up%plan)
+      allocate (fields(size(scene%output%fields)))
+      do f = 1, size(fields)
+        associate (field => table%field(trim(scene%output%fields(f))))
+          fields(f) = field%in_file(system%body%dim)
+        end associate
+      end do
+      text = names_of_files(stem_of(scene), trim(scene%output%format), fields, &
+        & planned_outputs(schedule_of(scene, plan, system%family%n_bonds), plan%step))
+    end associate
+  end function files
 
   !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
   !> largest.

@@ -12,7 +12,8 @@ module pd_output_results_datasets
     & H5T_STD_I64LE, H5T_STD_I8LE, h5dclose_f, h5dcreate_f, &
     & h5dget_create_plist_f, h5dget_space_f, h5dopen_f, &
     & h5dread_f, h5dset_extent_f, h5dwrite_f, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
-    & h5pget_chunk_f, h5pset_chunk_f, h5pset_fill_time_f, h5sclose_f, h5screate_simple_f, &
+    & h5pget_chunk_f, h5pset_chunk_f, h5pset_fill_time_f, h5pset_virtual_f, h5sclose_f, &
+    & h5screate_simple_f, &
     & h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, hid_t, &
     & hsize_t
   use pd_base_error, only: error_type, fail, internal_fault
@@ -21,7 +22,7 @@ module pd_output_results_datasets
   implicit none (type, external)
   private
   public :: put_array, make_dataset, make_series, write_rows, read_rows, set_rows, get_shape
-  public :: get_chunk, storage_f8, storage_f4, storage_i8
+  public :: get_chunk, make_view, storage_f8, storage_f4, storage_i8
 
   integer, parameter :: storage_f8 = 1  !! 64-bit real
   integer, parameter :: storage_f4 = 2  !! 32-bit real
@@ -149,6 +150,59 @@ contains
     end if
     call h5pclose_f(properties, ignored)
   end subroutine make_any
+
+  !> Make a dataset that has no values of its own but shows rows of another one in the same file
+  !> (HDF5's virtual datasets): all components of them, or one.
+  subroutine make_view(file, path, storage, source, components, total, first, rows, component, &
+    & error)
+    type(hdf5_file), intent(in) :: file  !! open and writable
+    character(*), intent(in) :: path     !! of the new dataset
+    integer, intent(in) :: storage       !! kind of the numbers of the other one
+    character(*), intent(in) :: source   !! path of the other one
+    integer, intent(in) :: components    !! numbers in a row of the other one
+    integer(i8), intent(in) :: total     !! rows of the other one, at least `first + rows`
+    integer(i8), intent(in) :: first     !! row that is shown first, from 0
+    integer(i8), intent(in) :: rows      !! how many are shown
+    integer, intent(in) :: component     !! the one that is shown, from 1; 0: all
+    type(error_type), allocatable, intent(out) :: error
+    integer(hid_t) :: here, there, properties, dataset
+    integer(hsize_t) :: extent(2), most(2), start(2), count(2)
+    integer :: rank, shown, status, ignored
+
+    rank = merge(2, 1, components > 1)
+    shown = merge(2, 1, components > 1 .and. component == 0)
+    extent = [int(components, hsize_t), int(total, hsize_t)]
+    start = [int(max(0, component - 1), hsize_t), int(first, hsize_t)]
+    count = [int(merge(1, components, component > 0), hsize_t), int(rows, hsize_t)]
+    most = [int(components, hsize_t), int(H5S_UNLIMITED_F, hsize_t)]
+    if (rank == 1) then
+      extent(1) = extent(2)
+      start(1) = start(2)
+      count(1) = count(2)
+      most(1) = most(2)
+    end if
+    call h5pcreate_f(H5P_DATASET_CREATE_F, properties, status)
+    if (status == 0) status = int(h5_track_times(properties, .false._c_bool))
+    if (status == 0) call h5screate_simple_f(rank, extent(:rank), there, status, most(:rank))
+    if (status == 0) then
+      call h5sselect_hyperslab_f(there, H5S_SELECT_SET_F, start(:rank), count(:rank), status)
+      if (shown == 1) count(1) = count(rank)
+      if (status == 0) call h5screate_simple_f(shown, count(:shown), here, status)
+      if (status == 0) then
+        ! '.' is the file itself, whatever name it has or gets
+        call h5pset_virtual_f(properties, here, '.', source, there, status)
+        if (status == 0) call h5dcreate_f(file%id, path, storage_id(storage), here, dataset, &
+          & status, dcpl_id=properties)
+        if (status == 0) call h5dclose_f(dataset, status)
+        if (status /= 0) call explain(error, 'make '//path//' in', file%name)
+        call h5sclose_f(here, ignored)
+      end if
+      call h5sclose_f(there, ignored)
+    end if
+    call h5pclose_f(properties, ignored)
+    if (status /= 0 .and. .not. allocated(error)) &
+      & call fail(error, 'cannot describe '//path//' of '//file%name)
+  end subroutine make_view
 
   !> Change the number of rows of a series.
   subroutine set_rows(file, path, components, rows, error)

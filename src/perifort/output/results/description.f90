@@ -1,12 +1,13 @@
 !> Whether what the results are to hold can be written: names, shapes and words.
 module pd_output_results_description
   use pd_base_error, only: error_type, fail
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i8
   use pd_base_text, only: lower_case
   use pd_output_results_types, only: column_type, field_type, label_length
+  use pd_output_results_views, only: views_fit
   implicit none (type, external)
   private
-  public :: check_description
+  public :: check_description, has_list, names_of_files
 
 contains
 
@@ -58,5 +59,35 @@ contains
       call fail(error, 'two fields or columns of the results are named '//trim(name))
     end if
   end subroutine check_name
+
+  !> Whether results in these files have a list of outputs, `STEM.xdmf`, beside the HDF5 file. Its
+  !> readers take what is before a colon for the name of the HDF5 file.
+  pure logical function has_list(stem, format, fields, outputs)
+    character(*), intent(in) :: stem           !! name of the files without their endings
+    character(*), intent(in) :: format         !! 'vtkhdf', 'vtu' or 'both', in any case
+    type(field_type), intent(in) :: fields(:)  !! (any number) of every output
+    integer, intent(in) :: outputs             !! planned
+    has_list = lower_case(format) /= 'vtu' .and. index(stem, ':') == 0 .and. &
+      & views_fit(fields, int(outputs, i8))
+  end function has_list
+
+  !> The files that a run will write, for its user.
+  pure function names_of_files(stem, format, fields, outputs) result(text)
+    character(*), intent(in) :: stem           !! name of the files without their endings
+    character(*), intent(in) :: format         !! 'vtkhdf', 'vtu' or 'both', in any case
+    type(field_type), intent(in) :: fields(:)  !! (any number) of every output
+    integer, intent(in) :: outputs             !! planned
+    character(:), allocatable :: text
+
+    text = ''
+    if (lower_case(format) /= 'vtu') text = stem//'.vtkhdf, '
+    if (has_list(stem, format, fields, outputs)) then
+      text = text//stem//'.xdmf (opens in ParaView and pyvista), '
+    else if (lower_case(format) /= 'vtu' .and. index(stem, ':') == 0) then
+      text = text//'no '//stem//'.xdmf for so many outputs, '
+    end if
+    if (lower_case(format) /= 'vtkhdf') text = text//stem//'.pvd with .vtu files, '
+    text = text//'history.csv'
+  end function names_of_files
 
 end module pd_output_results_description

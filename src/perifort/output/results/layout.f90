@@ -8,11 +8,12 @@ module pd_output_results_layout
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, sp, i8
-  use pd_output_results_datasets, only: get_shape, make_dataset, make_series, put_array, &
-    & read_rows, set_rows, storage_f4, storage_f8, storage_i8, write_rows
+  use pd_output_results_datasets, only: get_shape, make_dataset, make_series, make_view, &
+    & put_array, read_rows, set_rows, storage_f4, storage_f8, storage_i8, write_rows
   use pd_output_results_hdf5, only: change_attribute, copy_object, hdf5_file, make_group, &
-    & put_attribute, put_text
+    & object_exists, put_attribute, put_text, remove_object
   use pd_output_results_types, only: column_type, field_type
+  use pd_output_results_views, only: view_of_output, view_type, views_fit, views_of
   implicit none (type, external)
   private
   public :: layout_type, put_scene, put_geometry, write_vectors, copy_static, copy_scene, to_single
@@ -33,6 +34,7 @@ module pd_output_results_layout
   contains
     procedure :: make_heart
     procedure :: make_time_series
+    procedure, private :: make_views
     procedure :: copy_time_series
     procedure :: trim_time_series
     procedure :: field_bytes
@@ -220,7 +222,38 @@ contains
       if (self%columns(i)%origin /= '') call put_attribute(file, path, 'origin', &
         & trim(self%columns(i)%origin), error)
     end do
+    if (.not. allocated(error)) call self%make_views(file, error)
   end subroutine make_time_series
+
+  !> `/outputs`: the outputs one by one, where they are not too many.
+  subroutine make_views(self, file, error)
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    type(hdf5_file), intent(in) :: file     !! writable, with all fields
+    type(error_type), allocatable, intent(out) :: error
+    type(view_type), allocatable :: views(:)
+    character(:), allocatable :: source
+    integer(i8) :: k
+    integer :: i
+
+    if (.not. views_fit(self%fields, self%capacity)) return
+    views = views_of(self%fields)
+    call make_group(file, '/outputs', error)
+    do i = 1, size(views)
+      if (allocated(error)) return
+      associate (view => views(i), field => self%fields(views(i)%field))
+        source = '/outputs/'//trim(field%name)
+        if (view%component == 1) call make_group(file, source, error)
+        if (.not. allocated(error)) call make_group(file, trim(view%group), error)
+        source = '/VTKHDF/PointData/'//trim(field%name)
+        do k = 0, self%capacity - 1
+          if (allocated(error)) return
+          call make_view(file, view_of_output(view, k), merge(storage_f4, storage_f8, &
+            & self%single), source, field%components, self%capacity*self%points, &
+            & k*self%points, self%points, view%component, error)
+        end do
+      end associate
+    end do
+  end subroutine make_views
 
   !> Rows per chunk, for outputs of `points` rows of `row_bytes` bytes: several outputs if they
   !> are small; if they are large a part of one that divides it evenly, where there is such a part.
@@ -270,6 +303,9 @@ contains
 
     fixed_bytes = self%points*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
       & + self%row_capacity*8*size(self%columns)
+    ! a view has a record and a place in the index of its group
+    if (views_fit(self%fields, self%capacity)) &
+      & fixed_bytes = fixed_bytes + 500*self%capacity*size(views_of(self%fields))
   end function fixed_bytes
 
   !> Write `values(n, components)` as rows of components from row `at` on, turned block by block.
@@ -406,9 +442,19 @@ contains
       & 'PointOffsets', 'NumberOfParts']
     character(*), parameter :: tables(2) = [character(24) :: 'CellOffsets', &
       & 'ConnectivityIdOffsets']
+    type(view_type), allocatable :: views(:)
+    integer(i8) :: k
     integer :: i
 
     if (outputs < self%capacity) then
+      allocate (views(0))
+      if (object_exists(file, '/outputs')) views = views_of(self%fields)
+      do i = 1, size(views)
+        do k = self%capacity - 1, outputs, -1
+          call remove_object(file, view_of_output(views(i), k), error)
+          if (allocated(error)) return
+        end do
+      end do
       do i = 1, size(scalars)
         call set_rows(file, steps//trim(scalars(i)), 1, outputs, error)
         if (allocated(error)) return

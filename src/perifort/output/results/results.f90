@@ -20,7 +20,7 @@ module pd_output_results_results
   use pd_base_text, only: join, lower_case, to_text, with_unit
   use pd_output_checkpoint_checkpoint, only: remove_checkpoints
   use pd_output_results_answer, only: answer_type, values_type
-  use pd_output_results_description, only: check_description
+  use pd_output_results_description, only: check_description, has_list
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
   use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_empty, &
@@ -31,6 +31,7 @@ module pd_output_results_results
   use pd_output_results_types, only: column_type, field_type, kept_type, label_length
   use pd_output_results_vtkhdf, only: vtkhdf_file
   use pd_output_results_vtu, only: remove_series, vtu_series
+  use pd_output_results_xdmf, only: xdmf_file
   implicit none (type, external)
   private
   public :: results_type, column_type, field_type, label_length
@@ -43,6 +44,7 @@ module pd_output_results_results
     type(column_type), allocatable :: columns(:)
     logical, allocatable :: given(:)     !! fields of the output under way
     type(vtkhdf_file) :: vtkhdf
+    type(xdmf_file) :: xdmf              !! lists what is in the HDF5 file
     type(vtu_series) :: vtu
     type(history_type) :: history
     type(csv_type) :: csv
@@ -54,7 +56,7 @@ module pd_output_results_results
     real(wp), allocatable :: times(:)    !! of them [s]
     real(wp) :: time = 0.0_wp            !! of the output under way [s]
     logical :: in_output = .false.
-    logical :: use_vtkhdf = .false., use_vtu = .false.
+    logical :: use_vtkhdf = .false., use_xdmf = .false., use_vtu = .false.
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
     logical :: resumed = .false.         !! they are those of a run that continues
@@ -144,6 +146,8 @@ contains
     single = lower_case(precision) == 'single'
     self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
+    ! room for one output at least; whether there are too many shows with the file
+    self%use_xdmf = self%use_vtkhdf .and. has_list(stem, format, fields, 1)
     call self%history%start(size(columns))
     allocate (self%times(0))
     if (present(kept)) then
@@ -152,10 +156,14 @@ contains
         & call self%history%restore(kept%rows, written=self%resumed)
     end if
     if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
+    if (self%use_xdmf) call self%xdmf%create(in_directory(directory, self%stem//'.xdmf'), &
+      & self%stem//'.vtkhdf', size(positions, 1, kind=i8), fields, planned_outputs, single)
     if (self%resumed) then
       if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
         & size(positions, 1, kind=i8), fields, planned_outputs, columns, planned_rows, single, &
-        & scene_text, command, version, kept, error)
+        & scene_text, kept, error)
+      if (self%use_vtkhdf .and. .not. allocated(error)) &
+        & call cut_back(self, kept%times, scene_text, command, version, error)
       if (.not. allocated(error)) call resume_others(self, kept, error)
       if (allocated(error)) return
     else if (self%use_vtkhdf) then
@@ -169,6 +177,37 @@ contains
     end if
     self%open = .true.
   end subroutine create
+
+  !> Cut the HDF5 file to the outputs at `times`, and the list of its outputs before it, so that the
+  !> list never has more of them than the file.
+  subroutine cut_back(self, times, scene_text, command, version, error)
+    class(results_type), intent(inout) :: self
+    real(wp), intent(in) :: times(:)
+    character(*), intent(in) :: scene_text, command, version
+    type(error_type), allocatable, intent(out) :: error
+    logical :: listed
+
+    listed = self%use_xdmf .and. self%vtkhdf%has_views()
+    if (listed) call self%xdmf%resume(times, error)
+    if (.not. allocated(error)) call self%vtkhdf%cut(scene_text, command, version, error)
+    if (allocated(error)) return
+    call check_views(self)
+    if (self%use_xdmf .and. .not. listed) call self%xdmf%resume(times, error)
+  end subroutine cut_back
+
+  !> A file with too many outputs does not show them one by one: then there is no list of them.
+  subroutine check_views(self)
+    class(results_type), intent(inout) :: self
+
+    if (.not. self%use_xdmf) return
+    self%use_xdmf = self%vtkhdf%has_views()
+    if (self%use_xdmf) return
+    if (self%started .or. self%resumed) then
+      call self%xdmf%give_up()
+    else
+      call self%xdmf%abandon()  ! an earlier run's list stays until the first output is complete
+    end if
+  end subroutine check_views
 
   !> Continue the files beside the HDF5 file.
   subroutine resume_others(self, kept, error)
@@ -231,6 +270,8 @@ contains
     self%given = .false.
     self%time = time
     if (self%use_vtkhdf) call self%vtkhdf%begin_output(error)
+    if (.not. allocated(error)) call check_views(self)
+    if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%begin_output(error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%begin_output(error)
     if (allocated(error)) call explain_output(self, error)
     self%in_output = .not. allocated(error)
@@ -358,6 +399,7 @@ contains
     end if
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%end_output(self%time, error)
     if (.not. allocated(error)) call start_files(self, error)
+    if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%end_output(self%time, error)
     if (.not. allocated(error) .and. self%csv%is_open()) call self%csv%append(table, error)
     if (.not. allocated(error)) call check_there(self, error)
     if (allocated(error)) then
@@ -401,6 +443,7 @@ contains
     call mark_unfinished(self%directory, self%stem, error)
     if (allocated(error)) return
     call remove_checkpoints(self%directory, self%stem)
+    call remove_file(in_directory(self%directory, self%stem//'.xdmf'))
     if (self%use_vtkhdf) then
       call self%vtkhdf%publish(error)
     else
@@ -560,6 +603,7 @@ contains
     if (.not. (self%open .and. self%started)) return
     call write_rows(self, error)
     if (self%use_vtkhdf .and. .not. allocated(error)) call self%vtkhdf%sync(error)
+    if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%sync(error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%sync(error)
     if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
     if (.not. allocated(error)) call self%iterations%sync(error)
@@ -643,6 +687,7 @@ contains
       & call check_there(self, error)
     if (self%failed .or. allocated(error) .or. .not. self%started) then
       if (self%use_vtkhdf) call self%vtkhdf%abandon()
+      if (self%use_xdmf) call self%xdmf%abandon()
       if (self%csv%is_open()) call self%csv%close(ignored)
       ! a folder made for these results goes if nothing has come to be in it
       call remove_empty(self%directory, self%made_folder)
@@ -650,8 +695,10 @@ contains
     end if
     if (self%use_vtkhdf) then
       if (leave) then
+        if (self%use_xdmf) call self%xdmf%leave()
         call self%vtkhdf%leave(error)
       else
+        if (self%use_xdmf) call self%xdmf%finish()
         if (allocated(self%warnings)) call self%vtkhdf%put_warnings(self%warnings)
         call self%vtkhdf%finish(error)
       end if

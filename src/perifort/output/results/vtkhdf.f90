@@ -22,6 +22,7 @@ module pd_output_results_vtkhdf
   use pd_output_results_layout, only: block_rows, copy_scene, copy_static, layout_type, &
     & put_geometry, put_scene, to_single, write_vectors
   use pd_output_results_types, only: column_type, field_type, kept_type
+  use pd_output_results_views, only: views_fit
   implicit none (type, external)
   private
   public :: vtkhdf_file
@@ -38,9 +39,12 @@ module pd_output_results_vtkhdf
     integer(i8) :: outputs = 0            !! complete ones
     integer(i8) :: rows = 0               !! complete ones
     logical :: sealed = .false.           !! laid out for good
+    type(layout_type) :: plan             !! what a file that continues is to hold
   contains
     procedure :: create
     procedure :: resume
+    procedure :: cut
+    procedure :: has_views
     procedure, private :: put_points_real, put_points_i4, put_points_i1
     !> Add an array over the points to `/points`, before the first output.
     generic :: put_points => put_points_real, put_points_i4, put_points_i1
@@ -120,11 +124,11 @@ contains
     if (planned_rows > 0) self%layout%row_capacity = planned_rows
   end subroutine plan_layout
 
-  !> Continue a file that was left at or after the outputs and rows in `kept`: data beyond them are
-  !> removed. The other arguments are those of `create`; a changed `scene_text` is written. An error
+  !> Open a file that was left at or after the outputs and rows in `kept`, to be continued after
+  !> `cut`; it is not changed yet. The other arguments are those of `create`. An error
   !> if the file has fewer of them, other times, or the results of another scene.
   subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
-    & scene_text, command, version, kept, error)
+    & scene_text, kept, error)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
     character(*), intent(in) :: path             !! of the file, with its ending
     integer(i8), intent(in) :: points            !! their number
@@ -134,13 +138,9 @@ contains
     integer, intent(in) :: planned_rows          !! of the whole run; 0: unknown
     logical, intent(in) :: single                !! fields in single precision
     character(*), intent(in) :: scene_text       !! the resolved scene of this run
-    character(*), intent(in) :: command          !! the command line of this run
-    character(*), intent(in) :: version          !! of this program
     type(kept_type), intent(in) :: kept  !! rows, times and scene that the checkpoint counts on
     type(error_type), allocatable, intent(out) :: error
-    type(layout_type) :: plan
     character(:), allocatable :: text
-    logical :: narrow
 
     self%path = path
     self%current = path
@@ -160,18 +160,44 @@ contains
     self%outputs = size(kept%times, kind=i8)
     self%rows = size(kept%rows, 2, kind=i8)
 
-    plan = self%layout
+    self%plan = self%layout
+    self%plan%capacity = max(self%plan%capacity, self%outputs + 1)
+    self%plan%row_capacity = max(self%plan%row_capacity, self%rows + 1)
     call find_capacity(self, error)
+  end subroutine resume
+
+  !> Remove the data beyond those that `resume` was told to keep, and make the room that the run
+  !> needs; a changed `scene_text` is written. An error if the file cannot be read or written.
+  subroutine cut(self, scene_text, command, version, error)
+    class(vtkhdf_file), intent(inout) :: self    !! as `resume` left it; ready for an output on
+                                                 !! return
+    character(*), intent(in) :: scene_text       !! the resolved scene of this run
+    character(*), intent(in) :: command          !! the command line of this run
+    character(*), intent(in) :: version          !! of this program
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: text
+    logical :: renew
+
+    call get_text(self%file, '/scene/text', text, error)
     if (allocated(error)) return
-    narrow = self%layout%capacity < max(plan%capacity, self%outputs + 1) .or. &
-      & self%layout%row_capacity < max(plan%row_capacity, self%rows + 1)
-    if (narrow .or. text /= scene_text) then
-      call enlarge(self, max(plan%capacity, self%outputs + 1), &
-        & max(plan%row_capacity, self%rows + 1), error, scene_text, command, version)
+    renew = self%layout%capacity < self%plan%capacity .or. &
+      & self%layout%row_capacity < self%plan%row_capacity .or. text /= scene_text
+    ! an earlier version made no views
+    renew = renew .or. (.not. self%has_views() .and. &
+      & views_fit(self%plan%fields, self%plan%capacity))
+    if (renew) then
+      call enlarge(self, self%plan%capacity, self%plan%row_capacity, error, scene_text, command, &
+        & version)
     else
       call cut_back(self, error)
     end if
-  end subroutine resume
+  end subroutine cut
+
+  !> Whether the file shows its outputs one by one.
+  logical function has_views(self)
+    class(vtkhdf_file), intent(in) :: self  !! open
+    has_views = object_exists(self%file, '/outputs')
+  end function has_views
 
   !> Whether the file has the outputs and rows that the checkpoint counts.
   subroutine check_kept(self, kept, error)

@@ -13,6 +13,7 @@ module pd_output_results_vtu
   use pd_output_results_layout, only: block_rows, to_single
   use pd_output_results_sink, only: sink_type
   use pd_output_results_types, only: field_type
+  use pd_output_results_xdmf, only: escaped
   implicit none (type, external)
   private
   public :: vtu_series, remove_series
@@ -381,27 +382,6 @@ contains
     width = 3*8 + 2*8 + 1 + sum(self%fields%components)*merge(4, 8, self%single)
     output_bytes = 4*(size(self%positions, 1)*width)/3 + 1024
   end function output_bytes
-
-  !> Text as XML wants it within quotes.
-  pure function escaped(text) result(safe)
-    character(*), intent(in) :: text
-    character(:), allocatable :: safe
-    integer :: i
-
-    safe = ''
-    do i = 1, len(text)
-      select case (text(i:i))
-      case ('&')
-        safe = safe//'&amp;'
-      case ('<')
-        safe = safe//'&lt;'
-      case ('"')
-        safe = safe//'&quot;'
-      case default  ! any other character stands for itself
-        safe = safe//text(i:i)
-      end select
-    end do
-  end function escaped
 
   !> Give up the output under way and remove what there is of it.
   subroutine abandon(self)

@@ -50,7 +50,8 @@ contains
       & 'the history, and list them in fragments.csv at each output')
     call keys%key('precision', group%precision, 'of the fields in the file', &
       & allowed=[character(6) :: 'single', 'double'])
-    call keys%key('format', group%format, 'vtkhdf: one HDF5 file, also VTK; vtu: a .pvd series', &
+    call keys%key('format', group%format, 'vtkhdf: one HDF5 file, with a list of its '// &
+      & 'outputs (.xdmf) for ParaView and pyvista; vtu: a .pvd series', &
       & allowed=[character(6) :: 'vtkhdf', 'vtu', 'both'])
     call keys%key('checkpoint_every', group%checkpoint_every, '', &
       & 'steps (relaxation: iterations) between checkpoints, from which a run can go on', &
