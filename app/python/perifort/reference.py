@@ -98,9 +98,9 @@ class Reference:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """`: did you mean 'steps'?` if a known name is near, else nothing."""
+    """` (did you mean 'steps'?)` if a known name is near, else nothing."""
     found = difflib.get_close_matches(name, list(known), 1, 0.6)
-    return f": did you mean '{found[0]}'?" if found else ""
+    return f" (did you mean '{found[0]}'?)" if found else ""
 
 
 def reference(program: str | Path | None = None) -> Reference:

@@ -117,7 +117,7 @@ class TestScene(unittest.TestCase):
 
     def test_unknown_names(self):
         scene = Scene(check=REFERENCE)
-        with self.assertRaisesRegex(SceneError, "unknown group &matrial: did you mean 'material'"):
+        with self.assertRaisesRegex(SceneError, "unknown group &matrial .did you mean 'material'"):
             scene.add("matrial")
         with self.assertRaisesRegex(SceneError, "unknown key 'stps'.*did you mean 'steps'"):
             scene.add("time", stps=15)

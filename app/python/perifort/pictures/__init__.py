@@ -17,11 +17,13 @@ del _needed
 import numpy as np  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
+from .colours import colours_of  # noqa: E402
 from .curves import curve_pictures  # noqa: E402
-from .fields import (FONT, Clip, View, base_name, draw_panel, draw_surface, figure_of,  # noqa: E402
-                     label_of, names_of, new_figure, unit_of, values_of, worth_drawing)
+from .fields import (Clip, View, base_name, draw_panel, draw_surface, figure_of,  # noqa: E402
+                     figure_of_panels, names_of, values_of, worth_drawing)
 from .film import write_film  # noqa: E402
-from .units import scale_of, state_text  # noqa: E402
+from .layout import FONT, Panel, lay_out  # noqa: E402
+from .units import state_text  # noqa: E402
 
 __all__ = ["Clip", "View", "compare_results", "draw_panel", "draw_surface", "figure_of",
            "plot_results", "save", "values_of", "worth_drawing", "write_film"]
@@ -46,8 +48,11 @@ def plot_results(results: Results, *, field: str | Sequence[str] | None = None,
     by it. `to`: the folder, by default that of the results.
     """
     view = View(results, deform, Clip.parse(clip) if clip else None, render)
+    if film and (time is not None or output is not None):
+        raise ValueError("a film shows all outputs: leave out the time and the output")
+    numbers = list(_outputs(results, time, output))
+    fields = _fields(results, field, component, quiet, most=1 if film else None)
     folder = _folder(results, to)
-    fields = _fields(results, field, quiet, most=1 if film else None)
     made = []
     if film:
         if film not in ("mp4", "gif"):
@@ -55,22 +60,19 @@ def plot_results(results: Results, *, field: str | Sequence[str] | None = None,
         for name in fields:
             parts = names_of(results, name, component)
             path = folder / f"{_file(name, component)}.{film}"
-            frozen = figure_of(view, parts, results.outputs - 1).get_size_inches()
+            view.steady = True
 
-            def frame(k: int, parts: list[str] = parts,
-                      size: tuple[float, float] = (frozen[0], frozen[1])) -> Figure:
-                figure = figure_of(view, parts, k)
-                figure.set_size_inches(*size)
-                return figure
+            def frame(k: int, parts: list[str] = parts) -> Figure:
+                return figure_of(view, parts, k)
             made.append(_told(write_film(path, results.outputs, frame), quiet))
         return made
     ending = "pdf" if pdf else "png"
-    for k in _outputs(results, time, output):
+    for k in numbers:
         for name in fields:
             figure = figure_of(view, names_of(results, name, component), k)
             made.append(save(figure, folder / f"{_file(name, component)}_{k:04d}.{ending}",
                              quiet=quiet))
-    if curves or (curves is None and not field):
+    if curves or (curves is None and not field and not component):
         for name, figure in curve_pictures([results]).items():
             made.append(save(figure, folder / f"{name}.{ending}", quiet=quiet))
     return made
@@ -105,7 +107,7 @@ def compare_results(results: Results, other: Results, *,
     names = list(dict.fromkeys([results.name, other.name]))
     if len(names) == 1:
         names = [str(results.folder), str(other.folder)]
-    for name in _fields(results, field, quiet):
+    for name in _fields(results, field, component, quiet):
         base = results.split(base_name(name))[0]
         if base not in other.fields:
             if not quiet:
@@ -116,7 +118,7 @@ def compare_results(results: Results, other: Results, *,
         figure = _comparison(first, second, parts, k, j, same, names)
         path = folder / f"compared_{_file(name, component)}_{k:04d}.{ending}"
         made.append(save(figure, path, quiet=quiet))
-    if not field:
+    if not field and not component:
         for name, figure in curve_pictures([results, other]).items():
             made.append(save(figure, folder / f"compared_{name}.{ending}", quiet=quiet))
     return made
@@ -126,37 +128,29 @@ def _comparison(first: View, second: View, parts: Sequence[str], k: int, j: int,
                 names: Sequence[str]) -> Figure:
     """A row for each component: the two runs and their difference."""
     results, other = first.results, second.results
-    dimension = results.dimension
-    columns = 3 if same else 2
-    if dimension == 1:
-        figure = new_figure(5.0, 2.6 * len(parts))
-        for row, part in enumerate(parts):
-            axes = figure.add_subplot(len(parts), 1, row + 1)
-            draw_panel(axes, first, part, k)
-            draw_panel(axes, second, part, j)
-            axes.legend(axes.get_lines(), names, fontsize=FONT - 1)
-    else:
-        figure = new_figure(3.3 * columns, 3.0 * len(parts))
-        for row, part in enumerate(parts):
-            place = row * columns + 1
-            for offset, (view, at) in enumerate(((first, k), (second, j))):
-                axes = figure.add_subplot(len(parts), columns, place + offset)
-                if dimension == 3:
-                    draw_surface(axes, view, part, at, view.clip, bar=True)
-                else:
-                    draw_panel(axes, view, part, at)
-                axes.set_title(f"{names[offset]}, {state_text(view.results, at)}",
-                               fontsize=FONT)
-            if same:
-                axes = figure.add_subplot(len(parts), columns, place + 2)
-                difference = _Difference(results, other, part, k, j)
-                view = View(difference, first.scale, first.clip, first.render)
-                if dimension == 3:
-                    draw_surface(axes, view, part, k, view.clip, bar=True)
-                else:
-                    draw_panel(axes, view, part, k)
-                axes.set_title("second less first", fontsize=FONT)
-    return figure
+    if results.dimension == 1:
+        figure, rows = lay_out([[Panel(0.45, bar="")] for _ in parts], 5.0, caption=False)
+        for part, (place,) in zip(parts, rows):
+            assert place is not None
+            draw_panel(place.axes, first, part, k)
+            low, high = place.axes.get_ylim()
+            draw_panel(place.axes, second, part, j)
+            place.axes.set_ylim(min(low, place.axes.get_ylim()[0]),
+                                max(high, place.axes.get_ylim()[1]))
+            place.axes.legend(place.axes.get_lines(), names, fontsize=FONT - 1)
+        return figure
+    items = []
+    for part in parts:
+        for view, at, named in ((first, k, names[0]), (second, j, names[1])):
+            items.append((view, part, at, f"{named}, {state_text(view.results, at)}"))
+        if same:
+            difference = _Difference(results, other, part, k, j)
+            view = View(difference, first.scale, first.clip, first.render)
+            view.take_colours(part, colours_of(
+                "difference", [np.asarray(difference.field(base_name(part)))[results.body]]))
+            items.append((view, part, k, "second less first"))
+    caption = f"displacements \u00d7 {first.scale:.6g}" if first.scale not in (0.0, 1.0) else ""
+    return figure_of_panels(items, 3 if same else 2, 3.3, caption)
 
 
 class _Difference(Results):
@@ -175,7 +169,7 @@ class _Difference(Results):
         return self._first.field(name, self._at)
 
 
-def _fields(results: Results, field: str | Sequence[str] | None, quiet: bool,
+def _fields(results: Results, field: str | Sequence[str] | None, component: str | None, quiet: bool,
             most: int | None = None) -> list[str]:
     """The fields to draw: those asked for, else all that say something, of these the first `most`."""
     if field:
@@ -184,6 +178,13 @@ def _fields(results: Results, field: str | Sequence[str] | None, quiet: bool,
             results.split(base_name(name))
         return asked
     shown, left = worth_drawing(results)
+    if component:
+        # Fields without it are not meant
+        have = [name for name in results.fields if results.components[name]
+                and component in (*results.components[name], "magnitude")]
+        if not have:
+            raise KeyError(f"no field of {results.path.name} has a component '{component}'")
+        shown = [name for name in shown if name in have]
     if left and not quiet:
         print("  left out: " + ", ".join(f"{name} ({why})" for name, why in left.items()))
     if most and shown:

@@ -14,6 +14,10 @@ from ..results import Results
 # beside a crack or without enough bonds the gradient of the displacements is undefined, and splinters fly
 WHOLE = ("damage", "fragment")
 PERCENTS = (0.5, 99.5)
+# Fields that follow from the gradient of the displacements, which has no meaning in broken places
+GRADIENT = ("stress", "strain", "von_mises", "principal_stress", "bond_stress", "dilatation",
+            "deformation_gradient", "energy_density", "force_density")
+SOUND = 0.3
 MOST_OUTPUTS = 24
 
 
@@ -38,6 +42,18 @@ def sampled(results: Results) -> list[int]:
     return sorted({int(k) for k in np.linspace(0, results.outputs - 1, count).round()})
 
 
+def judged(results: Results, field: str, output: int) -> npt.NDArray[np.bool_]:
+    """The points whose values set the limits of a field: those of the body, and of fields that follow
+    from the gradient those that are not broken, where the damage was written.
+    """
+    body = results.body
+    if field in GRADIENT and "damage" in results.fields:
+        sound = body & np.asarray(results.field("damage", output) < SOUND)
+        if sound.any():
+            return sound
+    return body
+
+
 def limits_of(parts: Iterable[npt.NDArray[Any]], robust: bool) -> tuple[float, float, float, float]:
     """Limits of colours over several arrays (outputs), and their smallest and largest value.
 
@@ -59,8 +75,9 @@ def limits_of(parts: Iterable[npt.NDArray[Any]], robust: bool) -> tuple[float, f
     return float(low), float(high), float(least), float(most)
 
 
-def colours_of(field: str, parts: Iterable[npt.NDArray[Any]]) -> Colours:
-    """Colours for values of a field at several outputs.
+def colours_of(field: str, parts: Iterable[npt.NDArray[Any]], broken: bool = False) -> Colours:
+    """Colours for values of a field at several outputs; `broken`: values at broken points are not
+    among them, which may be larger.
 
     Blue to red about zero if both signs matter, else light to dark; zero is in the range unless the
     values are all far from it.
@@ -74,8 +91,11 @@ def colours_of(field: str, parts: Iterable[npt.NDArray[Any]]) -> Colours:
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max",
               (True, True): "both"}[ends]
     note = "" if extend == "neither" else "0.5 to 99.5 % of points"
-    if low < -0.05 * high and high > -0.05 * low:
-        bound = max(-low, high)
+    if broken:
+        extend = "both" if low < 0.0 else "max"
+        note = f"{note}\nof damage < {SOUND}" if note else f"points of damage < {SOUND}"
+    if field == "difference" or (low < -0.15 * high and high > -0.15 * low):
+        bound = max(-low, high) or 1.0
         return Colours("RdBu_r", -bound, bound, extend, note)
     if high - low <= 1e-6 * max(abs(low), abs(high)):
         # The same everywhere: a range around it, lest noise fill the picture

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ..results import Results, split_component
-from .fields import FONT, new_figure, tidy
+from .fields import tidy
+from .layout import FONT, new_figure
 from .units import abscissa, scale_of, words
 
 Array = npt.NDArray[Any]

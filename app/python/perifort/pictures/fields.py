@@ -1,9 +1,8 @@
 """Panels of fields: a curve in 1D, deformed cells in 2D, a lit surface and a cut in 3D."""
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,11 +19,11 @@ from matplotlib.ticker import MaxNLocator
 from ..reference import nearest
 from ..results import Results
 from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing_of
-from .colours import Colours, colours_of, limits_of, nice_scale, sampled
+from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
+from .layout import FONT, Panel, Place, lay_out, write_caption
 from .units import Scale, number, scale_of, state_text, words
 
 Array = npt.NDArray[Any]
-FONT = 8.0
 # More cells than this are drawn as an image of them, which no eye can tell apart
 MOST_CELLS = 600000
 Window = Sequence[Sequence[float]]
@@ -58,6 +57,8 @@ class View:
     clip: Clip | None = None
     render: str = "matplotlib"
     window: Window | None = None
+    # The same frame at all outputs, as films want it
+    steady: bool = False
     _colours: dict[str, Colours] = field(default_factory=dict)
 
     @cached_property
@@ -90,11 +91,28 @@ class View:
     def colours(self, name: str) -> Colours:
         """The colours of a field or component, over all outputs."""
         if name not in self._colours:
-            base = self.results.split(base_name(name))[0]
-            parts = [values_of(self.results, name, k)[self.results.body]
-                     for k in sampled(self.results)]
-            self._colours[name] = colours_of(base, parts)
+            self._colours[name] = shared_colours([self], name)
         return self._colours[name]
+
+    def seen(self, output: int) -> Array:
+        """Positions of the body, without what has flown far from it, that a picture must hold: at this
+        output or, of steady pictures, at all.
+        """
+        rest = self.results.points[self.results.body]
+        room = 0.6 * float(np.ptp(rest, axis=0).max())
+        low, high = rest.min(axis=0) - room, rest.max(axis=0) + room
+        outputs = sampled(self.results) if self.steady else [output]
+        every = np.concatenate([self.positions(k)[self.results.body] for k in outputs])
+        return np.asarray(np.clip(every, low, high))
+
+    def take_colours(self, name: str, colours: Colours) -> None:
+        """Give a field other colours than those of its values."""
+        self._colours[name] = colours
+
+    def fix_colours(self, name: str, low: float, high: float) -> None:
+        """Give the colours of a field other limits."""
+        self._colours[name] = replace(self.colours(name), low=low, high=high, extend="neither",
+                                      note="")
 
     def range(self, name: str) -> tuple[float, float]:
         """The smallest and largest value over all outputs, for curves."""
@@ -104,9 +122,7 @@ class View:
     def share_colours(self, others: Sequence[View], names: Sequence[str]) -> None:
         """Give all views the same colours, those over the outputs of all."""
         for name in names:
-            parts = [values_of(view.results, name, k)[view.results.body] for view in (self, *others)
-                     for k in sampled(view.results)]
-            shared = colours_of(self.results.split(base_name(name))[0], parts)
+            shared = shared_colours((self, *others), name)
             for view in (self, *others):
                 view._colours[name] = shared
 
@@ -117,8 +133,20 @@ class View:
         if r.dimension > 1 and self.scale == 1.0:
             text += ", displacements to scale"
         elif r.dimension > 1 and self.scale:
-            text += f", displacements \u00d7 {number(self.scale)}"
+            text += f", displacements \u00d7 {self.scale:.6g}"
         return text
+
+
+def shared_colours(views: Sequence[View], name: str) -> Colours:
+    """The colours of a field or component over all outputs of several runs."""
+    base = views[0].results.split(base_name(name))[0]
+    parts, broken = [], False
+    for results in (view.results for view in views):
+        for k in sampled(results):
+            points = judged(results, base, k)
+            broken = broken or bool(np.any(points != results.body))
+            parts.append(values_of(results, name, k)[points])
+    return colours_of(base, parts, broken)
 
 
 def base_name(name: str) -> str:
@@ -198,8 +226,8 @@ def worth_drawing(results: Results) -> tuple[list[str], dict[str, str]]:
 
 # Panels
 
-def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool = True,
-               title: str = "", window: Window | None = None) -> None:
+def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool | Axes | None = True,
+               title: str = "") -> None:
     """One field or component at one output, of a body in 1D or 2D, with its colour bar."""
     results = view.results
     values = values_of(results, name, output)
@@ -211,11 +239,11 @@ def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool = Tr
         positions = view.positions(output)
         _draw_cells(axes, [(part, positions[part.points], values[part.points])
                            for part in view.parts], colours, scale.factor)
-        _frame(axes, view, positions[results.body], window or view.window)
+        _label(axes, "xy", frame_of(view, output))
         if bar:
-            add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)))
+            add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)), bar)
     if title:
-        axes.set_title(title, fontsize=FONT + 1)
+        axes.set_title(title, fontsize=FONT)
 
 
 def _draw_line(axes: Axes, view: View, name: str, values: Array) -> None:
@@ -289,22 +317,21 @@ def _draw_image(axes: Axes, part: Part, positions: Array, values: Array, norm: N
                 interpolation="nearest")
 
 
-def _frame(axes: Axes, view: View, positions: Array, window: Window | None) -> None:
-    """Equal axes in a unit that reads well, around the body and what has not flown far from it."""
-    rest = view.results.points[view.results.body]
-    half = view.spacing / 2
-    limits = []
-    for c in (0, 1):
-        low, high = rest[:, c].min(), rest[:, c].max()
-        room = 0.6 * max(np.ptp(rest[:, 0]), np.ptp(rest[:, 1]))
-        limits.append((float(max(positions[:, c].min(), low - room) - half),
-                       float(min(positions[:, c].max(), high + room) + half)))
-    if window is not None:
-        limits = [(float(window[c][0]), float(window[c][1])) for c in (0, 1)]
-    else:
-        margin = 0.015 * max(end - begin for begin, end in limits)
-        limits = [(begin - margin, end + margin) for begin, end in limits]
-    _label(axes, "xy", limits)
+def frame_of(view: View, output: int, axes: Sequence[int] = (0, 1),
+             within: Array | None = None) -> list[tuple[float, float]]:
+    """Limits of two axes around the body, or points of it, with a small margin; or the window."""
+    if view.window is not None:
+        return [(float(view.window[c][0]), float(view.window[c][1])) for c in (0, 1)]
+    seen = view.seen(output) if within is None else within
+    half = 0.5 * view.spacing
+    limits = [(float(seen[:, c].min()) - half, float(seen[:, c].max()) + half) for c in axes]
+    margin = 0.015 * max(high - low for low, high in limits)
+    return [(low - margin, high + margin) for low, high in limits]
+
+
+def shape_of(limits: Sequence[tuple[float, float]]) -> float:
+    """Height over width."""
+    return (limits[1][1] - limits[1][0]) / (limits[0][1] - limits[0][0])
 
 
 def _label(axes: Axes, names: str, limits: Sequence[tuple[float, float]]) -> Scale:
@@ -345,23 +372,25 @@ def _map(colours: Colours) -> Any:
 
 
 def add_bar(axes: Axes, colours: Colours, factor: float, label: str,
-            wide: bool | None = None) -> None:
-    """A colour bar as long as the panel: beside it, or below wide ones. It says if the colours do not
-    cover all values.
+            where: bool | Axes = True) -> None:
+    """A colour bar in axes of its own, or beside the panel. It says if the colours do not cover all
+    values.
     """
-    figure = axes.figure
-    limits = axes.get_xlim(), axes.get_ylim()
-    if wide is None:
-        wide = (limits[0][1] - limits[0][0]) > 2.2 * (limits[1][1] - limits[1][0])
     norm = Normalize(factor * colours.low, factor * colours.high)
     shown = ScalarMappable(norm=norm, cmap=_map(colours))
-    bar = figure.colorbar(shown, ax=axes, extend=colours.extend,
-                          orientation="horizontal" if wide else "vertical",
-                          fraction=0.08 if wide else 0.046, pad=0.03, aspect=30 if wide else 22,
-                          extendfrac=0.03)
+    wide = False
+    if isinstance(where, Axes):
+        box = where.get_position()
+        size = where.figure.bbox
+        wide = box.width * size.width > box.height * size.height
+        bar = axes.figure.colorbar(shown, cax=where, extend=colours.extend, extendfrac=0.03,
+                                   orientation="horizontal" if wide else "vertical")
+    else:
+        bar = axes.figure.colorbar(shown, ax=axes, extend=colours.extend, extendfrac=0.03,
+                                   fraction=0.046, pad=0.03)
     bar.set_label(label + (f"\n{colours.note}" if colours.note else ""), fontsize=FONT)
     bar.ax.tick_params(labelsize=FONT - 1)
-    bar.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
+    bar.locator = MaxNLocator(4 if wide else 5, steps=[1, 2, 2.5, 5, 10])
     bar.update_ticks()
     bar.outline.set_linewidth(0.5)
 
@@ -376,7 +405,7 @@ class Camera:
         self.eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
         self.right = np.array([-np.sin(a), np.cos(a), 0.0])
         self.up = np.cross(self.eye, self.right)
-        light = 0.55 * self.eye + 0.7 * self.up - 0.45 * self.right
+        light = 0.7 * self.eye + 0.6 * self.up - 0.4 * self.right
         self.light = light / np.linalg.norm(light)
 
     def flat(self, points: Array) -> Array:
@@ -436,8 +465,15 @@ def position_of(view: View, clip: Clip) -> float:
     return clip.at
 
 
+def surface_frame(view: View, output: int, camera: Camera) -> list[tuple[float, float]]:
+    """Limits of the picture of a surface: the whole body, also where it is cut."""
+    flat = camera.flat(view.seen(output))
+    room = 0.9 * view.spacing + 0.02 * float(np.ptp(flat, axis=0).max())
+    return [(float(flat[:, c].min()) - room, float(flat[:, c].max()) + room) for c in (0, 1)]
+
+
 def draw_surface(axes: Axes, view: View, name: str, output: int, clip: Clip | None = None,
-                 bar: bool = False) -> None:
+                 bar: bool | Axes | None = False) -> None:
     """The body as a lit surface. With `clip` what lies in front of the cut is taken off."""
     results = view.results
     colours = view.colours(name)
@@ -455,20 +491,18 @@ def draw_surface(axes: Axes, view: View, name: str, output: int, clip: Clip | No
         flat, normal, depth = flat[seen], normal[seen], (quad[seen].mean(axis=1) @ camera.eye)
         norm = Normalize(colours.low, colours.high)
         rgba = _map(colours)(norm(np.ma.masked_invalid(values[seen])))
-        rgba[:, :3] *= (0.5 + 0.5 * np.clip(normal @ camera.light, 0.0, 1.0))[:, None]
+        rgba[:, :3] *= (0.68 + 0.32 * np.clip(normal @ camera.light, 0.0, 1.0))[:, None]
         order = np.argsort(depth)
         # Edges in the colour of the face close the hairlines between faces
         axes.add_collection(PolyCollection(flat[order], facecolors=rgba[order],
                                            edgecolors=rgba[order], linewidths=0.3, rasterized=True))
-    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
-    room = 0.04 * float((high - low).max())
-    axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room),
-             aspect="equal")
+    limits = surface_frame(view, output, camera)
+    axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
     axes.set_axis_off()
     _triad(axes, camera)
     if bar:
         scale = scale_of(unit_of(results, name), [colours.low, colours.high])
-        add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)))
+        add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)), bar)
 
 
 def _triad(axes: Axes, camera: Camera) -> None:
@@ -481,7 +515,8 @@ def _triad(axes: Axes, camera: Camera) -> None:
                       arrowprops={"arrowstyle": "<-", "linewidth": 0.7, "shrinkA": 1, "shrinkB": 0})
 
 
-def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip, bar: bool = True) -> None:
+def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
+             bar: bool | Axes | None = True) -> None:
     """The layer of cells that a plane cuts, seen along its normal, with equal axes."""
     results = view.results
     values = values_of(results, name, output)
@@ -507,17 +542,20 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip, bar: bo
     colours = view.colours(name)
     scale = scale_of(unit_of(results, name), [colours.low, colours.high])
     _draw_cells(axes, parts, colours, scale.factor)
-    every = np.concatenate([place for _, place, _ in parts])
-    half = 0.52 * view.spacing
-    limits = [(float(every[:, c].min() - half), float(every[:, c].max() + half)) for c in (0, 1)]
-    margin = 0.02 * max(high - low for low, high in limits)
-    limits = [(low - margin, high + margin) for low, high in limits]
+    limits = cut_frame(view, output, clip)
     unit = _label(axes, "".join("xyz"[c] for c in shown), limits)
     plane = 0.0 if abs(plane) < 1e-6 * view.spacing else plane
     axes.set_title(f"cut at {'xyz'[clip.axis]} = {number(plane * unit.factor)} {unit.text}",
                    fontsize=FONT)
     if bar:
-        add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)))
+        add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)), bar)
+
+
+def cut_frame(view: View, output: int, clip: Clip) -> list[tuple[float, float]]:
+    """Limits of the picture of a cut: the whole body along its axes."""
+    seen = view.seen(output)
+    shown = [c for c in range(3) if c != clip.axis]
+    return frame_of(replace(view, window=None), output, shown, seen)
 
 
 def clip_for(view: View, name: str) -> Clip:
@@ -533,78 +571,93 @@ def clip_for(view: View, name: str) -> Clip:
 
 def figure_of(view: View, names: Sequence[str], output: int, caption: str | None = None) -> Figure:
     """One picture of one field: a panel for each of the names, its components, at one output."""
-    dimension = view.results.dimension
-    count = len(names)
-    caption = view.caption(output) if caption is None else caption
-    if dimension == 1:
-        figure = new_figure(5.0, 2.6 * count)
-        for row, name in enumerate(names):
-            draw_panel(figure.add_subplot(count, 1, row + 1), view, name, output)
-    elif dimension == 2:
-        columns, rows, width, height = arrange(view, output, count)
-        figure = new_figure(width * columns, height * rows + 0.3)
-        for place, name in enumerate(names):
-            draw_panel(figure.add_subplot(rows, columns, place + 1), view, name, output)
-    else:
+    if view.results.dimension == 3:
         figure = _solid_figure(view, names, output)
-    figure.suptitle(caption, fontsize=FONT + 1)
+    elif view.results.dimension == 2:
+        figure = _plane_figure(view, names, output)
+    else:
+        figure, rows = lay_out([[Panel(0.45, bar="")] for _ in names], 5.0)
+        for name, row in zip(names, rows):
+            draw_panel(_there(row[0]).axes, view, name, output)
+    write_caption(figure, view.caption(output) if caption is None else caption)
     return figure
+
+
+def _there(place: Place | None) -> Place:
+    """A place that a panel has been laid out for."""
+    assert place is not None
+    return place
+
+
+def _plane_figure(view: View, names: Sequence[str], output: int) -> Figure:
+    """Panels of a plane body, side by side or, of long bodies, one over the other."""
+    shape = shape_of(frame_of(view, output))
+    count = len(names)
+    columns = min(count, 1 if shape < 0.45 and count <= 3 else 2 if count in (2, 4) else 3)
+    width = {1: 4.8, 2: 3.6, 3: 3.1}[columns]
+    panels: list[Panel | None] = [panel_for(view, name, shape) for name in names]
+    rows = [panels[k:k + columns] for k in range(0, count, columns)]
+    figure, places = lay_out(rows, width)
+    for name, place in zip(names, [_there(place) for row in places for place in row]):
+        draw_panel(place.axes, view, name, output, bar=place.bar)
+    return figure
+
+
+def panel_for(view: View, name: str, shape: float, title: bool = False, axes: bool = True) -> Panel:
+    """The panel of a field: its colour bar stands below flat bodies, where it is longer."""
+    note = view.colours(name).note
+    return Panel(shape, "below" if shape < 0.4 else "beside",
+                 1 + (note.count("\n") + 1 if note else 0), title, axes)
 
 
 def _solid_figure(view: View, names: Sequence[str], output: int) -> Figure:
     """The panels of a 3D body: each component as a surface and, beside or below, its cut."""
-    points = view.results.points[view.results.body]
+    camera = camera_for(view.results.points[view.results.body])
+    surface = Panel(shape_of(surface_frame(view, output, camera)), bar="", axes=False)
     clips = [clip_for(view, name) for name in names]
-    camera = camera_for(points)
-    box = np.array(list(itertools.product(*zip(points.min(axis=0), points.max(axis=0)))))
-    seen = np.ptp(camera.flat(box), axis=0)
-    sizes = [np.ptp(np.delete(box, clip.axis, axis=1), axis=0) + view.spacing for clip in clips]
-    surface_shape = float(seen[1] / seen[0])
-    cut_shape = max(float(size[1] / size[0]) for size in sizes)
-    beside = len(names) == 1 and surface_shape > 0.5
-    columns = 1 if len(names) == 1 else min(len(names), 3)
-    width = 4.8 if columns == 1 else 3.6 if columns == 2 else 3.0
-    below = 1 / cut_shape > 2.2
-    heights = [float(np.clip(width * surface_shape, 0.8, 4.5)),
-               float(np.clip((width - (0.6 if below else 1.2)) * cut_shape, 0.4, 4.0))
-               + (1.1 if below else 0.75)]
-    blocks = -(-len(names) // columns)
+    cuts = [panel_for(view, name, shape_of(cut_frame(view, output, clip)), title=True)
+            for name, clip in zip(names, clips)]
+    columns = 1 if len(names) == 1 else 2 if len(names) in (2, 4) else 3
+    rows: list[list[Panel | None]] = []
+    beside = len(names) == 1 and surface.shape > 0.5
     if beside:
-        figure = new_figure(7.2, float(np.clip(max(3.0 * surface_shape, 2.8 * cut_shape) + 0.7, 2.6,
-                                               5.0)))
-        grid = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.15))
-        places = [(grid[0, 0], grid[0, 1])]
+        rows = [[surface, cuts[0]]]
+        at = [(0, 0)]
     else:
-        figure = new_figure(width * columns, sum(heights) * blocks + 0.3)
-        grid = figure.add_gridspec(2 * blocks, columns, height_ratios=heights * blocks)
-        places = [(grid[2 * (k // columns), k % columns], grid[2 * (k // columns) + 1, k % columns])
-                  for k in range(len(names))]
-    for name, clip, (surface, cut) in zip(names, clips, places):
-        draw_surface(figure.add_subplot(surface), view, name, output, view.clip)
-        draw_cut(figure.add_subplot(cut), view, name, output, clip)
+        at = []
+        for k in range(0, len(names), columns):
+            block = cuts[k:k + columns]
+            at += [(len(rows), c) for c in range(len(block))]
+            rows += [[surface] * len(block), list(block)]
+    figure, places = lay_out(rows, 3.6 if beside else {1: 4.8, 2: 3.6, 3: 3.1}[columns],
+                             most=4.5 if beside else 3.5)
+    for name, clip, (row, column) in zip(names, clips, at):
+        upper = _there(places[row][column])
+        lower = _there(places[row][1] if beside else places[row + 1][column])
+        draw_surface(upper.axes, view, name, output, view.clip)
+        draw_cut(lower.axes, view, name, output, clip, lower.bar)
     return figure
 
 
-def arrange(view: View, output: int, count: int) -> tuple[int, int, float, float]:
-    """Columns and rows of plane panels, and the size of one [inches], for the shape of the body."""
-    positions = view.positions(output)[view.results.body]
-    if view.window is not None:
-        wide, high = (float(view.window[c][1] - view.window[c][0]) for c in (0, 1))
-    else:
-        wide, high = (float(np.ptp(positions[:, c]) + view.spacing) for c in (0, 1))
-    shape = high / wide
-    if count == 1:
-        columns = 1
-    elif shape < 0.45:
-        columns = 1 if count <= 3 else 2
-    else:
-        columns = {2: 2, 3: 3, 4: 2}.get(count, 3)
-    width = {1: 4.8, 2: 3.6, 3: 3.0}[columns]
-    below = 1 / shape > 2.2
-    height = (width - (0.6 if below else 1.25)) * shape + (1.0 if below else 0.55)
-    return columns, -(-count // columns), width, float(np.clip(height, 1.5, 6.5))
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """A figure whose panels arrange themselves."""
-    return Figure(figsize=(width, height), layout="constrained")
+def figure_of_panels(items: Sequence[tuple[View, str, int, str]], columns: int, width: float,
+                     caption: str = "") -> Figure:
+    """Panels of several runs, fields or outputs, each with its title, row by row: views, names of
+    fields, outputs, titles. 3D bodies are drawn as surfaces.
+    """
+    panels: list[Panel | None] = []
+    for view, name, output, _ in items:
+        solid = view.results.dimension == 3
+        limits = (surface_frame(view, output, camera_for(view.results.points[view.results.body]))
+                  if solid else frame_of(view, output))
+        panels.append(panel_for(view, name, shape_of(limits), True, not solid))
+    rows = [panels[k:k + columns] for k in range(0, len(panels), columns)]
+    figure, places = lay_out(rows, width, bool(caption))
+    for (view, name, output, title), place in zip(items, [_there(p) for row in places for p in row]):
+        if view.results.dimension == 3:
+            draw_surface(place.axes, view, name, output, view.clip, place.bar)
+            place.axes.set_title(title, fontsize=FONT)
+        else:
+            draw_panel(place.axes, view, name, output, bar=place.bar, title=title)
+    if caption:
+        write_caption(figure, caption)
+    return figure

@@ -23,6 +23,9 @@ def render(quads: Array, values: Array, colours: Colours,
     except ImportError as fault:
         raise ImportError("this way of drawing needs the package pyvista: pip install pyvista, or "
                           "leave out render") from fault
+    from vtkmodules.vtkCommonCore import vtkLogger
+    # Without a screen vtk draws in memory, and warns of that
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     # Lengths of about 1, since the renderer thinks in single precision
     flat = camera.flat(quads).reshape(-1, 2)
     low, high = flat.min(axis=0), flat.max(axis=0)
