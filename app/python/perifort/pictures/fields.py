@@ -140,12 +140,17 @@ class View:
 def shared_colours(views: Sequence[View], name: str) -> Colours:
     """The colours of a field or component over all outputs of several runs."""
     base = views[0].results.split(base_name(name))[0]
-    parts, broken = [], False
+    parts: list[Array] = []
+    left: list[Array] = []
     for results in (view.results for view in views):
         for k in sampled(results):
             points = judged(results, base, k)
-            broken = broken or bool(np.any(points != results.body))
-            parts.append(values_of(results, name, k)[points])
+            values = values_of(results, name, k)
+            parts.append(values[points])
+            left.append(values[results.body & ~points])
+    # Values at broken points are said to be left out where they are beyond the others
+    low, high = limits_of(parts, robust=False)[2:]
+    broken = any(bool(np.any((values < low) | (values > high))) for values in left)
     return colours_of(base, parts, broken)
 
 
