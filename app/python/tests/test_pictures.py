@@ -5,6 +5,7 @@ import itertools
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import perifort
@@ -317,6 +318,43 @@ class TestFiles(unittest.TestCase):
             with self.subTest(count=count):
                 self.assertGreater(inside.size, 10000)
                 self.assertEqual(int(inside.max()), int(inside.min(axis=(0, 1)).max()))
+
+    def test_clouds(self):
+        for dimension in (2, 3):
+            points = np.zeros((400, 3))
+            points[:, :dimension] = np.random.default_rng(dimension).random((400, dimension)) * 0.02
+            path = write_results(self.folder / f"cloud{dimension}.vtkhdf", points,
+                                 fields=fields_of(points))
+            results = perifort.open(path)
+            self.assertIsNone(cells.parts_of(results)[0].lattice)
+            self.check(results.plot(field="displacement", quiet=True, to=self.folder / "c"),
+                       ["displacement_0002.png"])
+
+    def test_many_cells_are_an_image_without_gaps(self):
+        points = lattice((60, 40))
+        fields = fields_of(points)
+        fields["displacement"][2][2] *= 40.0
+        path = write_results(self.folder / "many.vtkhdf", points, fields=fields)
+        with mock.patch("perifort.pictures.fields.MOST_CELLS", 1000):
+            figure = figure_of(View(perifort.open(path), deform=1.0), ["damage"], 2)
+        shown = figure.axes[0].images[0].get_array()
+        self.assertFalse(np.ma.getmaskarray(shown)[2:-2, 2:-2].any())
+        self.assertEqual(float(shown.max()), 0.4)
+
+    def test_pyvista_draws_the_same(self):
+        try:
+            import pyvista  # noqa: F401
+        except ImportError:
+            self.skipTest("pyvista is not installed")
+        results = self.results((12, 8, 6))
+        for render in ("matplotlib", "pyvista"):
+            self.check(results.plot(quiet=True, field="displacement_x", render=render),
+                       ["displacement_x_0002.png"])
+        mesh = results.to_pyvista(time=1e-5, deform=2.0)
+        self.assertEqual(mesh.n_points, len(results.points))
+        self.assertTrue(np.allclose(mesh.point_data["stress"], results.field("stress", 1)))
+        self.assertTrue(np.allclose(mesh.points, results.points
+                                    + 2.0 * results.field("displacement", 1)))
 
     def test_components(self):
         results = self.results((30, 20))

@@ -315,9 +315,8 @@ def _draw_image(axes: Axes, part: Part, positions: Array, values: Array, norm: N
         before, after = np.roll(image, 1, axis), np.roll(image, -1, axis)
         gap = np.isnan(image) & ~np.isnan(before) & ~np.isnan(after)
         image[gap] = 0.5 * (before[gap] + after[gap])
-    cmap = cmap.copy()
-    cmap.set_bad(alpha=0.0)
-    axes.imshow(np.ma.masked_invalid(image), origin="lower", cmap=cmap, norm=norm,
+    axes.imshow(np.ma.masked_invalid(image), origin="lower", norm=norm,
+                cmap=cmap.with_extremes(bad=(0.0, 0.0, 0.0, 0.0)),
                 extent=(low[0], low[0] + counts[0] * pixel, low[1], low[1] + counts[1] * pixel),
                 interpolation="nearest")
 
@@ -371,9 +370,7 @@ def tidy(axes: Axes) -> None:
 
 def _map(colours: Colours) -> Any:
     """The colour map; where a value is missing it is grey."""
-    cmap = mpl.colormaps[colours.map].copy()
-    cmap.set_bad("0.8")
-    return cmap
+    return mpl.colormaps[colours.map].with_extremes(bad="0.8")
 
 
 def add_bar(axes: Axes, colours: Colours, factor: float, label: str,
