@@ -4,9 +4,9 @@
                   [--clip PLANE] [--deform FACTOR] [--film [mp4 | gif]] [--compare DIR2] [--pdf]
                   [--render pyvista] [--to FOLDER]
 
-draws what the package perifort does in app/python: fields on the deformed body and the curves of the
-history. Of a study it draws error against time with the Pareto front, and error against each varied
-key. DIR is the folder of the results or of the study, or the .vtkhdf or study.csv file.
+draws what the package perifort does in app/python: fields on the deformed body and the curves of
+the history. Of a study it draws error against time with the Pareto front, and error against each
+varied key. DIR is the folder of the results or of the study, or the .vtkhdf or study.csv file.
 """
 import argparse
 import csv
@@ -21,8 +21,8 @@ from perifort.pictures.layout import new_figure
 
 
 def draw(figure, place, results, name, output, title, magnify, window=None, limits=None):
-    """One panel of a figure: a field at an output, `place`: rows, columns, number; `window`: x and y
-    limits [m]; `limits`: of the colours, in SI units.
+    """One panel of a figure: a field at an output, `place`: rows, columns, number; `window`: x and
+    y limits [m]; `limits`: of the colours, in SI units.
     """
     view = View(results, magnify, window=window)
     name = whole_name(results, name)
@@ -41,7 +41,8 @@ def whole_name(results, name):
     return f"{name}_magnitude" if name in results.fields and results.components[name] else name
 
 
-def figure_of_fields(items, path, columns=1, magnify=0.0, width=5.0, window=None, limits=None, dpi=80):
+def figure_of_fields(items, path, columns=1, magnify=0.0, width=5.0, window=None,
+                     limits=None, dpi=80):
     """One picture of several panels, each (results, field, title) or (results, field, title,
     output), and `width` inches wide.
     """
@@ -67,7 +68,8 @@ RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "ener
 
 
 class Study:
-    """The table of a study: its varied keys with their values as text, and its columns as arrays."""
+    """The table of a study: its varied keys with their values as text, and its columns as arrays.
+    """
 
     def __init__(self, path):
         self.path = Path(path)
@@ -182,7 +184,7 @@ def main():
     parser.add_argument("--component", metavar="C",
                         help="only this component, as y or xy, or magnitude")
     parser.add_argument("--time", type=seconds, metavar="T",
-                        help="the output nearest to this time, as 2e-5 or 20us; in statics load factor")
+                        help="the output nearest to this time, as 2e-5 or 20us, or load factor")
     parser.add_argument("--step", metavar="N",
                         help="output number from 0, or 'all' (default: the last)")
     parser.add_argument("--clip", metavar="PLANE", help="cut of a 3D body: x, y, z, or y=0.01 [m]")

@@ -8,9 +8,10 @@
     stress = results.field("stress_xx")               # of the last output
     results.plot()                                    # pictures beside the results
 
-`Scene` builds, reads and writes scenes and checks their keys against the input reference; `run` starts
-the program; `Results`, from `run` or `open`, reads what it wrote; `sweep` runs a scene for several
-values of its keys. numpy and h5py are needed, matplotlib for pictures, pyvista for `to_pyvista`.
+`Scene` builds, reads and writes scenes and checks their keys against the input reference; `run`
+starts the program; `Results`, from `run` or `open`, reads what it wrote; `sweep` runs a scene for
+several values of its keys. numpy and h5py are needed, matplotlib for pictures, pyvista for
+`to_pyvista`.
 """
 from .program import RunError, find_program, run
 from .reference import Reference, reference
@@ -20,5 +21,5 @@ from .scene import Group, Scene, SceneError
 from .sweep import Table, sweep
 
 __version__ = "0.2.0"
-__all__ = ["Columns", "Group", "Quantity", "Reference", "Results", "RunError", "Scene", "SceneError",
-           "Table", "find_program", "open", "reference", "run", "sweep"]
+__all__ = ["Columns", "Group", "Quantity", "Reference", "Results", "RunError", "Scene",
+           "SceneError", "Table", "find_program", "open", "reference", "run", "sweep"]

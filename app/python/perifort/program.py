@@ -24,8 +24,8 @@ STATUSES = {1: "the scene or the environment is at fault", 2: "wrong command lin
 
 class RunError(RuntimeError):
     """A run that ended without an answer: `message` is what the program said, `status` its exit
-    status (1: scene or environment at fault, 2: wrong command line, 3: unstable or not converged, 4:
-    stopped with a checkpoint).
+    status (1: scene or environment at fault, 2: wrong command line, 3: unstable or not converged,
+    4: stopped with a checkpoint).
     """
 
     def __init__(self, status: int, message: str, command: list[str]) -> None:
@@ -35,8 +35,8 @@ class RunError(RuntimeError):
 
 
 def find_program(program: PathLike | None = None) -> Path:
-    """The program: the argument, else what $PERIFORT names, `perifort` on PATH, or the one that ./pf
-    has built in the project this package lies in. FileNotFoundError if there is none.
+    """The program: the argument, else what $PERIFORT names, `perifort` on PATH, or the one that
+    ./pf has built in the project this package lies in. FileNotFoundError if there is none.
     """
     for given, source in ((program, "argument"), (os.environ.get("PERIFORT"), "$PERIFORT")):
         if given:
@@ -51,9 +51,9 @@ def find_program(program: PathLike | None = None) -> Path:
     built = root / "build" / "bin" / "optimised" / "perifort"
     if built.is_file():
         return built
-    raise FileNotFoundError("the program perifort was not found: build it with ./pf version and name "
-                            "it by program=..., by the environment variable PERIFORT, or put it on "
-                            f"PATH (looked for {built}, too)")
+    raise FileNotFoundError("the program perifort was not found: build it with ./pf version and "
+                            "name it by program=..., by the environment variable PERIFORT, or put it "
+                            f"on PATH (looked for {built}, too)")
 
 
 def run(scene: Scene | PathLike, folder: PathLike | None = None, *, threads: int | None = None,
@@ -107,7 +107,7 @@ def _watch(command: list[str], progress: bool | Callable[[str], None]) -> tuple[
         except KeyboardInterrupt:
             # The program writes a checkpoint and ends with status 4
             process.send_signal(signal.SIGINT)
-            _show(process.stdout, progress)
+            _show(process.stdout, progress is True)
             status = process.wait()
     finally:
         if process.poll() is None:

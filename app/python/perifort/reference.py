@@ -12,7 +12,9 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Key:
-    """One key: its type ('real', 'real(3)', 'text list', ...), unit, default and meaning, as printed."""
+    """One key: its type ('real', 'real(3)', 'text list', ...), unit, default and meaning, as
+    printed.
+    """
 
     name: str
     kind: str

@@ -124,7 +124,8 @@ class Results:
             self.volume: Array = file["points/volume"][()]
             self.layer: Array = file["points/layer"][()]
             # Bodies, materials, regions and levels of refinement, where there are any
-            self.marks: dict[str, Array] = {name: file["points"][name][()] for name in file["points"]
+            self.marks: dict[str, Array] = {name: file["points"][name][()]
+                                            for name in file["points"]
                                             if name not in ("volume", "layer")}
             columns = file["history"]
             rows = int(columns.attrs.get("rows", -1))
@@ -279,7 +280,8 @@ class Results:
         return self._group(name, self.boundaries, "boundary")
 
     def tip(self, name: str) -> Columns:
-        """The way of a crack tip: x, y, z [m], length [m], projection [m], speed [m/s], branches."""
+        """The way of a crack tip: x, y, z [m], length [m], projection [m], speed [m/s], branches.
+        """
         return self._group(name, self.tips, "tip", TIP_COLUMNS)
 
     def _columns(self, name: str, names: Sequence[str], kind: str,

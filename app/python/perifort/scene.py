@@ -18,6 +18,7 @@ Value = Union[Scalar, list[Scalar]]
 PathLike = Union[str, "os.PathLike[str]"]
 
 _WORD_ENDS = " \t,/!=&'\""
+_KEY = re.compile(r"([^\s,/!=&'\"(]+)[ \t]*(\([^)]*\))?[ \t]*=")
 _INTEGER = re.compile(r"[+-]?\d+$")
 _REAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([edED][+-]?\d+)?$")
 
@@ -166,7 +167,7 @@ class Scene:
                     if not values or comma:
                         raise SceneError(f"{file}:{number}: empty value")
                     comma, at = True, at + 1
-                elif match := re.compile(r"([^\s,/!=&'\"(]+)[ \t]*(\([^)]*\))?[ \t]*=").match(line, at):
+                elif match := _KEY.match(line, at):
                     close_key(number)
                     key = _key_name(match.group(1) + (match.group(2) or ""))
                     if key in group:
@@ -174,8 +175,8 @@ class Scene:
                             f"{file}:{number}: '{key}' is given twice in &{group.name}")
                     at = match.end()
                 elif not key or letter in "&=":
-                    raise SceneError(f"{file}:{number}: expected key = value in group &{group.name}, "
-                                     f"found {line[at:].strip()!r}")
+                    raise SceneError(f"{file}:{number}: expected key = value in group "
+                                     f"&{group.name}, found {line[at:].strip()!r}")
                 else:
                     more, at = _scan_value(line, at, f"{file}:{number}")
                     values += more
@@ -347,7 +348,8 @@ def _key_name(key: str) -> str:
 
 
 def _plain(value: Any, where: str) -> Value:
-    """A value of python's own types, or a list of them; SceneError if it is none a scene can hold."""
+    """A value of python's own types, or a list of them; SceneError if it is none a scene can hold.
+    """
     if isinstance(value, np.ndarray):
         # A matrix is read column by column
         value = value.ravel(order="F").tolist() if value.ndim else value.item()
@@ -373,8 +375,8 @@ def _plain(value: Any, where: str) -> Value:
 
 
 def _checked(check: Reference, group: str, key: str, value: Value) -> Value:
-    """The value if the group has such a key and it can hold it; else a SceneError. A whole number for
-    a real key stays one, which a scene may have.
+    """The value if the group has such a key and it can hold it; else a SceneError. A whole number
+    for a real key stays one, which a scene may have.
     """
     name, _, subscript = key.partition("(")
     try:

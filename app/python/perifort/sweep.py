@@ -20,7 +20,8 @@ PathLike = Union[str, "os.PathLike[str]"]
 
 
 class Table:
-    """The runs of a sweep: a column for each varied key and each measured number, a row for each run.
+    """The runs of a sweep: a column for each varied key and each measured number, a row for each
+    run.
 
     `table["horizon%ratio"]` is a column as an array, `table.results[3]` the results of a run, None
     if it failed; `table.errors[3]` is then the reason.

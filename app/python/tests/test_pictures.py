@@ -53,7 +53,8 @@ class TestColours(unittest.TestCase):
 
     def test_all_of_it_where_nothing_is_far(self):
         found = colours.colours_of("stress", [np.linspace(0, 1, 1000)])
-        self.assertEqual((found.low, found.high, found.extend, found.note), (0.0, 1.0, "neither", ""))
+        self.assertEqual((found.low, found.high, found.extend, found.note),
+                         (0.0, 1.0, "neither", ""))
 
     def test_damage_keeps_its_peak(self):
         values = np.zeros(1000)
@@ -263,8 +264,8 @@ class TestFiles(unittest.TestCase):
         results = self.results((12, 8, 6))
         self.check(results.plot(quiet=True, field=["damage", "displacement"]),
                    ["damage_0002.png", "displacement_0002.png"])
-        self.check(results.plot(quiet=True, field="stress_xx", clip="y=0.004", to=self.folder / "c"),
-                   ["stress_xx_0002.png"])
+        self.check(results.plot(quiet=True, field="stress_xx", clip="y=0.004",
+                                to=self.folder / "c"), ["stress_xx_0002.png"])
         with self.assertRaisesRegex(ValueError, "misses the body"):
             results.plot(quiet=True, field="damage", clip="y=1")
 
@@ -294,6 +295,18 @@ class TestFiles(unittest.TestCase):
         found = View(self.results((30, 20), fields=fields)).colours("stress_xx")
         self.assertAlmostEqual(found.high, 3e8, delta=1.0)
         self.assertEqual((found.extend, found.note), ("max", "points of damage < 0.3"))
+
+    def test_fragments_keep_their_colour(self):
+        points = lattice((30, 20))
+        number = np.ones((3, 600))
+        number[1:, points[:, 0] > 0.015] = 16.0
+        number[2, 0] = 7.0
+        results = self.results((30, 20), fields={"fragment": ("1", "", number)})
+        self.assertEqual(set(values_of(results, "fragment", 1)), {0.0, 15.0})
+        last = values_of(results, "fragment", 2)
+        self.assertTrue(np.isnan(last[0]))
+        self.assertEqual(set(last[1:]), {0.0, 15.0})
+        self.check(results.plot(field="fragment", quiet=True), ["fragment_0002.png"])
 
     def test_layers_are_not_drawn(self):
         layer = np.zeros(600, dtype="i4")

@@ -84,6 +84,15 @@ class TestRun(unittest.TestCase):
             perifort.run(bar(steps=2), self.folder)
         self.assertIn("\r100.0 %", text.getvalue())
 
+    def test_interrupt_leaves_a_checkpoint(self):
+        def interrupt(line):
+            raise KeyboardInterrupt
+        with self.assertRaises(perifort.RunError) as caught:
+            perifort.run(bar(points=2000, steps=10000000), self.folder, threads=1,
+                         progress=interrupt)
+        self.assertEqual(caught.exception.status, 4)
+        self.assertTrue(list(self.folder.glob("*.checkpoint")))
+
     def test_program(self):
         with self.assertRaisesRegex(FileNotFoundError, "argument"):
             perifort.find_program(self.folder / "none")

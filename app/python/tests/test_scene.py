@@ -127,7 +127,8 @@ class TestScene(unittest.TestCase):
     def test_bad_values(self):
         scene = Scene(check=REFERENCE)
         for group, key, value, message in (
-                ("time", "steps", 1.5, "expected integer"), ("time", "steps", True, "expected integer"),
+                ("time", "steps", 1.5, "expected integer"),
+                ("time", "steps", True, "expected integer"),
                 ("time", "steps", [1, 2], "too many values"), ("body",
                  "lower", [0] * 4, "at most 3"),
                 ("scene", "title", 3, "expected text"), ("body", "upper", [], "expected a value"),

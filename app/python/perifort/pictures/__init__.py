@@ -39,13 +39,13 @@ def plot_results(results: Results, *, field: str | Sequence[str] | None = None,
                  quiet: bool = False) -> list[Path]:
     """Draw results and return the paths of the pictures.
 
-    `field`: only this field (or component, `stress_xy`), or these; by default all that say something,
-    and the curves of the history (`curves`: always or never). `component`: only this component, or
-    `magnitude`. `time` [s], in statics a load factor, or `output`, its number or 'all': by default
-    the last one. `clip`: the plane of the cut in 3D, `y` or `y=0.01`. `deform`: the factor of the
-    drawn displacements, by default one that shows them. `film`: 'mp4' or 'gif', a film of all outputs
-    of the fields, by default of one. `pdf`: files for print. `render`: 'pyvista' for surfaces drawn
-    by it. `to`: the folder, by default that of the results.
+    `field`: only this field (or component, `stress_xy`), or these; by default all that say
+    something, and the curves of the history (`curves`: always or never). `component`: only this
+    component, or `magnitude`. `time` [s], in statics a load factor, or `output`, its number or
+    'all': by default the last one. `clip`: the plane of the cut in 3D, `y` or `y=0.01`. `deform`:
+    the factor of the drawn displacements, by default one that shows them. `film`: 'mp4' or 'gif', a
+    film of all outputs of the fields, by default of one. `pdf`: files for print. `render`:
+    'pyvista' for surfaces drawn by it. `to`: the folder, by default that of the results.
     """
     view = View(results, deform, Clip.parse(clip) if clip else None, render)
     if film and (time is not None or output is not None):
@@ -83,8 +83,8 @@ def compare_results(results: Results, other: Results, *,
                     time: float | None = None, output: int | None = None, clip: str | None = None,
                     deform: float | None = None, pdf: bool = False, render: str = "matplotlib",
                     to: PathLike | None = None, quiet: bool = False) -> list[Path]:
-    """Two runs beside each other with the same colours, and their difference where they have the same
-    points; their histories in the same curves. Options as of `plot_results`.
+    """Two runs beside each other with the same colours, and their difference where they have the
+    same points; their histories in the same curves. Options as of `plot_results`.
     """
     cut = Clip.parse(clip) if clip else None
     first = View(results, deform, cut, render)
@@ -115,7 +115,8 @@ def compare_results(results: Results, other: Results, *,
             continue
         parts = names_of(results, name, component)
         first.share_colours([second], parts)
-        figure = _comparison(first, second, parts, k, j, same, names)
+        # Numbers of fragments have no difference
+        figure = _comparison(first, second, parts, k, j, same and base != "fragment", names)
         path = folder / f"compared_{_file(name, component)}_{k:04d}.{ending}"
         made.append(save(figure, path, quiet=quiet))
     if not field and not component:
@@ -171,7 +172,8 @@ class _Difference(Results):
 
 def _fields(results: Results, field: str | Sequence[str] | None, component: str | None, quiet: bool,
             most: int | None = None) -> list[str]:
-    """The fields to draw: those asked for, else all that say something, of these the first `most`."""
+    """The fields to draw: those asked for, else all that say something, of these the first `most`.
+    """
     if field:
         asked = [field] if isinstance(field, str) else list(field)
         for name in asked:

@@ -14,8 +14,8 @@ Array = npt.NDArray[Any]
 
 
 class Lattice:
-    """Points on a grid of one spacing in 1, 2 or 3 dimensions. `place` (n, dimension): whole numbers,
-    the cell of each point.
+    """Points on a grid of one spacing in 1, 2 or 3 dimensions. `place` (n, dimension): whole
+    numbers, the cell of each point.
     """
 
     def __init__(self, place: Array, spacing: float) -> None:
@@ -40,8 +40,8 @@ class Lattice:
 
     def edges(self, positions: Array) -> Array:
         """The edges of the deformed cells (n, direction, component): the distance to the next point
-        on that side where the deformation is the smaller one. Across a crack this is the distance on
-        the side of the body; a point that moves alone keeps its square.
+        on that side where the deformation is the smaller one. Across a crack this is the distance
+        on the side of the body; a point that moves alone keeps its square.
         """
         n, d = positions.shape
         found = np.empty((n, d, d))
@@ -62,9 +62,9 @@ class Lattice:
         return found
 
     def corners(self, positions: Array, of: Array | None = None) -> Array:
-        """The corners of the deformed cells (n, 2^dimension, component), in the order of `signs`, of
-        all points or those with the numbers `of`. Cells that hang together share their corners, so
-        that no gaps are left; across a crack they do not.
+        """The corners of the deformed cells (n, 2^dimension, component), in the order of `signs`,
+        of all points or those with the numbers `of`. Cells that hang together share their corners,
+        so that no gaps are left; across a crack they do not.
         """
         of = np.arange(len(positions)) if of is None else of
         own = positions[:, None] + 0.5 * np.einsum("sa,nac->nsc", self.signs, self.edges(positions))

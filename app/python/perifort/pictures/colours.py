@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from ..results import Results
 
-# Of the other fields a few points have values far from all others, which would take the whole range:
-# beside a crack or without enough bonds the gradient of the displacements is undefined, and splinters fly
+# Of the other fields a few points have values far from all others, which would take the whole
+# range: beside a crack or without enough bonds the gradient of the displacements is undefined, and
+# splinters fly
 WHOLE = ("damage", "fragment")
 PERCENTS = (0.5, 99.5)
 # Fields that follow from the gradient of the displacements, which has no meaning in broken places
@@ -43,8 +44,8 @@ def sampled(results: Results) -> list[int]:
 
 
 def judged(results: Results, field: str, output: int) -> npt.NDArray[np.bool_]:
-    """The points whose values set the limits of a field: those of the body, and of fields that follow
-    from the gradient those that are not broken, where the damage was written.
+    """The points whose values set the limits of a field: those of the body, and of fields that
+    follow from the gradient those that are not broken, where the damage was written.
     """
     body = results.body
     if field in GRADIENT and "damage" in results.fields:
@@ -85,6 +86,8 @@ def colours_of(field: str, parts: Iterable[npt.NDArray[Any]], broken: bool = Fal
     if field == "damage":
         largest = max((float(np.max(part, initial=0.0)) for part in parts), default=0.0)
         return Colours("magma_r", 0.0, 1.0 if largest > 0.5 else max(largest, 1e-12))
+    if field == "fragment":
+        return Colours("tab20", -0.5, 19.5, note="a colour for each, small ones grey")
     low, high, least, most = limits_of(parts, robust=field not in WHOLE)
     room = 1e-9 * max(abs(least), abs(most))
     ends = (least < low - room, most > high + room)
@@ -110,8 +113,8 @@ def colours_of(field: str, parts: Iterable[npt.NDArray[Any]], broken: bool = Fal
 
 
 def nice_scale(displacement: float, size: float) -> float:
-    """The factor by which displacements are drawn: 1 where they are seen as they are, else 1, 2 or 5
-    times a power of ten, so that the largest is about 5 per cent of the body's size.
+    """The factor by which displacements are drawn: 1 where they are seen as they are, else 1, 2 or
+    5 times a power of ten, so that the largest is about 5 per cent of the body's size.
     """
     if not displacement > 1e-14 * size or size <= 0.0:
         return 0.0

@@ -54,8 +54,8 @@ def _named(runs: Sequence[Results], run: Results, text: str) -> str:
 
 
 def _finish(panels: Sequence[Axes], label: str) -> None:
-    """The shared axis, grids, and legends above, where they hide no curve. A curve alone is named by
-    its axis.
+    """The shared axis, grids, and legends above, where they hide no curve. A curve alone is named
+    by its axis.
     """
     for axes in panels:
         axes.grid(alpha=0.3)

@@ -41,7 +41,8 @@ class Clip:
         """From `y` or `y=0.01`."""
         name, _, position = text.partition("=")
         if name.strip().lower() not in ("x", "y", "z"):
-            raise ValueError(f"'{text}' is no cut: expected x, y or z, or y=0.01 with a position [m]")
+            raise ValueError(f"'{text}' is no cut: expected x, y or z, or y=0.01 with a position "
+                             "[m]")
         try:
             return cls("xyz".index(name.strip().lower()), float(position) if position else None)
         except ValueError:
@@ -95,8 +96,8 @@ class View:
         return self._colours[name]
 
     def seen(self, output: int) -> Array:
-        """Positions of the body, without what has flown far from it, that a picture must hold: at this
-        output or, of steady pictures, at all.
+        """Positions of the body, without what has flown far from it, that a picture must hold: at
+        this output or, of steady pictures, at all.
         """
         rest = self.results.points[self.results.body]
         room = 0.6 * float(np.ptp(rest, axis=0).max())
@@ -165,6 +166,10 @@ def values_of(results: Results, name: str, output: int = -1) -> Array:
     """
     base = base_name(name)
     values = np.asarray(results.field(base, output), dtype=float)
+    if base == "fragment":
+        # Numbers of colours, the same for a fragment at all outputs; none for crumbs
+        _, which, sizes = np.unique(values, return_inverse=True, return_counts=True)
+        return np.where(sizes[which] > 3, (values - 1) % 20, np.nan)
     if values.ndim == 2:
         # Components off the diagonal of a symmetric tensor stand for two each
         names = results.components[results.split(base)[0]]
@@ -187,7 +192,8 @@ def unit_of(results: Results, name: str) -> str:
 
 
 def names_of(results: Results, name: str, component: str | None = None) -> list[str]:
-    """What is drawn of a field: a scalar, the components that are not zero, or the one asked for."""
+    """What is drawn of a field: a scalar, the components that are not zero, or the one asked for.
+    """
     base, given = results.split(base_name(name))
     parts = results.components[base]
     if given is not None or name != base or not parts:
@@ -198,14 +204,15 @@ def names_of(results: Results, name: str, component: str | None = None) -> list[
         return [name]
     if component:
         if component not in (*parts, "magnitude"):
-            raise KeyError(f"'{base}' has no component '{component}'{nearest(component, parts)}; it "
-                           f"has {', '.join(parts)}, and magnitude")
+            raise KeyError(f"'{base}' has no component '{component}'{nearest(component, parts)}; "
+                           f"it has {', '.join(parts)}, and magnitude")
         return [f"{base}_{component}"]
     largest = np.zeros(len(parts))
     for k in sampled(results):
         values = np.asarray(results.field(base, k))[results.body]
         with np.errstate(invalid="ignore"):
-            largest = np.fmax(largest, np.abs(np.where(np.isfinite(values), values, 0.0)).max(axis=0))
+            finite = np.where(np.isfinite(values), values, 0.0)
+            largest = np.fmax(largest, np.abs(finite).max(axis=0))
     # Directions the body does not have
     absent = ["xyz".index(part) >= results.dimension if part in "xyz" else False for part in parts]
     shown = [f"{base}_{part}" for part, size, none in zip(parts, largest, absent)
@@ -266,7 +273,8 @@ def _draw_line(axes: Axes, view: View, name: str, values: Array) -> None:
         axes.set_ylim(scale.factor * low - room, scale.factor * high + room)
     else:
         # The same everywhere: not the noise of it
-        axes.set_ylim(min(0.0, 2.0 * scale.factor * high), max(0.0, 2.0 * scale.factor * high) or 1.0)
+        twice = 2.0 * scale.factor * high
+        axes.set_ylim(min(0.0, twice), max(0.0, twice) or 1.0)
     axes.set_xlabel(along.label("x"), fontsize=FONT)
     axes.set_ylabel(scale.label(label_of(results, name)), fontsize=FONT)
     axes.grid(alpha=0.3)
@@ -339,8 +347,8 @@ def shape_of(limits: Sequence[tuple[float, float]]) -> float:
 
 
 def _label(axes: Axes, names: str, limits: Sequence[tuple[float, float]]) -> Scale:
-    """Limits, ticks and names of equal axes in a length that reads well, which is returned. Ticks are
-    round in that unit, and fewer on short sides, where their numbers would overlap.
+    """Limits, ticks and names of equal axes in a length that reads well, which is returned. Ticks
+    are round in that unit, and fewer on short sides, where their numbers would overlap.
     """
     axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
     scale = scale_of("m", limits)
@@ -394,6 +402,8 @@ def add_bar(axes: Axes, colours: Colours, factor: float, label: str,
     bar.ax.tick_params(labelsize=FONT - 1)
     bar.locator = MaxNLocator(4 if wide else 5, steps=[1, 2, 2.5, 5, 10])
     bar.update_ticks()
+    if colours.map == "tab20":
+        bar.set_ticks([])
     bar.outline.set_linewidth(0.5)
 
 
@@ -424,8 +434,8 @@ def camera_for(points: Array) -> Camera:
 
 def surface_of(view: View, name: str, output: int, camera: Camera,
                clip: Clip | None) -> tuple[Array, Array]:
-    """The outer faces (n, 4, 3) of the deformed body and their values; what lies in front of the cut
-    is left out. Points of clouds are small squares that face the eye.
+    """The outer faces (n, 4, 3) of the deformed body and their values; what lies in front of the
+    cut is left out. Points of clouds are small squares that face the eye.
     """
     results = view.results
     values = values_of(results, name, output)
@@ -462,8 +472,8 @@ def position_of(view: View, clip: Clip) -> float:
     if clip.at is None:
         return middle
     if not along.min() - view.spacing / 2 <= clip.at <= along.max() + view.spacing / 2:
-        raise ValueError(f"the cut at {'xyz'[clip.axis]} = {clip.at:g} m misses the body, which lies "
-                         f"between {along.min():.6g} and {along.max():.6g} m")
+        raise ValueError(f"the cut at {'xyz'[clip.axis]} = {clip.at:g} m misses the body, which "
+                         f"lies between {along.min():.6g} and {along.max():.6g} m")
     return clip.at
 
 
@@ -561,7 +571,8 @@ def cut_frame(view: View, output: int, clip: Clip) -> list[tuple[float, float]]:
 
 
 def clip_for(view: View, name: str) -> Clip:
-    """The cut that was asked for, or the plane through the middle that shows how the field varies."""
+    """The cut that was asked for, or the plane through the middle that shows how the field varies.
+    """
     if view.clip is not None:
         return view.clip
     results = view.results
@@ -654,7 +665,8 @@ def figure_of_panels(items: Sequence[tuple[View, str, int, str]], columns: int, 
         panels.append(panel_for(view, name, shape_of(limits), True, not solid))
     rows = [panels[k:k + columns] for k in range(0, len(panels), columns)]
     figure, places = lay_out(rows, width, bool(caption))
-    for (view, name, output, title), place in zip(items, [_there(p) for row in places for p in row]):
+    flat = [_there(place) for row in places for place in row]
+    for (view, name, output, title), place in zip(items, flat):
         if view.results.dimension == 3:
             draw_surface(place.axes, view, name, output, view.clip, place.bar)
             place.axes.set_title(title, fontsize=FONT)

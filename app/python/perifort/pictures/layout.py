@@ -1,5 +1,5 @@
-"""Where panels stand in a picture. Sizes are in inches, so that labels have room and bodies keep their
-shape whatever it is.
+"""Where panels stand in a picture. Sizes are in inches, so that labels have room and bodies keep
+their shape whatever it is.
 """
 from __future__ import annotations
 
@@ -78,8 +78,9 @@ def lay_out(rows: Sequence[Sequence[Panel | None]], width: float, caption: bool 
     total = np.array([sum(wide), sum(high) + above])
     figure = Figure(figsize=(float(total[0]), float(total[1])))
 
-    def box(left: float, bottom: float, across: float, up: float) -> tuple[float, ...]:
-        return (left / total[0], bottom / total[1], across / total[0], up / total[1])
+    def axes_at(left: float, bottom: float, across: float, up: float) -> Axes:
+        return figure.add_axes((float(left / total[0]), float(bottom / total[1]),
+                                float(across / total[0]), float(up / total[1])))
 
     found: list[list[Place | None]] = []
     top = total[1] - above
@@ -94,13 +95,13 @@ def lay_out(rows: Sequence[Sequence[Panel | None]], width: float, caption: bool 
             spare = wide[c] - panel.left - across - panel.right
             left = sum(wide[:c]) + panel.left + spare / 2
             bottom = top - panel.top - up - (height - panel.top - up - panel.bottom) / 2
-            axes = figure.add_axes(box(left, bottom, across, up))  # type: ignore[arg-type]
+            axes = axes_at(left, bottom, across, up)
             bar = None
             if panel.bar == "beside":
-                bar = figure.add_axes(box(left + across + 0.07, bottom, 0.1, up))  # type: ignore[arg-type]
+                bar = axes_at(left + across + 0.07, bottom, 0.1, up)
             elif panel.bar == "below":
                 down = 0.5 if panel.axes else 0.14
-                bar = figure.add_axes(box(left, bottom - down - 0.1, across, 0.1))  # type: ignore[arg-type]
+                bar = axes_at(left, bottom - down - 0.1, across, 0.1)
             places.append(Place(axes, bar))
         found.append(places)
         top -= height

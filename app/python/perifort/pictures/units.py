@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from ..results import Results
 
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "\u00b5"), (1e-9, "n"))
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "\u00b5"),
+            (1e-9, "n"))
 # Prefixes that read well before a unit, by the symbol it begins with; others have none
 USUAL = {"Pa": "GMk", "N": "GMkm\u00b5", "J": "Mkm\u00b5n", "W": "Mkm\u00b5", "s": "m\u00b5n",
          "m": "m\u00b5n", "m/s": "m\u00b5"}
