@@ -10,7 +10,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Union
+from typing import Union
 
 from .results import Results
 from .scene import Scene
@@ -91,29 +91,35 @@ def run(scene: Scene | PathLike, folder: PathLike | None = None, *, threads: int
 
 def _watch(command: list[str], progress: bool | Callable[[str], None]) -> tuple[int, str]:
     """Run a command; its exit status and what it wrote to standard error."""
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                               encoding="utf-8", errors="replace",
-                               # An interrupt at the terminal would reach it twice
-                               start_new_session=True)
-    assert process.stdout is not None and process.stderr is not None
+    output, given = _terminal() if progress else (-1, subprocess.DEVNULL)
+    try:
+        process = subprocess.Popen(command, stdout=given, stderr=subprocess.PIPE, text=True,
+                                   encoding="utf-8", errors="replace",
+                                   # An interrupt at the terminal would reach it twice
+                                   start_new_session=True)
+    finally:
+        if given >= 0:
+            os.close(given)
+    assert process.stderr is not None
     said: list[str] = []
     reader = threading.Thread(target=lambda stream: said.append(stream.read()), daemon=True,
                               args=(process.stderr,))
     reader.start()
     try:
         try:
-            _show(process.stdout, progress)
+            _show(output, progress)
             status = process.wait()
         except KeyboardInterrupt:
             # The program writes a checkpoint and ends with status 4
             process.send_signal(signal.SIGINT)
-            _show(process.stdout, progress is True)
+            _show(output, progress is True)
             status = process.wait()
     finally:
         if process.poll() is None:
             process.kill()
             process.wait()
-        process.stdout.close()
+        if output >= 0:
+            os.close(output)
         reader.join()
         process.stderr.close()
     message = "".join(said).strip()
@@ -123,17 +129,38 @@ def _watch(command: list[str], progress: bool | Callable[[str], None]) -> tuple[
     return status, message
 
 
-def _show(lines: IO[str], progress: bool | Callable[[str], None]) -> None:
+def _terminal() -> tuple[int, int]:
+    """Two ends of a terminal, to read from and to write to: on one the program shows its progress
+    several times a second, in a log every ten seconds. Where there are none, those of a pipe.
+    """
+    try:
+        return os.openpty()
+    except (AttributeError, OSError):
+        return os.pipe()
+
+
+def _show(output: int, progress: bool | Callable[[str], None]) -> None:
     """Show the program's lines of progress, one over the other, until it has closed its output."""
-    shown = False
-    for line in lines:
-        text = line.rstrip()
-        if not re.match(r"\s*\d+(\.\d+)? %", text):
-            continue
-        if callable(progress):
-            progress(text.strip())
-        elif progress:
-            print(f"\r{text:<79}", end="", flush=True)
-            shown = True
+    shown, rest = False, ""
+    while output >= 0:
+        try:
+            read = os.read(output, 4096)
+        except OSError:
+            # So a terminal tells that its other end is closed
+            read = b""
+        *lines, rest = re.split(r"[\r\n]+", rest + read.decode("utf-8", errors="replace"))
+        if not read:
+            lines.append(rest)
+        for line in lines:
+            text = re.sub(r"\x1b\[K", "", line).strip()
+            if not re.match(r"\d+(\.\d+)? %", text):
+                continue
+            if callable(progress):
+                progress(text)
+            elif progress:
+                print(f"\r{text:<79}", end="", flush=True)
+                shown = True
+        if not read:
+            break
     if shown:
         print(flush=True)
