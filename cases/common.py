@@ -10,93 +10,15 @@ import csv
 import hashlib
 import os
 import re
-import subprocess
 import sys
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "app" / "python"))
 
-class Results:
-    """The results of one run: points, volumes, fields of every output and the history.
-
-    `folder` is the folder of the results, or the .vtkhdf file itself. Arrays are numpy arrays in SI
-    units; positions and vectors have three components whatever the dimension.
-    """
-
-    def __init__(self, folder):
-        folder = Path(folder)
-        files = [folder] if folder.is_file() else sorted(folder.glob("*.vtkhdf"))
-        if not folder.exists():
-            raise FileNotFoundError(f"there is no folder or file {folder}")
-        if not files:
-            raise FileNotFoundError(f"{folder} holds no results: no file *.vtkhdf")
-        if len(files) > 1:
-            raise FileNotFoundError(f"{folder} holds {len(files)} files *.vtkhdf; name one of them: "
-                                    f"{', '.join(file.name for file in files)}")
-        self.path = files[0]
-        with h5py.File(self.path, "r") as file:
-            root = file["VTKHDF"]
-            self.points = root["Points"][()]
-            steps = root["Steps"]
-            self.outputs = int(steps.attrs["NSteps"])
-            self.times = steps["Values"][:self.outputs]
-            self.fields = sorted(root["PointData"])
-            self.field_units = {name: text(data.attrs.get("units", ""))
-                                for name, data in root["PointData"].items()}
-            # Names of the components; of scalars none
-            self.components = {name: text(data.attrs.get("components", "")).split()
-                               for name, data in root["PointData"].items()}
-            self.volume = file["points/volume"][()]
-            self.layer = file["points/layer"][()]
-            self.history = {name: data[()] for name, data in file["history"].items()}
-            self.units = {name: text(data.attrs.get("units", ""))
-                          for name, data in file["history"].items()}
-            # 'run', 'boundary' or 'probe': what a column belongs to
-            self.origins = {name: text(data.attrs.get("origin", ""))
-                            for name, data in file["history"].items()}
-            self.scene = text(file["scene/text"][()])
-
-    def field(self, name, output=-1):
-        """Values of a field at an output: (n) or (n, 3); negative outputs count from the last."""
-        if name not in self.fields:
-            raise KeyError(f"{self.path.name} has no field '{name}'; "
-                           f"it has {', '.join(self.fields)}")
-        k = range(self.outputs)[output]
-        n = len(self.points)
-        with h5py.File(self.path, "r") as file:
-            return file["VTKHDF/PointData"][name][k * n:(k + 1) * n]
-
-    def output_at(self, step, step_size):
-        """The number of the output after so many steps of that size."""
-        k = int(np.argmin(np.abs(self.times - step * step_size)))
-        if abs(self.times[k] - step * step_size) > 1e-6 * step_size * max(step, 1):
-            raise KeyError(f"{self.path.name} has no output after step {step}")
-        return k
-
-    def nearest(self, point):
-        """The number of the body point nearest to a position; ties go to the lowest number."""
-        position = np.zeros(3)
-        position[:len(point)] = point
-        distance = np.linalg.norm(self.points - position, axis=1) + np.where(self.layer > 0, np.inf,
-                                                                             0.0)
-        return int(np.flatnonzero(distance <= distance.min() * (1 + 1e-9) + 1e-15)[0])
-
-    def balance(self):
-        """Largest gap of the energy balance over the history, as a part of the largest energy in
-        it.
-        """
-        h = self.history
-        stored = h["kinetic_energy"] + h["strain_energy"] + h["dissipated_energy"]
-        gap = stored - stored[0] - (h["external_work"] - h["external_work"][0])
-        return np.abs(gap).max() / max(np.abs(stored).max(), np.abs(h["external_work"]).max())
-
-
-def text(value):
-    """A text of the file as str."""
-    return value.decode() if isinstance(value, bytes) else str(value)
+from perifort import Results, RunError, run  # noqa: E402
 
 
 def change(scene, group, **keys):
@@ -166,21 +88,18 @@ class Case:
         if self.options.reuse and stamp.is_file() and stamp.read_text() == mark:
             print(f"  {stem}: results of an earlier call", flush=True)
             return Results(output)
-        command = [self.program, "run", str(path), "--output", str(output), "--overwrite"]
-        if threads > 0:
-            command += ["--threads", str(threads)]
-        # A person sees the program's own progress; a log file has no use for it
-        if not sys.stdout.isatty():
-            command.append("--quiet")
         print(f"  {stem}: running ...", end="\n" if sys.stdout.isatty() else " ", flush=True)
         begin = time.time()
-        status = subprocess.run(command, check=False).returncode
-        if status != 0:
-            sys.exit(f"error: perifort ended with status {status} on {path}")
+        try:
+            # A log file has no use for lines of progress
+            results = run(path, output, threads=threads if threads > 0 else None, overwrite=True,
+                          progress=sys.stdout.isatty(), program=self.program)
+        except RunError as fault:
+            sys.exit(f"error: {path}: {fault}")
         self.run_times[stem] = time.time() - begin
         print(f"{self.run_times[stem]:.1f} s", flush=True)
         stamp.write_text(mark)
-        return Results(output)
+        return results
 
     def _row(self, what, value, target, tolerance, passed):
         self.rows.append((what, value, target, tolerance, "pass" if passed else "FAIL"))

@@ -1,317 +1,66 @@
 """Pictures of the results in a folder.
 
-    ./pf plot DIR [--field NAME ...] [--step N | all] [--magnify FACTOR] [--to FOLDER]
+    ./pf plot DIR [--field NAME ...] [--component C] [--time T | --step N | --step all]
+                  [--clip PLANE] [--deform FACTOR] [--film [mp4 | gif]] [--compare DIR2] [--pdf]
+                  [--render pyvista] [--to FOLDER]
 
-writes a picture of every field (1D: a curve over x; 2D: coloured points; 3D: all points and a cut
-through the middle) and the curves of the history: energies, probes, reactions; of explicit runs the
-balance of energies, of a relaxation the residual over its iterations. Of a study it draws error against time with the Pareto front, and error against each varied key. DIR
-is the folder of the results or of the study, or the .vtkhdf or study.csv file.
+draws what the package perifort does in app/python: fields on the deformed body and the curves of
+the history. Of a study it draws error against time with the Pareto front, and error against each
+varied key. DIR is the folder of the results or of the study, or the .vtkhdf or study.csv file.
 """
 import argparse
 import csv
-import re
 import sys
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-from matplotlib.collections import PolyCollection  # noqa: E402
-from matplotlib.ticker import MaxNLocator  # noqa: E402
-
-from common import Results  # noqa: E402
-
-
-def values_of(results, name, output=-1):
-    """Values (n) of a field, of a component of it ('displacement_x', 'NAME_xy'), or the magnitude
-    of a vector or tensor; and a label.
-    """
-    base, _, component = name.rpartition("_")
-    if name in results.fields:
-        base = name
-        values = results.field(name, output)
-        label = name.replace("_", " ")
-        if values.ndim == 2:
-            # Components off the diagonal of a symmetric tensor stand for two each
-            names = results.components[name]
-            times = [2 if len(set(c)) == 2 and c[::-1] not in names else 1 for c in names]
-            values, label = np.sqrt((values**2) @ times), f"|{label}|"
-    elif base in results.fields and component in results.components[base]:
-        values = results.field(base, output)[:, results.components[base].index(component)]
-        label = f"{base.replace('_', ' ')} {component}"
-    else:
-        raise KeyError(f"{results.path.name} has no field '{name}'; "
-                       f"it has {', '.join(results.fields)} "
-                       "(a vector's component: displacement_x)")
-    return values, label + in_brackets(results.field_units[base])
-
-
-def in_brackets(unit):
-    """A unit as an axis shows it, with raised exponents; nothing for a number without one."""
-    if unit in ("", "1"):
-        return ""
-    return " [" + re.sub(r"(\d+)", r"$^\1$", unit) + "]"
-
-
-def dimension_of(points):
-    """1, 2 or 3: directions in which the points differ."""
-    extent = np.ptp(points, axis=0)
-    used = extent > 1e-9 * extent.max()
-    return 3 if used[2] else 2 if used[1] else 1
-
-
-def spacing_of(results, dim):
-    """A typical distance between neighbours: exact on a lattice that fills its box."""
-    sample = results.points[:: max(1, len(results.points) // 2000)]
-    best = np.inf
-    # Sorted along x, then y, neighbours of a lattice are next to one another
-    for axis in range(dim):
-        steps = np.diff(np.unique(np.round(results.points[:, axis], 12)))
-        steps = steps[steps > 1e-6 * np.ptp(results.points[:, axis])]
-        if len(steps):
-            best = min(best, np.median(steps))
-    extent = np.ptp(results.points, axis=0)[:dim]
-    mean = (np.prod(np.maximum(extent, best)) / len(results.points))**(1 / dim)
-    # In a cloud coordinates hardly repeat, and the steps between them say nothing
-    return best if best > 0.2 * mean and len(sample) > 1 else mean
-
-
-def colours_of(values):
-    """Colour map and limits: blue to red about zero if both signs matter, else light to dark."""
-    low, high = float(values.min()), float(values.max())
-    if low < -0.05 * high < 0:
-        bound = max(-low, high)
-        return {"cmap": "RdBu_r", "vmin": -bound, "vmax": bound}
-    return {"cmap": "viridis", "vmin": min(low, 0.0) if high > 0 else low,
-            "vmax": high if high > low else low + 1}
-
-
-def positions_of(results, output, magnify):
-    """Positions moved by the displacement times a factor; reference positions without
-    displacement.
-    """
-    if magnify == 0.0 or "displacement" not in results.fields:
-        return results.points
-    return results.points + magnify * results.field("displacement", output)
-
-
-def draw_points(axis, positions, values, spacing, colours, size):
-    """Squares of a spacing's width in the plane; `size` (width, height) of the picture's axis in
-    inches.
-    """
-    low, high = positions.min(axis=0) - spacing / 2, positions.max(axis=0) + spacing / 2
-    inches = min(size[0] / (high[0] - low[0]), size[1] / (high[1] - low[1]))
-    # In units of the axis: markers are rounded to pixels and would leave white lines between them
-    side = max(spacing * 1.02, 0.8 / 72 / inches)
-    corners = side / 2 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    drawn = PolyCollection(positions[:, None, :2] + corners, array=values, cmap=colours["cmap"],
-                           linewidths=0, antialiaseds=False, rasterized=True)
-    drawn.set_clim(colours["vmin"], colours["vmax"])
-    axis.add_collection(drawn)
-    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    return drawn
+from common import Results
+from perifort import pictures
+from perifort.pictures.fields import View, draw_panel, draw_surface, figure_of_panels
+from perifort.pictures.layout import new_figure
 
 
 def draw(figure, place, results, name, output, title, magnify, window=None, limits=None):
-    """One panel: a field at an output. `place`: rows, columns, number; `window`: x and y limits
-    [m].
+    """One panel of a figure: a field at an output, `place`: rows, columns, number; `window`: x and
+    y limits [m]; `limits`: of the colours, in SI units.
     """
-    values, label = values_of(results, name, output)
-    dim = dimension_of(results.points)
-    positions = positions_of(results, output, magnify)
-    if dim == 1:
-        axis = figure.add_subplot(*place)
-        order = np.argsort(results.points[:, 0])
-        axis.plot(results.points[order, 0], values[order], linewidth=1)
-        axis.set(xlabel="x [m]", ylabel=label, title=title)
-        axis.grid(alpha=0.3)
-        return
-    spacing = spacing_of(results, dim)
-    width, height = figure.get_size_inches() / np.array([place[1], place[0]])
-    colours = colours_of(values)
+    view = View(results, magnify, window=window)
+    name = whole_name(results, name)
     if limits:
-        colours.update(vmin=limits[0], vmax=limits[1])
-    if dim == 3:
-        axis = figure.add_subplot(*place, projection="3d")
-        # More points than a picture can show only make it slow
-        shown = slice(None, None, max(1, len(positions) // 60000))
-        drawn = axis.scatter(*positions[shown].T, c=values[shown], s=4, linewidths=0,
-                             depthshade=False, **colours)
-        extent = np.ptp(positions, axis=0)
-        axis.set_box_aspect(np.maximum(extent, 0.05 * extent.max()), zoom=1.15)
-        # Labels of short sides would lie on top of one another
-        for side, length, ticks in zip("xyz", extent, (axis.xaxis, axis.yaxis, axis.zaxis)):
-            if length > 0.3 * extent.max():
-                ticks.set_label_text(f"{side} [m]")
-            else:
-                ticks.set_ticks([])
-        axis.tick_params(labelsize=6)
+        view.fix_colours(name, *limits)
+    axes = figure.add_subplot(*place)
+    if results.dimension == 3:
+        draw_surface(axes, view, name, output, bar=True)
+        axes.set_title(title, fontsize=9)
     else:
-        axis = figure.add_subplot(*place)
-        if window:
-            inside = np.all([(positions[:, c] >= window[c][0]) & (positions[:, c] <= window[c][1])
-                             for c in (0, 1)],
-                            axis=0)
-            positions, values = positions[inside], values[inside]
-        drawn = draw_points(axis, positions, values, spacing, colours, (0.7 * width, 0.75 * height))
-        axis.set(xlabel="x [m]", ylabel="y [m]")
-        axis.ticklabel_format(scilimits=(-2, 3))
-    axis.set_title(title, fontsize=10)
-    figure.colorbar(drawn, ax=axis, shrink=0.75 if dim == 2 else 0.5,
-                    pad=0.05 if dim == 2 else 0.12, label=label)
+        draw_panel(axes, view, name, output, title=title)
 
 
-def figure_of_fields(items, path, columns=1, magnify=0.0, panel=(5.0, 3.6), window=None,
+def whole_name(results, name):
+    """A vector without component means its magnitude."""
+    return f"{name}_magnitude" if name in results.fields and results.components[name] else name
+
+
+def figure_of_fields(items, path, columns=1, magnify=0.0, width=5.0, window=None,
                      limits=None, dpi=80):
     """One picture of several panels, each (results, field, title) or (results, field, title,
-    output).
+    output), and `width` inches wide.
     """
-    rows = -(-len(items) // columns)
-    figure = plt.figure(figsize=(panel[0] * columns, panel[1] * rows))
-    for number, (results, name, title, *output) in enumerate(items, 1):
-        draw(figure, (rows, columns, number), results, name, output[0] if output else -1, title,
-             magnify, window,
-             limits)
-    save(figure, path, dpi)
+    shown = []
+    for results, name, title, *output in items:
+        view = View(results, magnify, window=window)
+        name = whole_name(results, name)
+        if limits:
+            view.fix_colours(name, *limits)
+        shown.append((view, name, output[0] if output else -1, title))
+    save(figure_of_panels(shown, columns, width), path, dpi)
 
 
 def save(figure, path, dpi=90):
     """Write a picture and say so."""
-    figure.tight_layout()
-    figure.savefig(path, dpi=dpi)
-    plt.close(figure)
-    print(f"  wrote {path}")
-
-
-def field_picture(results, name, output, magnify, path):
-    """The picture of one field at one output."""
-    dim = dimension_of(results.points)
-    time = f"{results.times[output]:.6g}"
-    # In relaxation the time is the part of the load steps, not seconds
-    title = f"{results.path.stem}, " + (f"load steps done: {100 * float(time):.6g} %"
-                                        if "residual" in results.history else f"t = {time} s")
-    if dim == 1:
-        figure_of_fields([(results, name, title, output)], path, panel=(7.0, 3.6))
-        return
-    extent = np.ptp(results.points, axis=0)
-    if dim == 2:
-        height = np.clip(5.5 * extent[1] / extent[0], 2.5, 9.0)
-        figure_of_fields([(results, name, title, output)], path, magnify=magnify,
-                         panel=(7.5, height + 1.0))
-        return
-    figure = plt.figure(figsize=(11, 4.5))
-    draw(figure, (1, 2, 1), results, name, output, title, magnify)
-    cut, values, plane, label = middle_cut(results, name, output)
-    axis = figure.add_subplot(1, 2, 2)
-    drawn = draw_points(axis, cut, values, spacing_of(results, 3), colours_of(values), (3.5, 3.2))
-    axis.set(xlabel=f"{plane[0]} [m]", ylabel=f"{plane[1]} [m]")
-    axis.set_title(f"the layer next to the middle of {plane[2]}", fontsize=10)
-    figure.colorbar(drawn, ax=axis, shrink=0.6, label=label)
-    save(figure, path)
-
-
-def middle_cut(results, name, output):
-    """Points and values of the layer next to the middle of the thinnest direction, and the names of
-    the axes.
-    """
-    values, label = values_of(results, name, output)
-    extent = np.ptp(results.points, axis=0)
-    thin = 2 if extent[2] <= extent[1] else int(np.argmin(extent))
-    across = results.points[:, thin]
-    middle = 0.5 * (across.min() + across.max())
-    near = np.abs(across - middle)
-    layer = near <= near.min() + 0.25 * spacing_of(results, 3)
-    kept = [c for c in range(3) if c != thin]
-    return results.points[layer][:, kept], values[layer], ["xyz"[c] for c in (*kept, thin)], label
-
-
-def history_pictures(results, folder):
-    """Energies, of explicit runs with their balance; one picture for probes, one for reactions, and
-    of a relaxation one of its iterations.
-    """
-    h = results.history
-    relaxation = "residual" in h
-    if relaxation:
-        # One row for each load step: too few for a line alone
-        across, label, style = h["load_step"], "load step", {"marker": "o", "markersize": 3}
-        figure, axes = plt.subplots(figsize=(7.5, 4.5))
-        axes = [axes]
-        iterations_picture(results, folder)
-    else:
-        across, label, style = h["time"], "time [s]", {}
-        figure, axes = plt.subplots(2, 1, figsize=(7.5, 6), sharex=True, height_ratios=(3, 1))
-    energies = [name for name in h
-                if results.origins[name] == "run" and results.units[name] == "J"]
-    for name in energies:
-        if not (relaxation and name == "kinetic_energy"):
-            axes[0].plot(across, h[name], label=name.replace("_", " "), **style)
-    axes[0].set(ylabel="energy [J]")
-    axes[0].legend(fontsize=8)
-    if not relaxation:
-        stored = h["kinetic_energy"] + h["strain_energy"] + h["dissipated_energy"]
-        axes[1].plot(across, stored - stored[0] - h["external_work"] + h["external_work"][0])
-        axes[1].set(ylabel="balance [J]")
-    for axis in axes:
-        axis.grid(alpha=0.3)
-    finish_history(axes[-1], label, relaxation)
-    save(figure, folder / "energies.png")
-
-    reactions = [name for name in h
-                 if results.origins[name] == "boundary" and results.units[name] == "N"]
-    probes = [name for name in h if results.origins[name] == "probe"]
-    units = {}
-    for name in probes:
-        units.setdefault(results.units.get(name, ""), []).append(name)
-    groups = [("reactions", [("N", reactions)])] if reactions else []
-    if probes:
-        groups.append(("probes", list(units.items())))
-    for title, panels in groups:
-        figure, axes = plt.subplots(len(panels), 1, figsize=(7.5, 2.8 * len(panels) + 0.6),
-                                    sharex=True, squeeze=False)
-        for axis, (unit, names) in zip(axes[:, 0], panels):
-            for name in names:
-                axis.plot(across, h[name], linewidth=1, label=name.replace("_", " "), **style)
-            axis.set(ylabel=in_brackets(unit).strip() or "[-]")
-            axis.grid(alpha=0.3)
-            axis.legend(fontsize=8)
-        finish_history(axes[-1, 0], label, relaxation)
-        save(figure, folder / f"{title}.png")
-
-
-def finish_history(axis, label, relaxation):
-    """The axis that the panels of a history share: time, or whole numbers of load steps."""
-    axis.set(xlabel=label)
-    if relaxation:
-        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-
-
-def iterations_picture(results, folder):
-    """The way of a relaxation to its tolerance: residual and change of displacement over all
-    iterations of iterations.csv. Where a load step begins there is a vertical line.
-    """
-    path = results.path.parent / "iterations.csv"
-    if not path.is_file():
-        return
-    with open(path, newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    if not rows:
-        return
-    columns = {name: np.array([float(row[name]) for row in rows])
-               for name in ("step", "load_step", "residual", "change")}
-    figure, axis = plt.subplots(figsize=(7.5, 3.6))
-    for name, label in (("residual", "residual"), ("change", "change of displacement")):
-        shown = columns[name] > 0
-        axis.semilogy(columns["step"][shown], columns[name][shown], linewidth=1, label=label)
-    begins = np.flatnonzero(np.diff(columns["load_step"]) > 0) + 1
-    for number in begins if len(begins) <= 60 else ():
-        axis.axvline(columns["step"][number], color="0.7", linewidth=0.6, zorder=0)
-    axis.set(xlabel="iteration, of all load steps" if len(begins) else "iteration",
-             ylabel="relative [-]")
-    axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
-    save(figure, folder / "iterations.png")
+    if figure.get_layout_engine() is None:
+        figure.tight_layout()
+    pictures.save(figure, Path(path), dpi)
 
 
 RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "energy_drift", "pareto",
@@ -319,7 +68,8 @@ RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "ener
 
 
 class Study:
-    """The table of a study: its varied keys with their values as text, and its columns as arrays."""
+    """The table of a study: its varied keys with their values as text, and its columns as arrays.
+    """
 
     def __init__(self, path):
         self.path = Path(path)
@@ -362,7 +112,7 @@ class Study:
         return found
 
 
-def study_pictures(study, folder):
+def study_pictures(study, folder, ending="png"):
     """Error against time with the front, and error against each varied key."""
     error, seconds = study.columns["error"], study.columns["seconds"]
     if not study.shown.any():
@@ -371,7 +121,8 @@ def study_pictures(study, folder):
     line = max(study.keys, key=lambda key: (study.values(key) is not None,
                                             len({row[study.keys.index(key)]
                                                  for row in study.settings})))
-    figure, axis = plt.subplots(figsize=(7.5, 5))
+    figure = new_figure(7.5, 5)
+    axis = figure.subplots()
     for label, runs in study.families(line).items():
         runs = sorted(runs, key=lambda run: seconds[run])
         axis.loglog(seconds[runs], error[runs], "o-", markersize=4, linewidth=0.8, label=label)
@@ -386,9 +137,10 @@ def study_pictures(study, folder):
     axis.set(xlabel="time [s]", ylabel="error", title=f"the numbers are {line}")
     axis.grid(alpha=0.3, which="both")
     axis.legend(fontsize=7)
-    save(figure, folder / "study_time.png")
+    save(figure, folder / f"study_time.{ending}")
     for key in study.keys:
-        figure, axis = plt.subplots(figsize=(7.5, 4.2))
+        figure = new_figure(7.5, 4.2)
+        axis = figure.subplots()
         numbers = study.values(key)
         words = sorted({row[study.keys.index(key)] for row in study.settings})
         for label, runs in study.families(key).items():
@@ -412,7 +164,15 @@ def study_pictures(study, folder):
             if len(study.families(key)) > 5:
                 figure.set_size_inches(8.5, 6.5)
                 axis.legend(fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1))
-        save(figure, folder / f"study_{''.join(c if c.isalnum() else '_' for c in key)}.png")
+        save(figure, folder / f"study_{''.join(c if c.isalnum() else '_' for c in key)}.{ending}")
+
+
+def seconds(text):
+    """A time in seconds, or with a unit: 2e-5, 20us, 0.02ms; in statics a load factor."""
+    for unit, size in (("us", 1e-6), ("\u00b5s", 1e-6), ("ms", 1e-3), ("ns", 1e-9), ("s", 1.0)):
+        if text.endswith(unit):
+            return float(text[:-len(unit)]) * size
+    return float(text)
 
 
 def main():
@@ -421,39 +181,58 @@ def main():
     parser.add_argument("folder", metavar="DIR", type=Path)
     parser.add_argument("--field", action="append", metavar="NAME",
                         help="only this field, or component as displacement_x (may be repeated)")
-    parser.add_argument("--step", default="-1", metavar="N",
+    parser.add_argument("--component", metavar="C",
+                        help="only this component, as y or xy, or magnitude")
+    parser.add_argument("--time", type=seconds, metavar="T",
+                        help="the output nearest to this time, as 2e-5 or 20us, or load factor")
+    parser.add_argument("--step", metavar="N",
                         help="output number from 0, or 'all' (default: the last)")
-    parser.add_argument("--magnify", type=float, default=0.0, metavar="FACTOR",
-                        help="draw points moved by so many times their displacement (default 0)")
+    parser.add_argument("--clip", metavar="PLANE", help="cut of a 3D body: x, y, z, or y=0.01 [m]")
+    parser.add_argument("--deform", type=float, metavar="FACTOR",
+                        help="factor of the drawn displacements (default: one that shows them)")
+    parser.add_argument("--film", nargs="?", const="mp4", choices=("mp4", "gif"),
+                        help="a film of all outputs")
+    parser.add_argument("--compare", type=Path, metavar="DIR2", help="beside the results in DIR2")
+    parser.add_argument("--pdf", action="store_true", help="files for print")
+    parser.add_argument("--render", choices=("matplotlib", "pyvista"), default="matplotlib",
+                        help="what draws the surface of a 3D body")
     parser.add_argument("--to", type=Path, metavar="FOLDER",
                         help="where the pictures go (default: DIR)")
     options = parser.parse_args()
     try:
-        table = options.folder if options.folder.suffix == ".csv" else options.folder / "study.csv"
-        if table.is_file():
-            folder = options.to or table.parent
-            folder.mkdir(parents=True, exist_ok=True)
-            study_pictures(Study(table), folder)
-            if table == options.folder or not list(options.folder.glob("*.vtkhdf")):
-                return
-        results = Results(options.folder)
-        if options.step == "all":
-            outputs = range(results.outputs)
-        else:
-            outputs = [range(results.outputs)[int(options.step)]]
-        folder = options.to or results.path.parent
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in options.field or results.fields:
-            for output in outputs:
-                field_picture(results, name, output, options.magnify,
-                              folder / f"{name}_{output:04d}.png")
-        if not options.field:
-            history_pictures(results, folder)
-    except (OSError, KeyError) as fault:
+        plot(options)
+    except (OSError, KeyError, ImportError) as fault:
         sys.exit(f"error: {fault.args[-1] if isinstance(fault, KeyError) else fault}")
-    except (ValueError, IndexError):
-        sys.exit(f"error: --step {options.step} is no output's number: this file has "
-                 f"{results.outputs} outputs, numbered from 0")
+    except (ValueError, IndexError) as fault:
+        sys.exit(f"error: {fault}")
+
+
+def plot(options):
+    """What the options ask for."""
+    table = options.folder if options.folder.suffix == ".csv" else options.folder / "study.csv"
+    if table.is_file():
+        folder = options.to or table.parent
+        folder.mkdir(parents=True, exist_ok=True)
+        study_pictures(Study(table), folder, "pdf" if options.pdf else "png")
+        if table == options.folder or not list(options.folder.glob("*.vtkhdf")):
+            return
+    step = options.step
+    if step is not None and step != "all":
+        try:
+            step = int(step)
+        except ValueError:
+            raise ValueError(f"--step {step} is no output's number: expected a whole number or "
+                             "'all'") from None
+    results = Results(options.folder)
+    shared = {"field": options.field, "component": options.component, "time": options.time,
+              "output": step, "clip": options.clip, "deform": options.deform, "pdf": options.pdf,
+              "render": options.render, "to": options.to}
+    if options.compare:
+        if options.film or step == "all":
+            raise ValueError("--compare draws one output: leave out --film and --step all")
+        pictures.compare_results(results, Results(options.compare), **shared)
+    else:
+        pictures.plot_results(results, film=options.film, **shared)
 
 
 if __name__ == "__main__":

@@ -84,7 +84,7 @@ def main():
                           (runs["short"], "damage", "50 m/s, $\\delta = \\Delta$ (figure 7.7 a)"),
                           (runs["fast"], "damage",
                            "50 m/s, $\\delta = 3\\,\\Delta$ (figure 7.7 b)")],
-                         case.folder / "cracks.png", panel=(8.0, 3.6), window=window, dpi=80)
+                         case.folder / "cracks.png", width=6.0, window=window, dpi=110)
     case.finish()
 
 

@@ -57,7 +57,7 @@ def main():
                           (runs["state_based"], "displacement_x",
                            "state-based, $\\nu = 1/4$: $u_x$"),
                           (runs["state_based"], "displacement_y", "$u_y$")],
-                         case.folder / "plate.png", columns=2, panel=(5.0, 2.5))
+                         case.folder / "plate.png", columns=2, width=4.5, dpi=100)
     case.finish()
 
 
