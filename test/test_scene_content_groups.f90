@@ -182,7 +182,7 @@ contains
 
   subroutine test_unknown(error)
     type(error_type), allocatable, intent(out) :: error
-    call expect_fault(error, windy, 'unknown group &wind|a/b.nml:5|known: scene, body')
+    call expect_fault(error, windy, 'unknown group &wind|a/b.nml:5|known: scene, define')
   end subroutine test_unknown
 
   subroutine test_write(error)
@@ -308,11 +308,11 @@ contains
       call table%add('wind_'//achar(96 + i), 'One of many.', .true., wind_group(speed=real(i, wp)))
     end do
     copy = table
-    call check(error, copy%count, 42)
+    call check(error, copy%count, 43)
     if (allocated(error)) return
     call check(error, copy%place_of('body'), 2)
     if (allocated(error)) return
-    call check(error, copy%place_of('wind_z'), 42)
+    call check(error, copy%place_of('wind_z'), 43)
     if (allocated(error)) return
     call copy%describe('wind_t', keys)
     call check(error, keys%known(2)%default, '20.0')
