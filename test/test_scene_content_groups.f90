@@ -310,7 +310,7 @@ contains
     copy = table
     call check(error, copy%count, 43)
     if (allocated(error)) return
-    call check(error, copy%place_of('body'), 2)
+    call check(error, copy%place_of('body'), 3)
     if (allocated(error)) return
     call check(error, copy%place_of('wind_z'), 43)
     if (allocated(error)) return
