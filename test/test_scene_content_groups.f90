@@ -182,7 +182,7 @@ contains
 
   subroutine test_unknown(error)
     type(error_type), allocatable, intent(out) :: error
-    call expect_fault(error, windy, 'unknown group &wind|a/b.nml:5|known: scene, body')
+    call expect_fault(error, windy, 'unknown group &wind|a/b.nml:5|known: scene, define')
   end subroutine test_unknown
 
   subroutine test_write(error)
@@ -311,7 +311,7 @@ contains
     copy = table
     call check(error, copy%count, known + 26)
     if (allocated(error)) return
-    call check(error, copy%place_of('body'), 2)
+    call check(error, copy%place_of('body'), 3)
     if (allocated(error)) return
     call check(error, copy%place_of('wind_z'), known + 26)
     if (allocated(error)) return

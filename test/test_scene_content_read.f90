@@ -173,8 +173,8 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     call expect_fault(error, good_head//'&tine steps = 1 /', &
-      & "unknown group &tine|a/b.nml:4|^^^^^ did you mean '&time'?|known: scene, body")
-    call expect_fault(error, '&physics /', 'unknown group &physics|a/b.nml:1|known: scene, body')
+      & "unknown group &tine|a/b.nml:4|^^^^^ did you mean '&time'?|known: scene, define")
+    call expect_fault(error, '&physics /', 'unknown group &physics|a/b.nml:1|known: scene, define')
   end subroutine test_unknown_group
 
   subroutine test_twice(error)
