@@ -74,7 +74,8 @@ contains
     do i = 1, size(names)
       field = table%field(names(i))
       call expect_true(error, table%number_of(names(i)) == i .and. field%name == names(i) .and. &
-        & field%unit /= '' .and. field%meaning /= '' .and. associated(field%fill), &
+        & field%unit /= '' .and. field%meaning /= '' .and. (associated(field%fill) .or. &
+        & associated(field%of_gradient)), &
         & 'the entry of '//trim(names(i)))
     end do
     call read_text_file('doc/user-guide.md', guide, fault)

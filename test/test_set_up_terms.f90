@@ -197,8 +197,8 @@ contains
           system%state%v(k, 1) = system%state%u(k, 1)*x*c/width
         end do
         diary%every = 1000
-        call run_explicit(system, 'forward_backward', dt, nint(merge(0.9_wp, 0.75_wp, dim == 1)*n*spacing/(c*dt)), diary, &
-          & fault)
+        call run_explicit(system, 'forward_backward', dt, nint(merge(0.9_wp, 0.75_wp, dim == 1) &
+          & *n*spacing/(c*dt)), diary, fault)
         if (allocated(fault)) then
           call test_failed(error, fault%message)
           return

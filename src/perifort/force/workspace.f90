@@ -68,8 +68,8 @@ module pd_force_workspace
     integer(i1), allocatable :: large(:)       !! how far clusters were strained in the last pass
   end type list_workspace_type
 
-  !> Of the generic pass, on any family (`pd_force_generic_pass`). Values of bonds are in the order of
-  !> `bonds_of`.
+  !> Of the generic pass, on any family (`pd_force_generic_pass`). Values of bonds are in the order
+  !> of `bonds_of`.
   type :: generic_workspace_type
     integer(i8), allocatable :: start(:)       !! first bond of each slot (n_slots + 1)
     integer(i8), allocatable :: partner(:)     !! the same bond at its other end

@@ -19,8 +19,8 @@ module pd_set_up_conditions
   use pd_motion_heating, only: heating_type, new_heating, new_timed_heat, timed_heat_type
   implicit none (type, external)
   private
-  public :: volume_of, motions_of_scene, loads_of_scene, heating_of_scene, region_mask, no_fail_mask, &
-    & in_no_fail_zones
+  public :: volume_of, motions_of_scene, loads_of_scene, heating_of_scene, region_mask, &
+    & no_fail_mask, in_no_fail_zones
 
   character(*), parameter :: xyz = 'xyz'
 

@@ -17,8 +17,8 @@ module pd_set_up_terms
 
 contains
 
-  !> The weight of all points, layers included, as one load; none without `gravity`. In relaxation it
-  !> grows over the load steps.
+  !> The weight of all points, layers included, as one load; none without `gravity`. In relaxation
+  !> it grows over the load steps.
   subroutine gravity_of_scene(scene, body, materials, loads)
     type(scene_type), intent(in) :: scene            !! a checked scene
     type(body_type), intent(in) :: body              !! its points, arranged in slots
@@ -59,8 +59,8 @@ contains
 
   !> Dashpots in the layer of every absorbing `&boundary` (doc/theory.md, 10): per area of the side
   !> rho c_p along its normal, rho c_s across it. Of the n rows of a layer the two act that are next
-  !> to a distance of 0.2 (n - 2) (1 + (n - 3)/6) rows from the outermost one: there the mass of what
-  !> lies beyond balances the softness of the incomplete families.
+  !> to a distance of 0.2 (n - 2) (1 + (n - 3)/6) rows from the outermost one: there the mass of
+  !> what lies beyond balances the softness of the incomplete families.
   subroutine add_dashpots_of_scene(scene, body, materials, motions, terms)
     type(scene_type), intent(in) :: scene            !! a checked scene
     type(body_type), intent(in) :: body              !! its points, arranged in slots

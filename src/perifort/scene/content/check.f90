@@ -67,8 +67,8 @@ contains
       end do
     end associate
     if (any(is_set(scene%header%gravity))) then
-      call check_vector(scene%header%gravity, scene%header%dimension, 'gravity', 'scene', 1, error, &
-        & source)
+      call check_vector(scene%header%gravity, scene%header%dimension, 'gravity', 'scene', 1, &
+        & error, source)
       if (allocated(error)) return
     end if
     do i = 1, size(scene%no_fail)

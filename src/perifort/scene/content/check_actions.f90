@@ -210,8 +210,9 @@ contains
       call check_vector(load%stiffness, d, 'stiffness', 'load', number, error, source)
       if (allocated(error)) return
       if (any(load%stiffness(:d) < 0.0_wp) .or. .not. any(load%stiffness(:d) > 0.0_wp)) then
-        call rule_fault(error, 'load', number, 'stiffness', "'stiffness' is negative, or 0 along "// &
-          & 'all directions', 'expected values of at least 0 N/m, one of them positive', source)
+        call rule_fault(error, 'load', number, 'stiffness', "'stiffness' is negative, or 0 "// &
+          & 'along all directions', 'expected values of at least 0 N/m, one of them positive', &
+          & source)
       else if (.not. loads_anything(load) .and. (is_set(load%ramp_time) .or. &
         & allocated(load%times))) then
         call rule_fault(error, 'load', number, trim(merge('times    ', 'ramp_time', &

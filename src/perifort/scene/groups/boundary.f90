@@ -44,8 +44,8 @@ contains
       & group%displacement_text)
     call keys%triple('velocity', group%velocity, 'm/s', 'imposed velocity', 'free', &
       & group%velocity_text)
-    call keys%key('absorbing', group%absorbing, 'side: the layer is free and takes in waves that '// &
-      & 'meet the side')
+    call keys%key('absorbing', group%absorbing, 'side: the layer is free and takes in waves '// &
+      & 'that meet the side')
     call visit_course(keys, group%ramp_time, group%times, group%values)
   end subroutine visit
 

@@ -44,8 +44,8 @@ contains
       & group%force_text)
     call keys%triple('body_force', group%body_force, 'N/m3', 'force density', '0', &
       & group%body_force_text)
-    call keys%key('stiffness', group%stiffness, 'N/m', 'total stiffness of springs that pull the '// &
-      & 'points back, along each direction', default='none')
+    call keys%key('stiffness', group%stiffness, 'N/m', 'total stiffness of springs that pull '// &
+      & 'the points back, along each direction', default='none')
     call visit_course(keys, group%ramp_time, group%times, group%values)
   end subroutine visit
 

@@ -39,7 +39,7 @@ module pd_study_limits_limits
     real(wp) :: equation = 0.0_wp      !! 7.25 with surface factors
     real(wp) :: most = 0.0_wp          !! its largest value over the points
     real(wp) :: printed = 0.0_wp       !! 7.25 as printed; 0: its sum is negative somewhere
-    logical :: chapter = .true.        !! the laws are the chapter's, so that it has a value as printed
+    logical :: chapter = .true.        !! the laws are the chapter's, which 7.25 is for
     integer :: slot = 0                !! where `equation` is least
     integer :: printed_slot = 0        !! where `printed` is
     real(wp) :: spectral = 0.0_wp      !! 2/omega of the body as it is
@@ -175,7 +175,8 @@ contains
     text = text//'  7.25 as used     '//with_unit(limits%equation, 's', 6)//', least at '// &
       & where_is(system, limits%slot)//'; elsewhere up to '//with_unit(limits%most, 's', 4)//newline
     if (.not. limits%chapter) then
-      text = text//"  7.25 as printed  is for the chapter's laws with influence = 'inverse'"//newline
+      text = text//"  7.25 as printed  is for the chapter's laws with influence = 'inverse'"// &
+        & newline
     else if (limits%printed > 0.0_wp) then
       text = text//'  7.25 as printed  '//with_unit(limits%printed, 's', 6)//', least at '// &
         & where_is(system, limits%printed_slot)//', without surface factors'//newline

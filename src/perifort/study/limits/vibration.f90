@@ -79,7 +79,8 @@ contains
       call internal_fault('free_body does not know a kind of family')
     end select
     call new_model(twin%body, materials, system%model%projected, &
-      & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), twin%model, laws)
+      & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), &
+      & twin%model, laws)
     twin%model%surface = system%model%surface
     if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
       & twin%model%S, laws)
