@@ -108,7 +108,7 @@ contains
       & 'text outside of any group|a/b.nml:2|closed &scene')
     call expect_fault(error, '&body file = cloud/points.txt /', 'outside|a/b.nml:1|needs quotes')
     call expect_fault(error, '& scene /', "'&' without the name|a/b.nml:1")
-    call expect_fault(error, '! nothing', 'no groups|a/b.nml|scene, body')
+    call expect_fault(error, '! nothing', 'no groups|a/b.nml|scene, define, body')
     call expect_fault(error, '', 'no groups')
   end subroutine test_outside
 
