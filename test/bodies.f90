@@ -14,7 +14,7 @@ module bodies
   use testdrive, only: error_type, test_failed
   use pd_output_report_before, only: foresee_output
   use pd_output_fields_table, only: all_fields
-  use pd_output_report_probes, only: probe_type
+  use pd_output_measures_measure, only: measure_list_type
   implicit none (type, external)
   private
   public :: prepare_run, box_scene, ready, ready_alone, expect, expect_true, noise, shake, &
@@ -201,9 +201,9 @@ contains
     type(scene_type), intent(in) :: scene
     type(set_up_type), intent(out) :: set_up
     type(fault_type), allocatable, intent(out) :: error
-    type(probe_type), allocatable :: probes(:)
+    type(measure_list_type) :: measures
     call prepare(scene, set_up, error)
-    if (.not. allocated(error)) call foresee_output(scene, all_fields(), set_up, probes, error)
+    if (.not. allocated(error)) call foresee_output(scene, all_fields(), set_up, measures, error)
   end subroutine prepare_run
 
 end module bodies

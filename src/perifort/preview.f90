@@ -13,7 +13,7 @@ module pd_preview
   use pd_output_report_columns, only: history_columns
   use pd_output_report_estimate, only: estimate
   use pd_output_report_overview, only: overview
-  use pd_output_report_probes, only: probe_type
+  use pd_output_measures_measure, only: measure_list_type
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of, schedule_type
   use pd_output_report_say, only: say
   use pd_output_report_summary, only: checkpoint_line, summary_before
@@ -72,23 +72,23 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable, intent(out) :: text
     type(set_up_type) :: set_up
-    type(probe_type), allocatable :: probes(:)
+    type(measure_list_type) :: measures
     character(:), allocatable :: times
 
     text = ''
     call check_names(scene, fields_of(options), error)
     if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
-    call foresee_output(scene, fields_of(options), set_up, probes, error)
+    call foresee_output(scene, fields_of(options), set_up, measures, error)
     if (allocated(error)) return
     associate (system => set_up%system, plan => set_up%plan)
-      call tell(summary_before(scene, system, plan, probes, set_up%cut, &
+      call tell(summary_before(scene, system, plan, measures, set_up%cut, &
         & set_up%warnings, set_up%notes, set_up%team%threads()))
       call tell_lines(overview(scene, system, .not. plan%relaxes))
       call estimate(scene, fields_of(options), system, plan, &
         & schedule_of(scene, plan, system%family%n_bonds), set_up%timer%total(), times)
       call tell_lines(times)
-      call tell(checkpoint_line(scene, bytes_of_checkpoint(scene, set_up, probes)))
+      call tell(checkpoint_line(scene, bytes_of_checkpoint(scene, set_up, measures)))
     end associate
 
   contains
@@ -109,10 +109,10 @@ contains
 
   !> Bytes of the last checkpoint of a run, which has all that it carries, or of a relaxation's
   !> largest.
-  integer(i8) function bytes_of_checkpoint(scene, set_up, probes) result(bytes)
+  integer(i8) function bytes_of_checkpoint(scene, set_up, measures) result(bytes)
     type(scene_type), intent(in) :: scene
     type(set_up_type), intent(inout) :: set_up
-    type(probe_type), intent(in) :: probes(:)
+    type(measure_list_type), intent(inout) :: measures  !! unchanged
     type(about_type) :: about
     type(schedule_type) :: schedule
     integer :: columns
@@ -120,11 +120,11 @@ contains
     associate (system => set_up%system, plan => set_up%plan)
       schedule = schedule_of(scene, plan, system%family%n_bonds)
       about = new_about(scene_text(scene), 0_i8, plan%steps, plan%step)
-      columns = size(history_columns(system, probes, plan%relaxes))
+      columns = size(history_columns(system, measures, plan%relaxes))
       allocate (about%kept%rows(columns, 0), about%kept%times(0))
       call take_all_memory(system, plan)
       ! rows and times are counted and not made: a long run may have more than fit into the memory
-      bytes = checkpoint_bytes(about, system) + 8*(int(columns, i8)*planned_rows(schedule) &
+      bytes = checkpoint_bytes(about, system, measures) + 8*(int(columns, i8)*planned_rows(schedule) &
         & + planned_outputs(schedule, plan%step))
     end associate
   end function bytes_of_checkpoint

@@ -1,7 +1,7 @@
 !> The output of one run, from what is there of earlier ones to the last word: the driver's partner.
 !>
 !>     call output%look_back(scene, options, error)   ! earlier results, a checkpoint to start from
-!>     call output%foresee(scene, options, set_up, error)      ! probes, schedule, warnings
+!>     call output%foresee(scene, options, set_up, error)      ! measures, schedule, warnings
 !>     call output%open(scene, options, set_up, error)
 !>     ...                                            ! the motion, seen by output%recorder
 !>     call output%close(scene, options, set_up, error)
@@ -18,7 +18,7 @@ module pd_output_run
   use pd_output_report_before, only: foresee_output
   use pd_output_report_begin, only: command_of, fields_of, keep_checkpoints, open_recorder, &
     & output_directory, run_options_type, stem_of, text_of
-  use pd_output_report_probes, only: probe_type
+  use pd_output_measures_measure, only: measure_list_type
   use pd_output_report_recorder, only: recorder_type
   use pd_output_report_say, only: say
   use pd_output_report_summary, only: summary_before
@@ -37,7 +37,7 @@ module pd_output_run
     type(recorder_type) :: recorder           !! sees the motion
     logical :: complete = .false.             !! there is nothing to compute: all is there already
     type(restart_type), private :: restart
-    type(probe_type), allocatable, private :: probes(:)
+    type(measure_list_type), private :: measures  !! of the history
     character(:), allocatable, private :: directory  !! '' = no files
     character(:), allocatable, private :: stem
   contains
@@ -81,7 +81,7 @@ contains
     type(run_options_type), intent(in) :: options
     type(set_up_type), intent(inout) :: set_up
     type(error_type), allocatable, intent(out) :: error
-    call foresee_output(scene, fields_of(options), set_up, self%probes, error)
+    call foresee_output(scene, fields_of(options), set_up, self%measures, error)
   end subroutine foresee
 
   !> Set the system to the state of its checkpoint, if there is one, print the summary, and open the
@@ -97,18 +97,19 @@ contains
 
     associate (system => set_up%system, plan => set_up%plan, recorder => self%recorder)
       start = checksum_of_start(system)
-      if (self%restart%found) call put_back(self%restart, scene, system, plan, error)
+      if (self%restart%found) call put_back(self%restart, scene, system, plan, &
+        & self%measures, error)
       if (allocated(error)) return
       self%complete = self%restart%complete
       if (self%complete) then
         call say('  complete        the run has as many steps already', options%quiet)
         return
       end if
-      call say(summary_before(scene, system, plan, self%probes, set_up%cut, set_up%warnings, &
+      call say(summary_before(scene, system, plan, self%measures, set_up%cut, set_up%warnings, &
         & set_up%notes, set_up%team%threads()), options%quiet)
       recorder%timer = set_up%timer
       recorder%team = set_up%team
-      recorder%probes = self%probes
+      recorder%measures = self%measures
       recorder%warnings = set_up%warnings
       call open_recorder(scene, options, system, plan, self%directory, self%stem, self%restart, &
         & recorder, in_memory, error)

@@ -14,6 +14,7 @@ module pd_output_checkpoint_checkpoint
   use pd_motion_keep, only: keep_system
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_file, only: meter_type, writer_type
+  use pd_output_measures_measure, only: measure_list_type
   use pd_output_results_files, only: file_exists, in_directory, remove_file, rename_file, sync_path
   use pd_output_results_types, only: kept_type
   implicit none (type, external)
@@ -124,13 +125,15 @@ contains
   end subroutine remove_checkpoints
 
   !> Bytes of a checkpoint.
-  integer(i8) function checkpoint_bytes(about, system) result(bytes)
+  integer(i8) function checkpoint_bytes(about, system, measures) result(bytes)
     type(about_type), intent(inout) :: about    !! as it is to be written; unchanged
     type(system_type), intent(inout) :: system  !! as it is to be written; unchanged
+    type(measure_list_type), intent(inout) :: measures  !! of the history; unchanged
     type(meter_type) :: meter
 
     call keep_about(meter, about)
     call keep_system(meter, system)
+    call measures%keep(meter)
     bytes = meter%bytes
   end function checkpoint_bytes
 
@@ -174,11 +177,12 @@ contains
 
   !> Write the next one. An error if it cannot be written or brought to the disk; those before it
   !> are then as they were.
-  subroutine write_checkpoint(self, about, system, error)
+  subroutine write_checkpoint(self, about, system, measures, error)
     class(checkpoint_type), intent(inout) :: self  !! the checkpoints of the run, with one more on
                                                    !! return
     type(about_type), intent(inout) :: about       !! what is kept beside the system; unchanged
     type(system_type), intent(inout) :: system     !! what is to be kept; unchanged
+    type(measure_list_type), intent(inout) :: measures  !! of the history; unchanged
     type(error_type), allocatable, intent(out) :: error
     type(error_type), allocatable :: ignored
     type(writer_type) :: writer
@@ -187,9 +191,10 @@ contains
     part = self%path//'.part'
     self%last = wall_time()
     self%last_step = about%step
-    call writer%create(part, checkpoint_bytes(about, system))
+    call writer%create(part, checkpoint_bytes(about, system, measures))
     call keep_about(writer, about)
     call keep_system(writer, system)
+    call measures%keep(writer)
     call writer%finish(error)
     if (.not. allocated(error) .and. self%keep_newest .and. file_exists(self%path)) &
       & call rename_file(self%path, older_path(self%path), error)

@@ -12,6 +12,7 @@ module pd_output_checkpoint_restart
   use pd_output_checkpoint_file, only: reader_type
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, refuse_existing, &
     & scene_of_results, unfinished
+  use pd_output_measures_measure, only: measure_list_type
   use pd_output_results_files, only: file_exists, in_directory
   use pd_scene_content_compare, only: difference_type, scene_differences
   use pd_scene_content_groups, only: table_of
@@ -240,7 +241,7 @@ contains
   !> Set a system made from the scene to the state of the checkpoint, and the plan to its time step.
   !> An error if the points or the initial state are others, if the checkpoint is beyond the end of
   !> the run, or if it does not hold what the system needs.
-  subroutine put_back(restart, scene, system, plan, error)
+  subroutine put_back(restart, scene, system, plan, measures, error)
     type(restart_type), intent(inout) :: restart  !! with the checkpoint's file open; closed on
                                                   !! return
     type(scene_type), intent(in) :: scene         !! the present one, for its duration
@@ -248,6 +249,8 @@ contains
                                                   !! checkpoint on return
     type(plan_type), intent(inout) :: plan        !! gets time step and number of steps, unless it
                                                   !! is a relaxation
+    type(measure_list_type), intent(inout) :: measures  !! of the history, begun; as in the
+                                                        !! checkpoint on return
     type(error_type), allocatable, intent(out) :: error
 
     if (checksum_of_start(system) /= restart%about%start) then
@@ -263,6 +266,7 @@ contains
     end if
     if (.not. allocated(error)) then
       call keep_system(restart%reader, system)
+      call measures%keep(restart%reader)
       if (allocated(restart%reader%error)) call move_alloc(restart%reader%error, error)
     end if
     call restart%reader%close()

@@ -41,7 +41,7 @@ module pd_output_report_begin
 
 contains
 
-  !> Files, history and progress of a run, whose probes the recorder has. With `in_memory` the last
+  !> Files, history and progress of a run, whose measures the recorder has. With `in_memory` the last
   !> output stays in memory, too.
   subroutine open_recorder(scene, options, system, plan, directory, stem, restart, recorder, &
     & in_memory, error)
@@ -78,7 +78,7 @@ contains
       call recorder%results%create(directory, stem, positions, &
         & [(recorder%fields(f)%in_file(body%dim), f=1, size(recorder%fields))], &
         & planned_outputs(schedule, plan%step), &
-        & history_columns(system, recorder%probes, plan%relaxes), planned_rows(schedule), &
+        & history_columns(system, recorder%measures, plan%relaxes), planned_rows(schedule), &
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
         & program_version, options%overwrite .or. options%restart, error, kept)
       if (allocated(error)) return

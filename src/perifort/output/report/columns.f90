@@ -1,28 +1,19 @@
-!> The columns of the history: a table of what every run has, then the reaction forces of boundaries
-!> with a name, then the fields of the probes.
+!> The columns of the history: a table of what every run has, then those of the measures
+!> (`pd_output_measures_measure`).
 module pd_output_report_columns
   use pd_base_kinds, only: wp
   use pd_base_reduce, only: largest_over
   use pd_force_generic_points, only: has_plasticity
   use pd_law_laws, only: law_table_type
-  use pd_motion_observer, only: instant_type
-  use pd_motion_system, only: energies_type, system_type
-  use pd_output_fields_field, only: moment_type
-  use pd_output_report_probes, only: probe_columns, probe_row, probe_type
+  use pd_motion_system, only: system_type
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_measures_measure, only: measure_list_type, row_source_type
+  use pd_output_measures_table, only: measures_of
   use pd_output_results_types, only: column_type
   use pd_scene_content_types, only: laws_of, scene_type
   implicit none (type, external)
   private
-  public :: history_table_type, history_table, history_columns, history_row, columns_of_scene, &
-    & row_source_type
-
-  character(*), parameter :: xyz(3) = ['x', 'y', 'z']
-
-  !> What a row is taken from.
-  type, extends(moment_type) :: row_source_type
-    type(instant_type) :: instant
-    type(energies_type) :: energies      !! at this instant
-  end type row_source_type
+  public :: history_table_type, history_table, history_columns, history_row, columns_of_scene
 
   !> A column that every run has, or every relaxation.
   type :: entry_type
@@ -82,36 +73,29 @@ contains
   end subroutine put
 
   !> The columns of the history, in the order of `history_row`.
-  function history_columns(system, probes, relaxation) result(columns)
+  function history_columns(system, measures, relaxation) result(columns)
     type(system_type), intent(in) :: system
-    type(probe_type), intent(in) :: probes(:)
+    type(measure_list_type), intent(in) :: measures
     logical, intent(in) :: relaxation
     type(column_type), allocatable :: columns(:)
     type(history_table_type) :: table
-    integer :: i
 
     table = history_table(relaxation, has_plasticity(system%model))
-    columns = table%entries%column
-    do i = 1, size(system%motions)
-      columns = [columns, reactions_of(system%motions(i)%name, system%body%dim)]
-    end do
-    do i = 1, size(probes)
-      columns = [columns, probe_columns(probes(i), system%body%dim)]
-    end do
+    columns = [table%entries%column, measures%columns(system%body%dim)]
   end function history_columns
 
   !> The columns that a scene's history will have, without those of probes.
-  function columns_of_scene(scene) result(columns)
-    type(scene_type), intent(in) :: scene
+  function columns_of_scene(scene, fields) result(columns)
+    type(scene_type), intent(in) :: scene         !! a checked scene, whose fields are known
+    type(field_table_type), intent(in) :: fields  !! that it may name
     type(column_type), allocatable :: columns(:)
     type(history_table_type) :: table
-    integer :: i
+    type(measure_list_type) :: measures
 
     table = history_table(scene%time%method == 'relaxation', names_plasticity(scene))
-    columns = table%entries%column
-    do i = 1, size(scene%boundaries)
-      columns = [columns, reactions_of(trim(scene%boundaries(i)%name), scene%header%dimension)]
-    end do
+    call measures_of(scene, fields, measures)
+    columns = measures%columns(scene%header%dimension)
+    columns = [table%entries%column, pack(columns, columns%origin /= 'probe')]
   end function columns_of_scene
 
   !> Whether a scene names a plastic bond law.
@@ -128,37 +112,18 @@ contains
     end do
   end function names_plasticity
 
-  !> Columns of the reaction force of a boundary, none without a name.
-  pure function reactions_of(name, dim) result(columns)
-    character(*), intent(in) :: name
-    integer, intent(in) :: dim
-    type(column_type), allocatable :: columns(:)
-    integer :: c
-
-    allocate (columns(merge(dim, 0, name /= '')))
-    do c = 1, size(columns)
-      columns(c) = column_type(name//'_reaction_'//xyz(c), 'N', 'boundary')
-    end do
-  end function reactions_of
-
-  !> The values of `history_columns`.
-  function history_row(table, now, probes) result(row)
-    type(history_table_type), intent(in) :: table  !! of the run
-    type(row_source_type), intent(in) :: now
-    type(probe_type), intent(in) :: probes(:)
-    real(wp), allocatable :: row(:)
+  !> The values of `history_columns`, once for each row.
+  subroutine history_row(table, now, measures, row)
+    type(history_table_type), intent(in) :: table          !! of the run
+    type(row_source_type), intent(in) :: now               !! the instant
+    type(measure_list_type), intent(inout) :: measures     !! of the run, which go from row to row
+    real(wp), allocatable, intent(out) :: row(:)           !! (columns)
+    real(wp), allocatable :: measured(:)
     integer :: i
 
-    row = [(table%entries(i)%value(now), i=1, size(table%entries))]
-    associate (system => now%system)
-      do i = 1, size(system%motions)
-        if (system%motions(i)%name /= '') row = [row, system%motions(i)%reaction(:system%body%dim)]
-      end do
-    end associate
-    do i = 1, size(probes)
-      row = [row, probe_row(probes(i), now%moment_type)]
-    end do
-  end function history_row
+    call measures%row(now, measured)
+    row = [(table%entries(i)%value(now), i=1, size(table%entries)), measured]
+  end subroutine history_row
 
   pure real(wp) function step(now)
     type(row_source_type), intent(in) :: now

@@ -15,9 +15,9 @@ module pd_output_report_recorder
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
   use pd_output_report_balance, only: balance_type
-  use pd_output_report_columns, only: history_row, history_table_type, row_source_type
+  use pd_output_measures_measure, only: measure_list_type, row_source_type
+  use pd_output_report_columns, only: history_row, history_table_type
   use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
-  use pd_output_report_probes, only: probe_type
   use pd_output_report_run_warnings, only: contact_warning, gradient_warning, &
     & rotation_warning, strain_warning
   use pd_output_report_schedule, only: due_at, iteration_due, schedule_type
@@ -30,7 +30,7 @@ module pd_output_report_recorder
     type(results_type) :: results
     type(schedule_type) :: schedule
     type(output_field_type), allocatable :: fields(:)  !! of every output
-    type(probe_type), allocatable :: probes(:)
+    type(measure_list_type) :: measures      !! of the history
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(team_type) :: team                  !! threads, whose number may change at any instant
@@ -227,7 +227,8 @@ contains
       about%strain = recorder%balance%energies%strain
       about%warnings = recorder%warnings
       call recorder%results%sync(error)
-      if (.not. allocated(error)) call recorder%checkpoint%write(about, system, error)
+      if (.not. allocated(error)) call recorder%checkpoint%write(about, system, &
+        & recorder%measures, error)
     end associate
     call recorder%timer%stop('checkpoints')
     if (.not. allocated(error)) return
@@ -259,6 +260,8 @@ contains
     real(wp), target, contiguous, intent(in) :: v(:, :)
     type(error_type), allocatable, intent(out) :: error
     type(row_source_type) :: now
+    type(measure_list_type) :: apart
+    real(wp), allocatable :: row(:)
     character(:), allocatable :: warning
 
     associate (balance => recorder%balance)
@@ -272,8 +275,14 @@ contains
       now%energies = balance%energies
     end associate
     recorder%rows = recorder%rows + 1
-    call recorder%results%add_row(history_row(recorder%columns, now, recorder%probes), &
-      & error)
+    if (recorder%more_rows == 0) then
+      call history_row(recorder%columns, now, recorder%measures, row)
+    else
+      ! a run that continues does not have this row: what goes from row to row does not see it
+      apart = recorder%measures
+      call history_row(recorder%columns, now, apart, row)
+    end if
+    call recorder%results%add_row(row, error)
     if (.not. recorder%turned) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0

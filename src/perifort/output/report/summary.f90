@@ -12,7 +12,7 @@ module pd_output_report_summary
   use pd_force_model, only: model_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_output_report_probes, only: probe_type
+  use pd_output_measures_measure, only: measure_list_type
   implicit none (type, external)
   private
   public :: summary_before, checkpoint_line, memory_of
@@ -20,18 +20,18 @@ module pd_output_report_summary
 contains
 
   !> The scene as it will be computed, a fact in each line: points, bonds, memory, forces, time
-  !> step, probes, and notes.
-  function summary_before(scene, system, plan, probes, cut, warnings, notes, threads) result(text)
+  !> step, what the history measures, and notes.
+  function summary_before(scene, system, plan, measures, cut, warnings, notes, threads) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     type(plan_type), intent(in) :: plan
-    type(probe_type), intent(in) :: probes(:)
+    type(measure_list_type), intent(in) :: measures  !! of the history
     integer(i8), intent(in) :: cut        !! bonds removed by cracks
     type(warnings_type), intent(in) :: warnings  !! found so far
     type(warnings_type), intent(in) :: notes     !! correct, but possibly unexpected facts
     integer, intent(in) :: threads        !! that the run may use
     character(:), allocatable :: text
-    integer :: p, k
+    integer :: p
 
     text = ''
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
@@ -56,11 +56,7 @@ contains
     else
       text = text//steps(scene, system, plan)
     end if
-    do p = 1, size(probes)
-      k = int(probes(p)%slot)
-      text = text//line('probe', probes(p)%name//' is point '// &
-        & to_text(int(system%body%point(k)))//' at ('//position(system, k)//') m')
-    end do
+    text = text//measures%describe(system)
     do p = 1, notes%count()
       text = text//line('note', notes%line(p))
     end do
@@ -257,16 +253,5 @@ contains
     bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) &
       & + system%family%bytes() + system%workspace%bytes()
   end function memory_of
-
-  pure function position(system, k) result(text)
-    type(system_type), intent(in) :: system
-    integer, intent(in) :: k
-    character(:), allocatable :: text
-    integer :: c
-    text = to_text(system%body%x(k, 1))
-    do c = 2, system%body%dim
-      text = text//', '//to_text(system%body%x(k, c))
-    end do
-  end function position
 
 end module pd_output_report_summary

@@ -13,7 +13,7 @@ module pd_output_report_warnings
   use pd_set_up_conditions, only: no_fail_mask, region_mask
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
-  use pd_output_report_probes, only: probe_type
+  use pd_output_measures_measure, only: measure_list_type
   implicit none (type, external)
   private
   public :: warn_before, note_before
@@ -21,15 +21,14 @@ module pd_output_report_warnings
 contains
 
   !> Add all warnings that are known before a run.
-  subroutine warn_before(scene, system, plan, probes, isolated, warnings)
+  subroutine warn_before(scene, system, plan, measures, isolated, warnings)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     type(plan_type), intent(in) :: plan
-    type(probe_type), intent(in) :: probes(:)
+    type(measure_list_type), intent(in) :: measures  !! of the history
     integer, intent(in) :: isolated        !! points without a bond
     type(warnings_type), intent(inout) :: warnings
-    real(wp) :: distance
-    integer :: i, k
+    integer :: i
 
     call warnings_of_scene(scene, edges_of(system%body), warnings)
     call warn_of_points(scene, system%body, system%family, warnings)
@@ -60,13 +59,7 @@ contains
       call warnings%add('empty no-fail zone '//to_text(i), '&no_fail number '//to_text(i)// &
         & ' holds no point', tell=.false.)
     end do
-    do i = 1, size(probes)
-      k = int(probes(i)%slot)
-      distance = norm2(system%body%x(k, :) - scene%probes(i)%point(:system%body%dim))
-      if (distance > system%body%spacing(k)) call warnings%add('probe '//to_text(i), 'probe '// &
-        & probes(i)%name//' lies outside the bodies: the nearest point is '// &
-        & with_unit(distance, 'm', 3)//' away', tell=.false.)
-    end do
+    call measures%warn(system, warnings)
     call warn_of_schedule(scene, plan, warnings)
   end subroutine warn_before
 

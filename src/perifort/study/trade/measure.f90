@@ -84,7 +84,7 @@ contains
         measure%component = component
       end do
       if (measure%kind == 0) then
-        columns = measurable_columns(scene)
+        columns = measurable_columns(scene, table)
         c = findloc(columns%name == name, .true., dim=1)
         if (c > 0) measure%kind = of_column
       end if
@@ -105,11 +105,12 @@ contains
   end subroutine resolve_measure
 
   !> Columns of the history without those of probes, the step and the time.
-  function measurable_columns(scene) result(columns)
+  function measurable_columns(scene, table) result(columns)
     type(scene_type), intent(in) :: scene
+    type(field_table_type), intent(in) :: table
     type(column_type), allocatable :: columns(:)
 
-    columns = columns_of_scene(scene)
+    columns = columns_of_scene(scene, table)
     columns = pack(columns, columns%name /= 'step' .and. columns%name /= 'time')
   end function measurable_columns
 
@@ -123,7 +124,7 @@ contains
     integer :: p
 
     names = [character(name_length) :: (scene%probes(p)%name, p=1, size(scene%probes))]
-    columns = measurable_columns(scene)
+    columns = measurable_columns(scene, table)
     names = [names, [character(name_length) :: columns%name], table%names()]
     nearest = nearest_name(name, names)
     note = 'expected a probe, a column of the history or a field: '//join(names, ', ')

@@ -3,18 +3,20 @@ module pd_study_trade_trial
   use pd_base_clock, only: progress_type, wall_time
   use pd_base_error, only: error_type, fail, internal_fault, status_interrupted
   use pd_base_interrupt, only: interrupted
-  use pd_base_kinds, only: wp, i8
+  use pd_base_kinds, only: wp, i4, i8
   use pd_base_numbers, only: median
   use pd_base_text, only: to_text
   use pd_set_up_prepare, only: prepare, set_up_type
   use pd_force_generic_points, only: has_plasticity
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_set_up_conditions, only: region_mask
-  use pd_output_fields_check, only: check_available
+  use pd_output_fields_check, only: check_available, check_names
   use pd_output_fields_table, only: field_table_type
   use pd_output_report_columns, only: history_columns, history_row, history_table, &
-    & history_table_type, row_source_type
-  use pd_output_report_probes, only: find_probes, probe_type
+    & history_table_type
+  use pd_output_measures_measure, only: measure_list_type, row_source_type
+  use pd_output_measures_probe, only: nearest_slot
+  use pd_output_measures_table, only: measures_of
   use pd_output_report_schedule, only: history_interval
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_static_relaxation, only: run_relaxation
@@ -54,7 +56,7 @@ module pd_study_trade_trial
   type, extends(observer_type) :: watcher_type
     type(measure_type) :: measure
     type(record_type) :: record
-    type(probe_type), allocatable :: probes(:)
+    type(measure_list_type) :: measures        !! of the history
     integer, allocatable :: slots(:)           !! of the places
     type(history_table_type) :: columns        !! of the history
     integer :: column = 0                      !! among them
@@ -155,9 +157,12 @@ contains
     watcher%columns = history_table(watcher%relaxation, &
       & has_plasticity(set_up%system%model))
     watcher%every = history_interval(scene, set_up%plan, set_up%system%family%n_bonds)
-    call find_probes(scene, table, set_up%system%body, watcher%probes, error)
+    call check_names(scene, table, error)
     if (allocated(error) .or. watcher%quick) return
     call check_available(scene, set_up%system, table, error)
+    if (allocated(error)) return
+    call measures_of(scene, table, watcher%measures)
+    call watcher%measures%begin(scene, set_up%system, error)
     if (allocated(error)) return
     if (measure%kind /= of_column) then
       reason = measure%field%missing(set_up%system)
@@ -239,6 +244,7 @@ contains
     type(column_type), allocatable :: columns(:)
     logical, allocatable :: chosen(:)
     real(wp) :: distance
+    integer(i4) :: probe
     integer :: k, dim
 
     dim = system%body%dim
@@ -246,7 +252,8 @@ contains
     associate (measure => watcher%measure, body => system%body)
       select case (measure%kind)
       case (of_probe)
-        chosen(watcher%probes(measure%probe)%slot) = .true.
+        probe = nearest_slot(body, scene%probes(measure%probe)%point)
+        chosen(probe) = .true.
         do k = 1, merge(body%n_slots, 0, around > 0.0_wp)
           distance = norm2(body%x(k, :) - scene%probes(measure%probe)%point(:dim))
           chosen(k) = chosen(k) .or. body%point(k) > 0 .and. distance <= around
@@ -256,7 +263,7 @@ contains
         if (measure%region /= '') chosen = chosen .and. region_mask(scene, body, measure%region)
         if (.not. any(chosen)) call fail(error, "the region '"//measure%region//"' has no points")
       case (of_column)
-        columns = history_columns(system, watcher%probes, watcher%relaxation)
+        columns = history_columns(system, watcher%measures, watcher%relaxation)
         do k = 1, size(columns)
           if (columns(k)%name == measure%name) watcher%column = k
         end do
@@ -274,7 +281,7 @@ contains
           record%weight = body%volume(watcher%slots)
           record%place = 0
         case (of_probe)
-          record%place = findloc(watcher%slots, watcher%probes(measure%probe)%slot, dim=1)
+          record%place = findloc(watcher%slots, int(probe), dim=1)
         case (of_column)
           record%place = 1
         case default
@@ -361,7 +368,7 @@ contains
       if (measure%kind == of_column) then
         now%instant = instant
         now%energies = energies
-        row = history_row(watcher%columns, now, watcher%probes)
+        call history_row(watcher%columns, now, watcher%measures, row)
         record%values(1, 1, record%rows) = row(watcher%column)
         return
       end if

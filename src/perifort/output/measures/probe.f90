@@ -1,0 +1,162 @@
+!> Probes: points whose values are in every row of the history.
+module pd_output_measures_probe
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp, i4
+  use pd_base_text, only: line => labelled_line, to_text, with_unit
+  use pd_base_warnings, only: warnings_type
+  use pd_body_body, only: body_type
+  use pd_body_generate, only: touch
+  use pd_motion_system, only: system_type
+  use pd_output_fields_field, only: output_field_type
+  use pd_output_fields_table, only: field_table_type
+  use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
+  use pd_output_results_types, only: column_type
+  use pd_scene_content_types, only: scene_type
+  implicit none (type, external)
+  private
+  public :: add_probes, nearest_slot
+
+  !> A probe: the point that is nearest to the place that the scene names.
+  type, extends(measure_type) :: probe_measure_type
+    character(:), allocatable :: name
+    integer :: number = 0                !! of its group
+    real(wp) :: place(3) = 0.0_wp        !! where it is asked for [m]
+    integer(i4) :: slot = 0_i4           !! of its point
+    type(output_field_type), allocatable :: fields(:)
+  contains
+    procedure :: begin => begin_probe
+    procedure :: columns => columns_of_probe
+    procedure :: row => row_of_probe
+    procedure :: describe => describe_probe
+    procedure :: warn => warn_of_probe
+  end type probe_measure_type
+
+contains
+
+  !> Add the probes of a scene.
+  subroutine add_probes(scene, table, measures)
+    type(scene_type), intent(in) :: scene                !! a checked scene, whose fields are known
+    type(field_table_type), intent(in) :: table          !! of fields
+    type(measure_list_type), intent(inout) :: measures   !! added to
+    type(probe_measure_type) :: measure
+    integer :: p, f
+
+    do p = 1, size(scene%probes)
+      associate (group => scene%probes(p))
+        measure%name = trim(group%name)
+        measure%number = p
+        measure%place = group%point
+        if (allocated(measure%fields)) deallocate (measure%fields)
+        allocate (measure%fields(size(group%fields)))
+        do f = 1, size(group%fields)
+          measure%fields(f) = table%field(trim(group%fields(f)))
+        end do
+      end associate
+      call measures%add(measure)
+    end do
+  end subroutine add_probes
+
+  !> The slot of the point that is nearest to a place; ties go to the lowest point number.
+  pure integer(i4) function nearest_slot(body, place) result(slot)
+    type(body_type), intent(in) :: body  !! points
+    real(wp), intent(in) :: place(3)     !! where; components beyond the dimension do not count [m]
+    real(wp) :: distance, least
+    integer :: i
+
+    slot = 0_i4
+    least = huge(least)
+    do i = 1, body%n_points
+      distance = norm2(body%x(body%slot(i), :) - place(:body%dim))
+      ! differences within the tolerance are ties, so that ties do not depend on rounding
+      if (distance >= least - touch*body%spacing(body%slot(i))) cycle
+      least = distance
+      slot = body%slot(i)
+    end do
+  end function nearest_slot
+
+  !> Find its point.
+  subroutine begin_probe(measure, scene, system, error)
+    class(probe_measure_type), intent(inout) :: measure
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(error_type), allocatable, intent(out) :: error
+
+    associate (unused_scene => scene)
+    end associate
+    measure%slot = nearest_slot(system%body, measure%place)
+  end subroutine begin_probe
+
+  !> The components of its fields.
+  function columns_of_probe(measure, dim) result(columns)
+    class(probe_measure_type), intent(in) :: measure
+    integer, intent(in) :: dim
+    type(column_type), allocatable :: columns(:)
+    character(:), allocatable :: suffix
+    integer :: f, c
+
+    allocate (columns(0))
+    do f = 1, size(measure%fields)
+      associate (field => measure%fields(f))
+        do c = 1, field%components(dim)
+          suffix = field%component_name(c, dim)
+          if (suffix /= '') suffix = '_'//suffix
+          columns = [columns, column_type(measure%name//'_'//trim(field%name)//suffix, &
+            & field%unit, 'probe')]
+        end do
+      end associate
+    end do
+  end function columns_of_probe
+
+  !> Their values.
+  subroutine row_of_probe(measure, now, values)
+    class(probe_measure_type), intent(inout) :: measure
+    type(row_source_type), intent(in) :: now
+    real(wp), intent(out) :: values(:)
+    real(wp), allocatable :: of_field(:, :)
+    integer :: f, first
+
+    first = 1
+    do f = 1, size(measure%fields)
+      associate (field => measure%fields(f))
+        allocate (of_field(field%components(now%system%body%dim), 1))
+        call field%values_at(now%moment_type, [int(measure%slot)], of_field)
+        values(first:first + size(of_field) - 1) = of_field(:, 1)
+        first = first + size(of_field)
+        deallocate (of_field)
+      end associate
+    end do
+  end subroutine row_of_probe
+
+  !> Its point.
+  function describe_probe(measure, system) result(text)
+    class(probe_measure_type), intent(in) :: measure
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+    integer :: c
+
+    text = ''
+    do c = 1, system%body%dim
+      if (c > 1) text = text//', '
+      text = text//to_text(system%body%x(measure%slot, c))
+    end do
+    text = line('probe', measure%name//' is point '// &
+      & to_text(int(system%body%point(measure%slot)))//' at ('//text//') m')
+  end function describe_probe
+
+  !> A probe should lie in a body.
+  subroutine warn_of_probe(measure, system, warnings)
+    class(probe_measure_type), intent(in) :: measure
+    type(system_type), intent(in) :: system
+    type(warnings_type), intent(inout) :: warnings
+    real(wp) :: distance
+
+    associate (body => system%body)
+      distance = norm2(body%x(measure%slot, :) - measure%place(:body%dim))
+      if (distance > body%spacing(measure%slot)) call warnings%add('probe '// &
+        & to_text(measure%number), 'probe '//measure%name// &
+        & ' lies outside the bodies: the nearest point is '//with_unit(distance, 'm', 3)// &
+        & ' away', tell=.false.)
+    end associate
+  end subroutine warn_of_probe
+
+end module pd_output_measures_probe
