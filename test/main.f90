@@ -65,6 +65,7 @@ program main
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
+  use test_output_measures_section, only: collect_output_measures_section
   use test_output_report_contact, only: collect_output_report_contact
   use test_output_results_files, only: collect_output_results_files
   use test_output_results_layout, only: collect_output_results_layout
@@ -159,6 +160,7 @@ program main
   call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
+  call register('output_measures_section', collect_output_measures_section)
   call register('output_report_contact', collect_output_report_contact)
   call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)

@@ -347,6 +347,7 @@ contains
       & size(scene%boundaries) == table%place_of('boundary') .and. &
       & size(scene%loads) == table%place_of('load') .and. &
       & size(scene%probes) == table%place_of('probe') .and. &
+      & size(scene%sections) == table%place_of('section') .and. &
       & size(scene%studies) == table%place_of('study'), 'a list belongs to another group')
   end subroutine test_own
 

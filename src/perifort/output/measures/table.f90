@@ -4,6 +4,7 @@ module pd_output_measures_table
   use pd_output_measures_boundary, only: add_boundaries
   use pd_output_measures_measure, only: measure_list_type
   use pd_output_measures_probe, only: add_probes
+  use pd_output_measures_section, only: add_sections
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
@@ -20,6 +21,7 @@ contains
     allocate (measures%items(0))
     call add_boundaries(scene, measures)
     call add_probes(scene, table, measures)
+    call add_sections(scene, measures)
   end subroutine measures_of
 
 end module pd_output_measures_table

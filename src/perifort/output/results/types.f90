@@ -19,7 +19,7 @@ module pd_output_results_types
   type :: column_type
     character(label_length) :: name = ''
     character(32) :: unit = ''             !! SI; '1' for none
-    character(16) :: origin = ''           !! 'run', 'boundary' or 'probe': what it belongs to
+    character(16) :: origin = ''           !! 'run', 'boundary', 'probe', ..: what it belongs to
   end type column_type
 
   !> What of the results a checkpoint counts on.

@@ -7,7 +7,7 @@ module pd_scene_content_groups
   use pd_scene_content_types, only: scene_type, header_type, body_group, shape_group, &
     & region_group, no_fail_group, material_group, horizon_group, crack_group, initial_group, &
     & boundary_group, load_group, time_group, relaxation_group, output_group, probe_group, &
-    & study_group, group_table
+    & section_group, study_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -57,6 +57,8 @@ contains
     call table%add('output', 'What is written, and how often.', once, output_group(), one=output)
     call table%add('probe', 'The values of the nearest point in every row of the history.', &
       & repeated, probe_group(), all=probes)
+    call table%add('section', 'Force and moment carried across a plane (3D), a line (2D) or a '// &
+      & 'point (1D), in every row of the history.', repeated, section_group(), all=sections)
     call table%add('study', 'A key that `perifort study` and `choose` vary. Several groups '// &
       & 'make the product of their values; measure and against are given in one of them '// &
       & 'only. `run` ignores it.', repeated, study_group(), all=studies)
@@ -203,6 +205,16 @@ contains
     if (.not. allocated(scene%probes)) allocate (scene%probes(0))
     groups => scene%probes
   end subroutine probes
+
+  subroutine sections(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%sections)) deallocate (scene%sections)
+    if (present(room)) allocate (scene%sections(room))
+    if (.not. allocated(scene%sections)) allocate (scene%sections(0))
+    groups => scene%sections
+  end subroutine sections
 
   subroutine studies(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

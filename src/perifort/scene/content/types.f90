@@ -21,6 +21,7 @@ module pd_scene_content_types
   use pd_scene_groups_output, only: output_group
   use pd_scene_groups_probe, only: probe_group
   use pd_scene_groups_relaxation, only: relaxation_group
+  use pd_scene_groups_section, only: section_group
   use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
   use pd_scene_groups_study, only: study_group
   use pd_scene_groups_time, only: time_group
@@ -28,8 +29,8 @@ module pd_scene_content_types
   private
   public :: scene_type, header_type, body_group, shape_group, region_group, no_fail_group, &
     & material_group, horizon_group, crack_group, initial_group, boundary_group, load_group, &
-    & time_group, relaxation_group, output_group, probe_group, study_group, name_length, &
-    & path_length, unset, is_set
+    & time_group, relaxation_group, output_group, probe_group, section_group, study_group, &
+    & name_length, path_length, unset, is_set
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -85,6 +86,7 @@ module pd_scene_content_types
     type(relaxation_group) :: relaxation
     type(output_group) :: output
     type(probe_group), allocatable :: probes(:)
+    type(section_group), allocatable :: sections(:)
     type(study_group), allocatable :: studies(:)
     type(added_type), allocatable :: added(:)    !! groups of a table with more than these
     type(group_table), allocatable :: table      !! that table; without, the program's own
