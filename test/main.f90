@@ -60,11 +60,14 @@ program main
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_explicit_time_step, only: collect_motion_explicit_time_step
   use test_orders, only: collect_orders
+  use test_output_fields_between, only: collect_output_fields_between
+  use test_output_fields_interpolate, only: collect_output_fields_interpolate
   use test_output_fields_stress, only: collect_output_fields_stress
   use test_output_fields_table, only: collect_output_fields_table
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
+  use test_output_measures_j_integral, only: collect_output_measures_j_integral
   use test_output_measures_section, only: collect_output_measures_section
   use test_output_report_contact, only: collect_output_report_contact
   use test_output_results_files, only: collect_output_results_files
@@ -93,7 +96,6 @@ program main
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_study_limits_limits, only: collect_study_limits_limits
   use test_study_trade_closed_form, only: collect_study_trade_closed_form
-  use test_study_trade_interpolate, only: collect_study_trade_interpolate
   use test_study_trade_plan, only: collect_study_trade_plan
   use test_study_trade_predict, only: collect_study_trade_predict
   use test_study_trade_study, only: collect_study_trade_study
@@ -156,10 +158,13 @@ program main
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_explicit_time_step', collect_motion_explicit_time_step)
   call register('orders', collect_orders)
+  call register('output_fields_between', collect_output_fields_between)
+  call register('output_fields_interpolate', collect_output_fields_interpolate)
   call register('output_fields_stress', collect_output_fields_stress)
   call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
+  call register('output_measures_j_integral', collect_output_measures_j_integral)
   call register('output_measures_section', collect_output_measures_section)
   call register('output_report_contact', collect_output_report_contact)
   call register('output_report_schedule', collect_output_report_schedule)
@@ -189,7 +194,6 @@ program main
   call register('study_bench_bench', collect_study_bench_bench)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)
-  call register('study_trade_interpolate', collect_study_trade_interpolate)
   call register('study_trade_plan', collect_study_trade_plan)
   call register('study_trade_predict', collect_study_trade_predict)
   call register('study_trade_study', collect_study_trade_study)

@@ -213,9 +213,9 @@ contains
       & 'thermal_expansion = 1e-5 /'//line// &
       & "&material name = 'b' youngs_modulus = 7e10 density = 8e3 poissons_ratio = 0.2 "// &
       & 'thermal_expansion = 2e-5 /'//line// &
-      & "&body name = 'one' lower = 0, 0 upper = 0.1, 0.1 points = 10, 10 material = 'a' /"//line// &
-      & "&body name = 'two' lower = 0.1, 0 upper = 0.2, 0.1 points = 10, 10 material = 'b' /"// &
-      & line//"&initial temperature_change = 100 /"//line// &
+      & "&body name = 'one' lower = 0, 0 upper = 0.1, 0.1 points = 10, 10 material = 'a' /"// &
+      & line//"&body name = 'two' lower = 0.1, 0 upper = 0.2, 0.1 points = 10, 10 "// &
+      & "material = 'b' /"//line//"&initial temperature_change = 100 /"//line// &
       & "&boundary name = 'left' side = 'x_min' displacement_x = 0 displacement_y = 0 /"//line// &
       & "&boundary name = 'right' side = 'x_max' displacement_x = 0 /"//line// &
       & "&section name = 'one' point = 0.05, 0.05 normal = 1, 0 /"//line// &
@@ -252,7 +252,8 @@ contains
     logical, allocatable :: top(:)
     integer :: c
 
-    call solve(error, block('poissons_ratio = 0.3')//'&relaxation tolerance = 1e-11 /'//line, answer)
+    call solve(error, block('poissons_ratio = 0.3')//'&relaxation tolerance = 1e-11 /'//line, &
+      & answer)
     if (allocated(error)) return
     call answer%get_field('displacement', u, fault)
     allocate (top(size(u, 1)))
@@ -295,8 +296,8 @@ contains
       & "&body name = 'plate' lower = 0, 0 upper = 0.2, 0.1 points = 20, 10 /"//line// &
       & '&crack from = 0.1, -1 to = 0.1, 1 /'//line// &
       & "&boundary name = 'left' side = 'x_min' displacement_x = 0 displacement_y = 0 /"//line// &
-      & "&boundary name = 'right' side = 'x_max' displacement_x = 1e-4 displacement_y = 0 /"//line// &
-      & "&section name = 'cut' point = 0.1, 0.05 normal = 1, 0 /"//line//rest, answer)
+      & "&boundary name = 'right' side = 'x_max' displacement_x = 1e-4 displacement_y = 0 /"// &
+      & line//"&section name = 'cut' point = 0.1, 0.05 normal = 1, 0 /"//line//rest, answer)
     call expect_close(error, last(error, answer, 'cut_force_x'), 0.0_wp, 0.0_wp, 'force')
     call expect_close(error, last(error, answer, 'cut_moment_z'), 0.0_wp, 0.0_wp, 'moment')
   end subroutine test_crack
@@ -309,14 +310,14 @@ contains
       & "&body name = 'plate' lower = 0, 0 upper = 1, 0.5 points = 100, 50 /"//line// &
       & "&initial velocity_x = 3 velocity_y = 1 region = 'left' /"//line// &
       & "&region name = 'left' shape = 'box' upper = 0.3, 1 /"//line// &
-      & '&time steps = 20 /'//line//'&output history_every = 1 fields = '//"'displacement' /"//line// &
+      & '&time steps = 20 /'//line//"&output history_every = 1 fields = 'displacement' /"//line// &
       & "&section name = 'cut' point = 0.31, 0.2 normal = 1, 0.3 /"//line
 
     call solve(error, wave, one, threads=1)
     call solve(error, wave, two, threads=2)
     if (allocated(error)) return
-    call expect_true(error, maxval(abs(one%history(:, one%column_number('cut_force_x')))) > 1.0_wp, &
-      & 'no wave crosses the section')
+    call expect_true(error, maxval(abs(one%history(:, one%column_number('cut_force_x')))) &
+      & > 1.0_wp, 'no wave crosses the section')
     call expect_close(error, one%history, two%history, 0.0_wp, 'the history')
   end subroutine test_threads
 

@@ -11,8 +11,9 @@ module pd_output_fields_pair_force
 
 contains
 
-  !> The present pair force density of a bond, which pulls both ends together along the deformed bond
-  !> (doc/theory.md, 2; of the generic pass, 15): times vc V_k V_j it is the force in the bond [N].
+  !> The present pair force density of a bond, which pulls both ends together along the deformed
+  !> bond (doc/theory.md, 2; of the generic pass, 15): times vc V_k V_j it is the force in the bond
+  !> [N].
   pure subroutine pair_force(system, k, bonds, i, magnitude, direction)
     type(system_type), intent(in) :: system  !! with forces that are up to date
     integer, intent(in) :: k                 !! slot

@@ -7,6 +7,7 @@ module pd_output_measures_probe
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
   use pd_motion_system, only: system_type
+  use pd_output_fields_between, only: stencil_at, stencil_type, values_between
   use pd_output_fields_field, only: output_field_type
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
@@ -16,12 +17,13 @@ module pd_output_measures_probe
   private
   public :: add_probes, nearest_slot
 
-  !> A probe: the point that is nearest to the place that the scene names.
+  !> A probe: the point that is nearest to the place that the scene names, or the place itself.
   type, extends(measure_type) :: probe_measure_type
     character(:), allocatable :: name
     integer :: number = 0                !! of its group
     real(wp) :: place(3) = 0.0_wp        !! where it is asked for [m]
     integer(i4) :: slot = 0_i4           !! of its point
+    logical :: interpolate = .false.     !! values at the place itself
     type(output_field_type), allocatable :: fields(:)
   contains
     procedure :: begin => begin_probe
@@ -46,6 +48,7 @@ contains
         measure%name = trim(group%name)
         measure%number = p
         measure%place = group%point
+        measure%interpolate = group%interpolate
         if (allocated(measure%fields)) deallocate (measure%fields)
         allocate (measure%fields(size(group%fields)))
         do f = 1, size(group%fields)
@@ -112,14 +115,21 @@ contains
     class(probe_measure_type), intent(inout) :: measure
     type(row_source_type), intent(in) :: now
     real(wp), intent(out) :: values(:)
+    type(stencil_type) :: stencil(1)
     real(wp), allocatable :: of_field(:, :)
     integer :: f, first
 
+    if (measure%interpolate) call stencil_at(now%system, int(measure%slot), &
+      & measure%place(:now%system%body%dim), stencil(1))
     first = 1
     do f = 1, size(measure%fields)
       associate (field => measure%fields(f))
         allocate (of_field(field%components(now%system%body%dim), 1))
-        call field%values_at(now%moment_type, [int(measure%slot)], of_field)
+        if (measure%interpolate) then
+          call values_between(field, now%moment_type, stencil, of_field)
+        else
+          call field%values_at(now%moment_type, [int(measure%slot)], of_field)
+        end if
         values(first:first + size(of_field) - 1) = of_field(:, 1)
         first = first + size(of_field)
         deallocate (of_field)
@@ -135,6 +145,14 @@ contains
     integer :: c
 
     text = ''
+    if (measure%interpolate) then
+      do c = 1, system%body%dim
+        if (c > 1) text = text//', '
+        text = text//to_text(measure%place(c))
+      end do
+      text = line('probe', measure%name//' is interpolated at ('//text//') m')
+      return
+    end if
     do c = 1, system%body%dim
       if (c > 1) text = text//', '
       text = text//to_text(system%body%x(measure%slot, c))

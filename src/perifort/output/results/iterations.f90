@@ -1,4 +1,5 @@
-!> The convergence of a relaxation, `iterations.csv`: a line for each iteration that is due. It is
+!> Tables whose rows begin with a number that ascends: the convergence of a relaxation,
+!> `iterations.csv`, with a line for each iteration that is due; the profiles along a line. They are
 !> not part of a checkpoint: a restarted run keeps the lines up to where it continues, and adds to
 !> them. An error is set if the file cannot be read or written.
 module pd_output_results_iterations
@@ -24,6 +25,7 @@ module pd_output_results_iterations
     procedure :: begin
     procedure :: has_begun
     procedure :: add
+    procedure :: flush => flush_iterations
     procedure :: sync
     procedure :: close => close_iterations
   end type iterations_type
@@ -32,21 +34,25 @@ contains
 
   !> Make the file `path`, with the lines of an older one whose step (the first number) is at most
   !> `last`, if it is to `go_on`.
-  subroutine begin(self, path, go_on, last, error)
+  subroutine begin(self, path, go_on, last, error, names)
     class(iterations_type), intent(inout) :: self  !! open on return, behind the lines that stay
     character(*), intent(in) :: path               !! of the file
     logical, intent(in) :: go_on                   !! keep lines of an older file
     integer, intent(in) :: last  !! step of the last line that stays; not used without `go_on`
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: text
+    character(*), intent(in), optional :: names
+      !! of the columns, parted by commas; without, those of iterations
+    character(:), allocatable :: text, titles
     integer :: first, length, step, status
 
     self%begun = .true.
+    titles = head
+    if (present(names)) titles = names
     text = ''
     if (go_on .and. file_exists(path)) call read_text_file(path, text, error)
     if (allocated(error)) return
     call self%sink%open(path//'.part', error)
-    if (.not. allocated(error)) call self%sink%line(head, error)
+    if (.not. allocated(error)) call self%sink%line(titles, error)
     first = index(text, newline) + 1
     do while (.not. allocated(error))
       ! a line that was cut off has no end
@@ -81,6 +87,13 @@ contains
     self%written_at = now
     call self%sink%flush(error)
   end subroutine add
+
+  !> Hand all lines to the system.
+  subroutine flush_iterations(self, error)
+    class(iterations_type), intent(inout) :: self  !! begun
+    type(error_type), allocatable, intent(out) :: error
+    call self%sink%flush(error)
+  end subroutine flush_iterations
 
   !> Wait until all lines are on the disk.
   subroutine sync(self, error)

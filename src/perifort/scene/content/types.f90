@@ -16,6 +16,8 @@ module pd_scene_content_types
   use pd_scene_groups_header, only: header_type
   use pd_scene_groups_horizon, only: horizon_group
   use pd_scene_groups_initial, only: initial_group
+  use pd_scene_groups_j_integral, only: j_integral_group
+  use pd_scene_groups_line, only: line_group
   use pd_scene_groups_load, only: load_group
   use pd_scene_groups_material, only: material_group
   use pd_scene_groups_output, only: output_group
@@ -29,8 +31,8 @@ module pd_scene_content_types
   private
   public :: scene_type, header_type, body_group, shape_group, region_group, no_fail_group, &
     & material_group, horizon_group, crack_group, initial_group, boundary_group, load_group, &
-    & time_group, relaxation_group, output_group, probe_group, section_group, study_group, &
-    & name_length, path_length, unset, is_set
+    & time_group, relaxation_group, output_group, probe_group, section_group, line_group, &
+    & j_integral_group, study_group, name_length, path_length, unset, is_set
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -87,6 +89,8 @@ module pd_scene_content_types
     type(output_group) :: output
     type(probe_group), allocatable :: probes(:)
     type(section_group), allocatable :: sections(:)
+    type(line_group), allocatable :: lines(:)
+    type(j_integral_group), allocatable :: j_integrals(:)
     type(study_group), allocatable :: studies(:)
     type(added_type), allocatable :: added(:)    !! groups of a table with more than these
     type(group_table), allocatable :: table      !! that table; without, the program's own

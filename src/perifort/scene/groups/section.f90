@@ -30,8 +30,8 @@ contains
     call keys%key('name', group%name, 'start of its column names', required=.true., word=.true.)
     call keys%key('point', group%point, 'm', 'a position on it; moments are about this position', &
       & required=.true.)
-    call keys%key('normal', group%normal, '-', 'direction across it, of any length: the force is '// &
-      & 'that on the part behind, from the part ahead', default='1D: 1')
+    call keys%key('normal', group%normal, '-', 'direction across it, of any length: the '// &
+      & 'force is that on the part behind, from the part ahead', default='1D: 1')
     call keys%key('lower', group%lower, 'm', 'bonds that cross it within a box: its lower corner', &
       & default='unbounded')
     call keys%key('upper', group%upper, 'm', 'its upper corner', default='unbounded')
