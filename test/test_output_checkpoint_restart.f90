@@ -789,6 +789,12 @@ contains
     other%output%fields = [character(64) :: 'dilatation']
     call run(other, 'from', fault, restart=.true., checkpoint=here//'/from/plate.checkpoint.old')
     call expect_true(error, allocated(fault), 'other fields in the same file')
+    ! other columns do not fit to the rows that the checkpoint has
+    scene%probes(1)%fields = [character(64) :: 'velocity']
+    call run(scene, 'less', fault, restart=.true., checkpoint=here//'/from/plate.checkpoint.old')
+    if (.not. allocated(fault)) call test_failed(error, 'a history of fewer columns')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'columns') > 0, fault%message)
     call remove_file(path)
     call remove_file(here//'/elsewhere/plate.pvd')
     call remove_file(here//'/elsewhere/history.csv')

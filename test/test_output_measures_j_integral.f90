@@ -35,6 +35,7 @@ contains
       & new_unittest('fields of Williams, both modes, plane strain', test_strain), &
       & new_unittest('a crack along another direction', test_direction), &
       & new_unittest('a crack in the centre of a plate in tension', test_centre), &
+      & new_unittest('boxes and runs that warn', test_warnings), &
       & new_unittest('J integrals that cannot be had', test_wrong)]
   end subroutine collect_output_measures_j_integral
 
@@ -268,6 +269,35 @@ contains
     call expect_parts(error, fault, parts)
   end subroutine expect_refused
 
+  !> A run in time, and a box whose inner half barely holds the tip.
+  subroutine test_warnings(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: narrow = &
+      & "&j_integral name = 'narrow' lower = -0.08, -0.08 upper = 0.08, 0.08 direction = 1, 0 /"//line
+    integer :: w
+    type(scene_type) :: scene
+    type(set_up_type), target :: set_up
+    type(measure_list_type) :: measures
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+
+    do w = 1, 3
+      text = square('stress', '-1, 0', '1, 0', '')
+      if (w == 2) text = square('stress', '-1, 0', '1, 0', narrow)
+      if (w == 3) text = good_head//'&time steps = 5 /'//line//"&j_integral name = 'moving' "// &
+        & 'lower = 0.3, 0.1 upper = 0.7, 0.4 direction = 1, 0 /'
+      call read_scene_text(text, 'j.nml', scene, fault)
+      if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+      if (.not. allocated(fault)) call foresee_output(scene, all_fields(), set_up, measures, fault)
+      if (allocated(fault)) then
+        call test_failed(error, 'refused: '//fault%message)
+        return
+      end if
+      call expect_true(error, set_up%warnings%has('J integral 3') .eqv. w == 2, 'a narrow box')
+      call expect_true(error, set_up%warnings%has('J integral') .eqv. w == 3, 'a run in time')
+    end do
+  end subroutine test_warnings
+
   subroutine test_wrong(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: steps = '&time steps = 5 /'//line
@@ -286,6 +316,10 @@ contains
       & 'tip = 0.35, 0.25 /', "'tip' lies outside of the inner half")
     call expect_refused(error, good_head//steps// &
       & "&j_integral name = 'tip' direction = 1, 0 lower = 0.3, 0.2 upper = 0.7, 0.6 /", &
+      & "there is no J integral 'tip'|the box reaches beyond the bodies")
+    call expect_refused(error, good_head//steps// &
+      & "&j_integral name = 'tip' direction = 1, 0 lower = 0.3, 0.1 upper = 0.7, 0.5 "// &
+      & 'tip = 0.5, 0.21 /', &
       & "there is no J integral 'tip'|mirror image")
     call expect_refused(error, '&scene dimension = 2 /'//line// &
       & '&material youngs_modulus = 1e9 density = 1e3 thermal_expansion = 1e-5 /'//line// &

@@ -16,7 +16,7 @@ module pd_output_measures_j_integral
   use pd_output_fields_between, only: is_inside, stencil_at, stencil_type
   use pd_output_fields_gradient, only: displacement_gradient, lack_of_stress, strain_of
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
-  use pd_output_measures_probe, only: nearest_slot
+  use pd_output_measures_probe, only: nearest_slots
   use pd_output_results_types, only: column_type
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type
@@ -36,7 +36,7 @@ module pd_output_measures_j_integral
     integer :: material = 0                  !! of the points
     logical :: moving = .false.              !! a run in time
     integer(i4), allocatable :: slots(:)     !! of the points, in the order of the points
-    integer(i4), allocatable :: mirror(:)    !! nearest slots to their mirror images
+    integer, allocatable :: mirror(:)        !! nearest slots to their mirror images
     real(wp), allocatable :: slope(:, :)     !! gradient of the weight q along and across (2, point)
                                              !! [1/m]
   contains
@@ -103,15 +103,17 @@ contains
     type(system_type), intent(in) :: system
     type(error_type), allocatable, intent(out) :: error
     character(:), allocatable :: reason
-    real(wp) :: slope(2), image(2)
+    real(wp) :: slope(2)
+    real(wp), allocatable :: image(:, :)
     integer :: p, k, n
 
     associate (body => system%body)
       reason = lack_of_stress(system)
       if (reason == '' .and. system%model%thermal) reason = 'with temperature changes it '// &
         & 'depends on the box'
+      if (reason == '') reason = lack_of_room(measure, body)
       allocate (measure%slots(count(in_box(measure, body))))
-      allocate (measure%mirror(size(measure%slots)), measure%slope(2, size(measure%slots)))
+      allocate (image(size(measure%slots), 2), measure%slope(2, size(measure%slots)))
       if (reason == '' .and. size(measure%slots) == 0) reason = 'there is no point in the '// &
         & 'outer half of the box'
       n = 0
@@ -121,22 +123,44 @@ contains
         slope = slope_of(measure, body%x(k, :))
         if (all(abs(slope) <= 0.0_wp)) cycle
         n = n + 1
-        image = mirrored(measure, body%x(k, :))
+        image(n, :) = mirrored(measure, body%x(k, :))
         measure%slots(n) = int(k, i4)
-        measure%mirror(n) = nearest_slot(body, [image, 0.0_wp])
         measure%slope(:, n) = matmul(measure%axes, slope)
         if (n == 1) measure%material = body%material(k)
-        if (body%material(k) /= measure%material) then
-          reason = 'there is more than one material in the box'
-        else if (.not. is_inside(system, int(measure%mirror(n)), image)) then
-          reason = 'the mirror image of the box about the line of the crack reaches beyond the '// &
-            & 'body: at ('//to_text(image(1), 4)//', '//to_text(image(2), 4)//') m'
-        end if
+        if (body%material(k) /= measure%material) &
+          & reason = 'there is more than one material in the box'
+      end do
+      if (reason == '') measure%mirror = nearest_slots(body, image)
+      do n = 1, size(image, 1)
+        if (reason /= '') exit
+        if (is_inside(system, measure%mirror(n), image(n, :))) cycle
+        reason = 'the mirror image of the box about the line of the crack reaches beyond the '// &
+          & 'body: at ('//to_text(image(n, 1), 4)//', '//to_text(image(n, 2), 4)//') m'
       end do
     end associate
     if (reason /= '') call scene_fault(error, scene, 'j_integral', measure%number, 'lower', &
       & "there is no J integral '"//measure%name//"'", reason)
   end subroutine begin_j
+
+  !> Why a box is not in the body, '' if it is: the integral needs the whole of its outer half.
+  function lack_of_room(measure, body) result(reason)
+    class(j_measure_type), intent(in) :: measure
+    type(body_type), intent(in) :: body
+    character(:), allocatable :: reason
+    real(wp) :: least(2), most(2)
+    integer :: p, k
+
+    least = huge(1.0_wp)
+    most = -huge(1.0_wp)
+    do p = 1, body%n_points
+      k = body%slot(p)
+      least = min(least, body%x(k, :) - 0.51_wp*body%spacing(k))
+      most = max(most, body%x(k, :) + 0.51_wp*body%spacing(k))
+    end do
+    reason = ''
+    if (any(measure%lower < least .or. measure%upper > most)) reason = 'the box reaches beyond '// &
+      & 'the bodies'
+  end function lack_of_room
 
   !> Which points of a process lie in the outer half of the box.
   pure function in_box(measure, body) result(inside)
@@ -213,7 +237,7 @@ contains
     k = measure%slots(s)
     associate (body => system%body, m => system%model%materials(measure%material))
       call gradient_at(k, here)
-      call stencil_at(system, int(measure%mirror(s)), mirrored(measure, body%x(k, :)), stencil)
+      call stencil_at(system, measure%mirror(s), mirrored(measure, body%x(k, :)), stencil)
       there = 0.0_wp
       do i = 1, size(stencil%place)
         call gradient_at(stencil%place(i), one)

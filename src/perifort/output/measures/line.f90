@@ -7,7 +7,7 @@ module pd_output_measures_line
   use pd_output_fields_between, only: is_inside, stencil_at, stencil_type, values_between
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_table, only: field_table_type
-  use pd_output_measures_probe, only: nearest_slot
+  use pd_output_measures_probe, only: nearest_slots
   use pd_output_results_results, only: results_type
   use pd_output_results_types, only: line_type
   use pd_scene_content_types, only: scene_type
@@ -38,15 +38,15 @@ contains
     do i = 1, size(profiles)
       associate (group => scene%lines(i), line => profiles(i)%line)
         line%name = group%name
-        allocate (line%positions(group%points, d), profiles(i)%nearest(group%points))
+        allocate (line%positions(group%points, d))
         allocate (line%fields(size(group%fields)), profiles(i)%fields(size(group%fields)))
         do p = 1, group%points
           place = 0.0_wp
           place(:d) = group%from(:d) + (group%to(:d) - group%from(:d)) &
             & *(real(p - 1, wp)/real(group%points - 1, wp))
           line%positions(p, :) = place(:d)
-          profiles(i)%nearest(p) = nearest_slot(body, place)
         end do
+        profiles(i)%nearest = nearest_slots(body, line%positions)
         do f = 1, size(group%fields)
           profiles(i)%fields(f) = table%field(trim(group%fields(f)))
           associate (field => profiles(i)%fields(f), entry => line%fields(f))

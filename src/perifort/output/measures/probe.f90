@@ -6,6 +6,7 @@ module pd_output_measures_probe
   use pd_base_warnings, only: warnings_type
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
+  use pd_family_cells, only: cells_around, cells_type, sort_into_cells
   use pd_motion_system, only: system_type
   use pd_output_fields_between, only: stencil_at, stencil_type, values_between
   use pd_output_fields_field, only: output_field_type
@@ -15,7 +16,7 @@ module pd_output_measures_probe
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
-  public :: add_probes, nearest_slot
+  public :: add_probes, nearest_slot, nearest_slots
 
   !> A probe: the point that is nearest to the place that the scene names, or the place itself.
   type, extends(measure_type) :: probe_measure_type
@@ -76,6 +77,41 @@ contains
       slot = body%slot(i)
     end do
   end function nearest_slot
+
+  !> The slots of the points that are nearest to many places, as of `nearest_slot`.
+  function nearest_slots(body, places) result(slots)
+    type(body_type), intent(in) :: body   !! points
+    real(wp), intent(in) :: places(:, :)  !! (place, dim) where [m]
+    integer, allocatable :: slots(:)
+    type(cells_type) :: cells
+    integer(i4), allocatable :: around(:)
+    real(wp) :: distance, least, width, place(3)
+    integer :: i, p, point
+
+    allocate (slots(size(places, 1)))
+    width = 2*maxval(body%spacing(body%slot))
+    call sort_into_cells(body%x(body%slot, :), width, cells)
+    do p = 1, size(slots)
+      call cells_around(cells, places(p, :), around)
+      least = huge(least)
+      point = 0
+      do i = 1, size(around)
+        associate (k => body%slot(around(i)))
+          distance = norm2(body%x(k, :) - places(p, :))
+          if (distance > least + touch*body%spacing(k)) cycle
+          if (distance >= least - touch*body%spacing(k) .and. around(i) > point) cycle
+          least = distance
+          point = around(i)
+          slots(p) = k
+        end associate
+      end do
+      if (least <= width) cycle
+      ! all points within a width of the place were there
+      place = 0.0_wp
+      place(:body%dim) = places(p, :)
+      slots(p) = nearest_slot(body, place)
+    end do
+  end function nearest_slots
 
   !> Find its point.
   subroutine begin_probe(measure, scene, system, error)

@@ -129,6 +129,13 @@ contains
 
     call check_description(positions, fields, columns, precision, format, error)
     if (allocated(error)) return
+    if (present(kept)) then
+      if (size(kept%rows, 1) /= size(columns)) call fail(error, 'the history of the checkpoint '// &
+        & 'has '//to_text(size(kept%rows, 1))//' columns, that of the scene '// &
+        & to_text(size(columns))//': a run that continues has the same &probe, &section and '// &
+        & '&j_integral groups and names of boundaries')
+      if (allocated(error)) return
+    end if
     self%resumed = .false.
     self%in_files = directory /= ''
     if (self%in_files) then
