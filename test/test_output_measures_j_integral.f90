@@ -273,7 +273,8 @@ contains
   subroutine test_warnings(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: narrow = &
-      & "&j_integral name = 'narrow' lower = -0.08, -0.08 upper = 0.08, 0.08 direction = 1, 0 /"//line
+      & "&j_integral name = 'narrow' lower = -0.08, -0.08 upper = 0.08, 0.08 "// &
+      & 'direction = 1, 0 /'//line
     integer :: w
     type(scene_type) :: scene
     type(set_up_type), target :: set_up
@@ -322,7 +323,8 @@ contains
       & 'tip = 0.5, 0.21 /', &
       & "there is no J integral 'tip'|mirror image")
     call expect_refused(error, '&scene dimension = 2 /'//line// &
-      & '&material youngs_modulus = 1e9 density = 1e3 thermal_expansion = 1e-5 /'//line// &
+      & '&material youngs_modulus = 1e9 density = 1e3 poissons_ratio = 0.3 '// &
+      & 'thermal_expansion = 1e-5 /'//line// &
       & "&body name = 'plate' lower = 0, 0 upper = 1, 0.5 points = 40, 20 /"//line//steps// &
       & '&initial temperature_change = 5 /'//line//box, "there is no J integral 'tip'|temperature")
     call expect_refused(error, "&scene dimension = 2 plane = 'strain' /"//line// &
@@ -331,8 +333,8 @@ contains
       & "&body name = 'plate' lower = 0, 0 upper = 1, 0.5 points = 40, 20 /"//line//steps//box, &
       & "there is no J integral 'tip'|depends on its history")
     call expect_refused(error, '&scene dimension = 2 /'//line// &
-      & "&material name = 'a' youngs_modulus = 1e9 density = 1e3 /"//line// &
-      & "&material name = 'b' youngs_modulus = 2e9 density = 1e3 /"//line// &
+      & "&material name = 'a' youngs_modulus = 1e9 density = 1e3 poissons_ratio = 0.3 /"//line// &
+      & "&material name = 'b' youngs_modulus = 2e9 density = 1e3 poissons_ratio = 0.3 /"//line// &
       & "&body name = 'one' lower = 0, 0 upper = 0.5, 0.5 points = 20, 20 material = 'a' /"// &
       & line//"&body name = 'two' lower = 0.5, 0 upper = 1, 0.5 points = 20, 20 "// &
       & "material = 'b' /"//line//steps//box, "there is no J integral 'tip'|more than one material")

@@ -292,7 +292,7 @@ contains
     type(answer_type) :: answer
 
     call solve(error, '&scene dimension = 2 thickness = 0.01 /'//line// &
-      & '&material youngs_modulus = 2e11 density = 8e3 /'//line// &
+      & '&material youngs_modulus = 2e11 density = 8e3 poissons_ratio = 0.3 /'//line// &
       & "&body name = 'plate' lower = 0, 0 upper = 0.2, 0.1 points = 20, 10 /"//line// &
       & '&crack from = 0.1, -1 to = 0.1, 1 /'//line// &
       & "&boundary name = 'left' side = 'x_min' displacement_x = 0 displacement_y = 0 /"//line// &

@@ -66,6 +66,7 @@ contains
       if (allocated(error)) return
       call available(scene%probes(p)%fields, 'probe', p)
     end do
+    if (.not. allocated(scene%lines)) return
     do p = 1, size(scene%lines)
       if (allocated(error)) return
       call available(scene%lines(p)%fields, 'line', p)

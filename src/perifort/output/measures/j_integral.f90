@@ -56,6 +56,7 @@ contains
     type(j_measure_type) :: measure
     integer :: i
 
+    if (.not. allocated(scene%j_integrals)) return
     do i = 1, size(scene%j_integrals)
       associate (group => scene%j_integrals(i))
         measure%name = trim(group%name)

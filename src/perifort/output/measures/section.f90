@@ -47,6 +47,7 @@ contains
     type(section_measure_type) :: measure
     integer :: i, d
 
+    if (.not. allocated(scene%sections)) return
     d = scene%header%dimension
     do i = 1, size(scene%sections)
       associate (group => scene%sections(i))
