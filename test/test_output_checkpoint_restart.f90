@@ -552,6 +552,7 @@ contains
       allocate (scene%cracks(0), scene%boundaries(2 - way), scene%regions(0), scene%loads(way))
       scene%bodies(1)%upper(:2) = [12, 2]*spacing
       scene%bodies(1)%points(:2) = [12, 2]
+      scene%sections(1)%point(2) = spacing
       scene%materials(1)%critical_stretch = unset
       scene%relaxation%load_steps = way
       scene%loads(1)%side = 'x_max'

@@ -103,8 +103,9 @@ contains
       end associate
       do i = 1, size(positions, 2)
         call displacement_at(set_up%system, positions(:dim, i)*h, values)
+        ! normal equations beyond the outermost points lose some digits
         call expect_close(error, values, 0.2_wp + matmul(gradient(:dim, :dim), &
-          & positions(:dim, i)*h), 1.0e-12_wp, 'displacement')
+          & positions(:dim, i)*h), 1.0e-10_wp, 'displacement')
       end do
     end do
   end subroutine test_linear
@@ -332,9 +333,11 @@ contains
         row = 41*o + p
         call expect_close(error, table(:5, row), [real(o, wp), times(o + 1), positions(:, p), &
           & 0.005_wp*(p - 1)], 1.0e-12_wp, 'places')
-        if (positions(1, p) > 0.081_wp .and. positions(1, p) < 0.119_wp) then
+        call expect_true(error, ieee_is_nan(u(1, p)) .or. abs(positions(1, p) - 0.1_wp) > 0.019_wp, &
+          & 'a value in the hole')
+        if (ieee_is_nan(u(1, p))) then
           call expect_true(error, all(ieee_is_nan(table(6:, row))) .and. &
-            & all(ieee_is_nan(u(:, p))), 'values in the hole')
+            & abs(positions(1, p) - 0.1_wp) < 0.03_wp, 'no value in the body')
         else
           call expect_close(error, table(6:, row), [u(:, p), mises(:, p), stress(:, p)], &
             & 1.0e-6_wp, 'table and file')
