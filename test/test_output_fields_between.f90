@@ -333,8 +333,8 @@ contains
         row = 41*o + p
         call expect_close(error, table(:5, row), [real(o, wp), times(o + 1), positions(:, p), &
           & 0.005_wp*(p - 1)], 1.0e-12_wp, 'places')
-        call expect_true(error, ieee_is_nan(u(1, p)) .or. abs(positions(1, p) - 0.1_wp) > 0.019_wp, &
-          & 'a value in the hole')
+        call expect_true(error, ieee_is_nan(u(1, p)) .or. &
+          & abs(positions(1, p) - 0.1_wp) > 0.019_wp, 'a value in the hole')
         if (ieee_is_nan(u(1, p))) then
           call expect_true(error, all(ieee_is_nan(table(6:, row))) .and. &
             & abs(positions(1, p) - 0.1_wp) < 0.03_wp, 'no value in the body')

@@ -329,7 +329,7 @@ contains
       & '&initial temperature_change = 5 /'//line//box, "there is no J integral 'tip'|temperature")
     call expect_refused(error, '&scene dimension = 2 /'//line// &
       & "&material model = 'softening' critical_stretch = 0.01 peak_stretch = 0.005 "// &
-      & 'youngs_modulus = 1e9 density = 1e3 poissons_ratio = 0.3 /'//line// &
+      & 'youngs_modulus = 1e9 density = 1e3 /'//line// &
       & "&body name = 'plate' lower = 0, 0 upper = 1, 0.5 points = 40, 20 /"//line//steps//box, &
       & "there is no J integral 'tip'|depends on its history")
     call expect_refused(error, '&scene dimension = 2 /'//line// &
