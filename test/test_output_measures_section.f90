@@ -9,7 +9,7 @@ module test_output_measures_section
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
   use bodies, only: expect_true
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use test_scene_expect, only: expect_fault, expect_parts, good_head, line
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
@@ -316,7 +316,7 @@ contains
     call solve(error, wave, one, threads=1)
     call solve(error, wave, two, threads=2)
     if (allocated(error)) return
-    call expect_true(error, maxval(abs(one%history(:, one%column_number('cut_force_x')))) &
+    call expect_true(error, max_abs(one%history(:, one%column_number('cut_force_x'))) &
       & > 1.0_wp, 'no wave crosses the section')
     call expect_close(error, one%history, two%history, 0.0_wp, 'the history')
   end subroutine test_threads
