@@ -61,6 +61,8 @@ program main
   use test_motion_tangent, only: collect_motion_tangent
   use test_motion_explicit_time_step, only: collect_motion_explicit_time_step
   use test_orders, only: collect_orders
+  use test_output_fields_between, only: collect_output_fields_between
+  use test_output_fields_interpolate, only: collect_output_fields_interpolate
   use test_output_fields_stress, only: collect_output_fields_stress
   use test_output_fields_table, only: collect_output_fields_table
   use test_output_measures_boundary, only: collect_output_measures_boundary
@@ -69,6 +71,8 @@ program main
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_base64, only: collect_output_results_base64
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
+  use test_output_measures_j_integral, only: collect_output_measures_j_integral
+  use test_output_measures_section, only: collect_output_measures_section
   use test_output_report_contact, only: collect_output_report_contact
   use test_output_results_files, only: collect_output_results_files
   use test_output_results_layout, only: collect_output_results_layout
@@ -100,7 +104,6 @@ program main
   use test_set_up_terms, only: collect_set_up_terms
   use test_study_limits_limits, only: collect_study_limits_limits
   use test_study_trade_closed_form, only: collect_study_trade_closed_form
-  use test_study_trade_interpolate, only: collect_study_trade_interpolate
   use test_study_trade_plan, only: collect_study_trade_plan
   use test_study_trade_predict, only: collect_study_trade_predict
   use test_study_trade_study, only: collect_study_trade_study
@@ -164,6 +167,8 @@ program main
   call register('motion_tangent', collect_motion_tangent)
   call register('motion_explicit_time_step', collect_motion_explicit_time_step)
   call register('orders', collect_orders)
+  call register('output_fields_between', collect_output_fields_between)
+  call register('output_fields_interpolate', collect_output_fields_interpolate)
   call register('output_fields_stress', collect_output_fields_stress)
   call register('output_fields_table', collect_output_fields_table)
   call register('output_results_base64', collect_output_results_base64)
@@ -171,6 +176,8 @@ program main
   call register('output_measures_boundary', collect_output_measures_boundary)
   call register('output_measures_fragments', collect_output_measures_fragments)
   call register('output_measures_tip', collect_output_measures_tip)
+  call register('output_measures_j_integral', collect_output_measures_j_integral)
+  call register('output_measures_section', collect_output_measures_section)
   call register('output_report_contact', collect_output_report_contact)
   call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)
@@ -203,7 +210,6 @@ program main
   call register('set_up_terms', collect_set_up_terms)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)
-  call register('study_trade_interpolate', collect_study_trade_interpolate)
   call register('study_trade_plan', collect_study_trade_plan)
   call register('study_trade_predict', collect_study_trade_predict)
   call register('study_trade_study', collect_study_trade_study)

@@ -9,7 +9,8 @@ module test_output_checkpoint_restart
   use pd_base_kinds, only: wp, i1, i8
   use pd_driver, only: run_scene
   use pd_output_report_begin, only: run_options_type
-  use pd_output_results_datasets, only: read_rows
+  use pd_output_results_blocks, only: read_block
+  use pd_output_results_datasets, only: get_shape, read_rows
   use pd_output_results_files, only: file_bytes, file_exists, make_directory, remove_file
   use pd_output_results_hdf5, only: close_file, get_attribute, hdf5_file, object_exists, open_file
   use pd_scene_content_types, only: scene_type, tip_group, unset
@@ -85,6 +86,16 @@ contains
     scene%probes(1)%name = 'corner'
     scene%probes(1)%point(:2) = 0.0_wp
     scene%probes(1)%fields = [character(64) :: 'velocity', 'dilatation']
+    scene%probes(1)%interpolate = .true.
+    allocate (scene%sections(1), scene%lines(1))
+    scene%sections(1)%name = 'cut'
+    scene%sections(1)%point = [6.0_wp, 6.0_wp, 0.0_wp]*spacing
+    scene%sections(1)%normal = [0.2_wp, 1.0_wp, 0.0_wp]
+    scene%lines(1)%name = 'across'
+    scene%lines(1)%from = [3.0_wp, 0.0_wp, 0.0_wp]*spacing
+    scene%lines(1)%to = [3.0_wp, 12.0_wp, 0.0_wp]*spacing
+    scene%lines(1)%points = 7
+    scene%lines(1)%fields = [character(64) :: 'displacement', 'damage']
     scene%time%steps = 30
     scene%output%every = 7
     scene%output%history_every = 4
@@ -182,6 +193,7 @@ contains
 
     call expect_same_file(error, here//'/'//first//'/history.csv', here//'/'//second// &
       & '/history.csv')
+    call expect_same_file(error, here//'/'//first//'/across.csv', here//'/'//second//'/across.csv')
     call expect_same_file(error, here//'/'//first//'/plate.pvd', here//'/'//second//'/plate.pvd')
     call expect_same_file(error, here//'/'//first//'/plate.xdmf', here//'/'//second//'/plate.xdmf')
     do i = 0, outputs - 1
@@ -215,7 +227,38 @@ contains
       call expect_true(error, all(transfer(a, 0_i8, size(a)) == transfer(b, 0_i8, size(b))), &
         & trim(fields(i))//' differs')
     end do
+    call profiles_of(first, outputs, a, error)
+    call profiles_of(second, outputs, b, error)
+    if (allocated(error)) return
+    call expect_true(error, all(transfer(a, 0_i8, size(a)) == transfer(b, 0_i8, size(b))), &
+      & 'the profiles of a line differ')
   end subroutine expect_same_hdf5
+
+  !> The displacements along the line in all outputs.
+  subroutine profiles_of(folder, outputs, values, error)
+    character(*), intent(in) :: folder
+    integer, intent(in) :: outputs
+    real(wp), allocatable, intent(out) :: values(:)
+    type(error_type), allocatable, intent(inout) :: error
+    type(hdf5_file) :: file
+    type(fault_type), allocatable :: fault, late
+    real(wp), allocatable :: block(:, :)
+    integer(i8) :: rows
+    integer :: o, dim
+
+    allocate (values(0))
+    if (allocated(error)) return
+    call open_file(here//'/'//folder//'/plate.vtkhdf', .false., file, fault)
+    if (.not. allocated(fault)) call get_shape(file, '/lines/across/position', dim, rows, fault)
+    allocate (block(dim, 7))
+    do o = 0, outputs - 1
+      if (.not. allocated(fault)) call read_block(file, '/lines/across/displacement', int(o, i8), &
+        & block, fault)
+      values = [values, block]
+    end do
+    call close_file(file, late)
+    call accept(error, fault)
+  end subroutine profiles_of
 
   !> Times, rows and a field of all outputs in one line of numbers.
   subroutine values_of(folder, field, outputs, values, error)
@@ -595,6 +638,7 @@ contains
       allocate (scene%cracks(0), scene%boundaries(2 - way), scene%regions(0), scene%loads(way))
       scene%bodies(1)%upper(:2) = [12, 2]*spacing
       scene%bodies(1)%points(:2) = [12, 2]
+      scene%sections(1)%point(2) = spacing
       scene%materials(1)%critical_stretch = unset
       scene%relaxation%load_steps = way
       scene%loads(1)%side = 'x_max'
@@ -832,6 +876,12 @@ contains
     other%output%fields = [character(64) :: 'dilatation']
     call run(other, 'from', fault, restart=.true., checkpoint=here//'/from/plate.checkpoint.old')
     call expect_true(error, allocated(fault), 'other fields in the same file')
+    ! other columns do not fit to the rows that the checkpoint has
+    scene%probes(1)%fields = [character(64) :: 'velocity']
+    call run(scene, 'less', fault, restart=.true., checkpoint=here//'/from/plate.checkpoint.old')
+    if (.not. allocated(fault)) call test_failed(error, 'a history of fewer columns')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'columns') > 0, fault%message)
     call remove_file(path)
     call remove_file(here//'/elsewhere/plate.pvd')
     call remove_file(here//'/elsewhere/history.csv')

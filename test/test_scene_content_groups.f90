@@ -349,6 +349,9 @@ contains
       & size(scene%loads) == table%place_of('load') .and. &
       & size(scene%probes) == table%place_of('probe') .and. &
       & size(scene%tips) == table%place_of('tip') .and. &
+      & size(scene%sections) == table%place_of('section') .and. &
+      & size(scene%lines) == table%place_of('line') .and. &
+      & size(scene%j_integrals) == table%place_of('j_integral') .and. &
       & size(scene%studies) == table%place_of('study'), 'a list belongs to another group')
   end subroutine test_own
 

@@ -204,12 +204,14 @@ contains
     type(difference_type), allocatable :: differences(:)
     type(group_table) :: table
     character(:), allocatable :: wrong, other_files
+    logical :: other_columns
     integer :: i
 
     call table_of(scene, table)
     differences = scene_differences(restart%about%kept%scene_text, scene_text(scene))
     wrong = ''
     other_files = ''
+    other_columns = .false.
     do i = 1, size(differences)
       select case (meaning_of(differences(i), table))
       case (change_refused)
@@ -219,6 +221,8 @@ contains
         restart%longer = .true.
       case (change_of_the_files)
         other_files = other_files//newline//'  '//differences(i)%text
+        other_columns = other_columns .or. differences(i)%group /= 'output' .or. &
+          & differences(i)%key == 'fragments'
       case (change_harmless)
         continue
       case default
@@ -235,6 +239,9 @@ contains
         & other_files//newline//'  --restart CHECKPOINT --output OTHER continues the run in '// &
         & 'another folder, whose results begin at the checkpoint')
     end if
+    ! earlier rows have other columns: the history begins at the checkpoint, too
+    if (other_columns .and. .not. allocated(error)) &
+      & restart%about%kept%rows = restart%about%kept%rows(:, :0)
     if (allocated(error)) call restart%reader%close()
   end subroutine compare
 

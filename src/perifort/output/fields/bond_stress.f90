@@ -1,12 +1,11 @@
 !> The field `bond_stress`.
 module pd_output_fields_bond_stress
-  use pd_base_kinds, only: wp, i8
+  use pd_base_kinds, only: wp
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_force_model, only: q_of
-  use pd_force_reference, only: bond_state_type, state_of_bond
   use pd_motion_system, only: system_type
   use pd_output_fields_field, only: moment_type, output_field_type, rank_symmetric
   use pd_output_fields_gradient, only: components_of
+  use pd_output_fields_pair_force, only: pair_force
   implicit none (type, external)
   private
   public :: bond_stress_field
@@ -67,31 +66,17 @@ contains
     integer, intent(in) :: k
     type(bonds_type), intent(in) :: bonds
     real(wp) :: stress(3, 3)
-    type(bond_state_type) :: state
-    real(wp) :: magnitude
-    integer(i8) :: b
-    integer :: i, j, c
+    real(wp) :: magnitude, direction(3)
+    integer :: i, c
 
     stress = 0.0_wp
-    associate (model => system%model, generic => system%workspace%generic, p => system%state%p)
-      do i = 1, bonds%n
-        if (.not. bonds%intact(i)) cycle
-        j = bonds%j(i)
-        state = state_of_bond(model, system%state%u, k, bonds, i)
-        if (model%generic) then
-          b = generic%start(k) + i - 1
-          magnitude = generic%pull(b) + generic%pull(generic%partner(b))
-        else
-          magnitude = (q_of(model, k) + q_of(model, j))*state%Gb*state%stretch
-          if (model%dilatation) &
-            & magnitude = magnitude + (p(k) + p(j))*state%Gd*state%lambda/bonds%length(i)
-        end if
-        do c = 1, model%dim
-          stress(:, c) = stress(:, c) &
-            & + magnitude*bonds%weight(i)*state%direction*bonds%xi(i, c)/2
-        end do
+    do i = 1, bonds%n
+      if (.not. bonds%intact(i)) cycle
+      call pair_force(system, k, bonds, i, magnitude, direction)
+      do c = 1, system%model%dim
+        stress(:, c) = stress(:, c) + magnitude*bonds%weight(i)*direction*bonds%xi(i, c)/2
       end do
-    end associate
+    end do
     stress = (stress + transpose(stress))/2
   end function stress_of_bonds
 

@@ -27,6 +27,11 @@ contains
       if (allocated(error)) return
       if (allocated(scene%probes(p)%fields)) call known(scene%probes(p)%fields, 'probe', p)
     end do
+    if (.not. allocated(scene%lines)) return
+    do p = 1, size(scene%lines)
+      if (allocated(error)) return
+      if (allocated(scene%lines(p)%fields)) call known(scene%lines(p)%fields, 'line', p)
+    end do
 
   contains
 
@@ -60,6 +65,11 @@ contains
     do p = 1, size(scene%probes)
       if (allocated(error)) return
       call available(scene%probes(p)%fields, 'probe', p)
+    end do
+    if (.not. allocated(scene%lines)) return
+    do p = 1, size(scene%lines)
+      if (allocated(error)) return
+      call available(scene%lines(p)%fields, 'line', p)
     end do
 
   contains

@@ -6,7 +6,9 @@ module pd_output_measures_probe
   use pd_base_warnings, only: warnings_type
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
+  use pd_family_cells, only: cells_around, cells_type, sort_into_cells
   use pd_motion_system, only: system_type
+  use pd_output_fields_between, only: stencil_at, stencil_type, values_between
   use pd_output_fields_field, only: output_field_type
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
@@ -14,14 +16,15 @@ module pd_output_measures_probe
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
-  public :: add_probes, nearest_slot
+  public :: add_probes, nearest_slot, nearest_slots
 
-  !> A probe: the point that is nearest to the place that the scene names.
+  !> A probe: the point that is nearest to the place that the scene names, or the place itself.
   type, extends(measure_type) :: probe_measure_type
     character(:), allocatable :: name
     integer :: number = 0                !! of its group
     real(wp) :: place(3) = 0.0_wp        !! where it is asked for [m]
     integer(i4) :: slot = 0_i4           !! of its point
+    logical :: interpolate = .false.     !! values at the place itself
     type(output_field_type), allocatable :: fields(:)
   contains
     procedure :: begin => begin_probe
@@ -46,6 +49,7 @@ contains
         measure%name = trim(group%name)
         measure%number = p
         measure%place = group%point
+        measure%interpolate = group%interpolate
         if (allocated(measure%fields)) deallocate (measure%fields)
         allocate (measure%fields(size(group%fields)))
         do f = 1, size(group%fields)
@@ -73,6 +77,41 @@ contains
       slot = body%slot(i)
     end do
   end function nearest_slot
+
+  !> The slots of the points that are nearest to many places, as of `nearest_slot`.
+  function nearest_slots(body, places) result(slots)
+    type(body_type), intent(in) :: body   !! points
+    real(wp), intent(in) :: places(:, :)  !! (place, dim) where [m]
+    integer, allocatable :: slots(:)
+    type(cells_type) :: cells
+    integer(i4), allocatable :: around(:)
+    real(wp) :: distance, least, width, place(3)
+    integer :: i, p, point
+
+    allocate (slots(size(places, 1)))
+    width = 2*maxval(body%spacing(body%slot))
+    call sort_into_cells(body%x(body%slot, :), width, cells)
+    do p = 1, size(slots)
+      call cells_around(cells, places(p, :), around)
+      least = huge(least)
+      point = 0
+      do i = 1, size(around)
+        associate (k => body%slot(around(i)))
+          distance = norm2(body%x(k, :) - places(p, :))
+          if (distance > least + touch*body%spacing(k)) cycle
+          if (distance >= least - touch*body%spacing(k) .and. around(i) > point) cycle
+          least = distance
+          point = around(i)
+          slots(p) = k
+        end associate
+      end do
+      if (least <= width) cycle
+      ! all points within a width of the place were there
+      place = 0.0_wp
+      place(:body%dim) = places(p, :)
+      slots(p) = nearest_slot(body, place)
+    end do
+  end function nearest_slots
 
   !> Find its point.
   subroutine begin_probe(measure, scene, system, error)
@@ -112,14 +151,21 @@ contains
     class(probe_measure_type), intent(inout) :: measure
     type(row_source_type), intent(in) :: now
     real(wp), intent(out) :: values(:)
+    type(stencil_type) :: stencil(1)
     real(wp), allocatable :: of_field(:, :)
     integer :: f, first
 
+    if (measure%interpolate) call stencil_at(now%system, int(measure%slot), &
+      & measure%place(:now%system%body%dim), stencil(1))
     first = 1
     do f = 1, size(measure%fields)
       associate (field => measure%fields(f))
         allocate (of_field(field%components(now%system%body%dim), 1))
-        call field%values_at(now%moment_type, [int(measure%slot)], of_field)
+        if (measure%interpolate) then
+          call values_between(field, now%moment_type, stencil, of_field)
+        else
+          call field%values_at(now%moment_type, [int(measure%slot)], of_field)
+        end if
         values(first:first + size(of_field) - 1) = of_field(:, 1)
         first = first + size(of_field)
         deallocate (of_field)
@@ -135,6 +181,14 @@ contains
     integer :: c
 
     text = ''
+    if (measure%interpolate) then
+      do c = 1, system%body%dim
+        if (c > 1) text = text//', '
+        text = text//to_text(measure%place(c))
+      end do
+      text = line('probe', measure%name//' is interpolated at ('//text//') m')
+      return
+    end if
     do c = 1, system%body%dim
       if (c > 1) text = text//', '
       text = text//to_text(system%body%x(measure%slot, c))

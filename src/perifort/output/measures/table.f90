@@ -3,8 +3,10 @@ module pd_output_measures_table
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_boundary, only: add_boundaries
   use pd_output_measures_fragments, only: add_fragments
+  use pd_output_measures_j_integral, only: add_j_integrals
   use pd_output_measures_measure, only: measure_list_type
   use pd_output_measures_probe, only: add_probes
+  use pd_output_measures_section, only: add_sections
   use pd_output_measures_tip, only: add_tips
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
@@ -24,6 +26,8 @@ contains
     call add_boundaries(scene, measures)
     call add_probes(scene, table, measures)
     call add_tips(scene, measures)
+    call add_sections(scene, measures)
+    call add_j_integrals(scene, measures)
   end subroutine measures_of
 
 end module pd_output_measures_table

@@ -14,6 +14,7 @@ module pd_output_report_begin
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about
   use pd_output_fields_table, only: all_fields, field_table_type
+  use pd_output_measures_line, only: profiles_of
   use pd_output_report_columns, only: history_columns, history_table
   use pd_output_report_recorder, only: recorder_type
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of
@@ -71,6 +72,7 @@ contains
       do f = 1, size(recorder%fields)
         recorder%fields(f) = table%field(trim(scene%output%fields(f)))
       end do
+      call profiles_of(scene, table, body, recorder%profiles)
       allocate (positions(body%n_points, 3), source=0.0_wp)
       do c = 1, body%dim
         call gather(body, body%x(:, c), positions(:, c))
@@ -81,7 +83,8 @@ contains
         & planned_outputs(schedule, plan%step), &
         & history_columns(system, recorder%measures, plan%relaxes), planned_rows(schedule), &
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
-        & program_version, options%overwrite .or. options%restart, error, kept)
+        & program_version, options%overwrite .or. options%restart, error, kept, &
+        & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))])
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
       if (.not. recorder%results%resumes()) call put_points(scene, body, recorder, error)

@@ -14,6 +14,7 @@ module pd_output_report_recorder
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
+  use pd_output_measures_line, only: profile_type, write_profiles
   use pd_output_report_balance, only: balance_type
   use pd_output_measures_fragments, only: fragment_type, fragments_of
   use pd_output_measures_measure, only: measure_list_type, row_source_type
@@ -32,6 +33,7 @@ module pd_output_report_recorder
     type(schedule_type) :: schedule
     type(output_field_type), allocatable :: fields(:)  !! of every output
     type(measure_list_type) :: measures      !! of the history
+    type(profile_type), allocatable :: profiles(:)     !! of every output
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(team_type) :: team                  !! threads, whose number may change at any instant
@@ -322,6 +324,7 @@ contains
     call recorder%results%begin_output(instant%time, error)
     if (allocated(error)) return
     call write_fields(recorder%results, recorder%fields, now, undefined, error)
+    if (.not. allocated(error)) call write_profiles(recorder%results, recorder%profiles, now, error)
     if (allocated(error)) return
     call warn_if_any(recorder, 'gradient', gradient_warning(undefined, instant%time))
     call recorder%results%end_output(error)

@@ -22,7 +22,7 @@ module pd_output_results_datasets
   implicit none (type, external)
   private
   public :: put_array, make_dataset, make_series, write_rows, read_rows, set_rows, get_shape
-  public :: get_chunk, make_view, storage_f8, storage_f4, storage_i8
+  public :: get_chunk, make_view, settled_properties, storage_f8, storage_f4, storage_i8
 
   integer, parameter :: storage_f8 = 1  !! 64-bit real
   integer, parameter :: storage_f4 = 2  !! 32-bit real
@@ -109,6 +109,19 @@ contains
     call make_any(file, path, storage, components, rows, max(1_i8, chunk), error)
   end subroutine make_series
 
+  !> Properties of a new dataset whose place in the file is set aside at once and not filled, so
+  !> that writing its values changes none of the file's own records. To be closed by the caller.
+  subroutine settled_properties(properties, status)
+    integer(hid_t), intent(out) :: properties  !! HDF5's identifier
+    integer, intent(out) :: status             !! 0: they are there
+
+    call h5pcreate_f(H5P_DATASET_CREATE_F, properties, status)
+    ! times of change would be one more record to keep
+    if (status == 0) status = int(h5_track_times(properties, .false._c_bool))
+    if (status == 0) call h5pset_alloc_time_f(properties, H5D_ALLOC_TIME_EARLY_F, status)
+    if (status == 0) call h5pset_fill_time_f(properties, H5D_FILL_TIME_NEVER_F, status)
+  end subroutine settled_properties
+
   subroutine make_any(file, path, storage, components, rows, chunk, error)
     type(hdf5_file), intent(in) :: file
     character(*), intent(in) :: path
@@ -126,11 +139,7 @@ contains
     most = extent
     if (chunk > 0) most(rank) = H5S_UNLIMITED_F
 
-    call h5pcreate_f(H5P_DATASET_CREATE_F, properties, status)
-    ! times of change would be one more record to keep
-    if (status == 0) status = int(h5_track_times(properties, .false._c_bool))
-    if (status == 0) call h5pset_alloc_time_f(properties, H5D_ALLOC_TIME_EARLY_F, status)
-    if (status == 0) call h5pset_fill_time_f(properties, H5D_FILL_TIME_NEVER_F, status)
+    call settled_properties(properties, status)
     if (status == 0 .and. chunk > 0) then
       if (rank == 1) then
         call h5pset_chunk_f(properties, 1, [int(chunk, hsize_t)], status)

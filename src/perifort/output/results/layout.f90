@@ -12,7 +12,9 @@ module pd_output_results_layout
     & put_array, read_rows, set_rows, storage_f4, storage_f8, storage_i8, write_rows
   use pd_output_results_hdf5, only: change_attribute, copy_object, hdf5_file, make_group, &
     & object_exists, put_attribute, put_text, remove_object
-  use pd_output_results_types, only: column_type, field_type
+  use pd_output_results_profiles, only: bytes_of_profiles, copy_profiles, make_profiles, &
+    & trim_profiles
+  use pd_output_results_types, only: column_type, field_type, line_type
   use pd_output_results_views, only: view_of_output, view_type, views_fit, views_of
   implicit none (type, external)
   private
@@ -27,6 +29,7 @@ module pd_output_results_layout
   type :: layout_type
     type(field_type), allocatable :: fields(:)
     type(column_type), allocatable :: columns(:)
+    type(line_type), allocatable :: lines(:)
     integer(i8) :: points = 0        !! points
     integer(i8) :: capacity = 0      !! outputs there is room for
     integer(i8) :: row_capacity = 0  !! rows of the history there is room for
@@ -223,6 +226,7 @@ contains
         & trim(self%columns(i)%origin), error)
     end do
     if (.not. allocated(error)) call self%make_views(file, error)
+    if (.not. allocated(error)) call make_profiles(file, self%lines, self%capacity, error)
   end subroutine make_time_series
 
   !> `/outputs`: the outputs one by one, where they are not too many.
@@ -291,7 +295,7 @@ contains
     class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
     integer :: i
 
-    output_bytes = 0
+    output_bytes = bytes_of_profiles(self%lines)
     do i = 1, size(self%fields)
       output_bytes = output_bytes + self%points*field_bytes(self, i)
     end do
@@ -371,11 +375,12 @@ contains
 
   !> Copy the complete outputs and rows, and what there is of an output under way, field by field
   !> and block by block. `outputs` and `rows` count the complete ones.
-  subroutine copy_time_series(self, from, outputs, rows, to, error)
+  subroutine copy_time_series(self, from, outputs, rows, room, to, error)
     class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
     type(hdf5_file), intent(in) :: from     !! a file of the same fields and columns
     integer(i8), intent(in) :: outputs      !! complete ones
     integer(i8), intent(in) :: rows         !! complete ones of the history
+    integer(i8), intent(in) :: room         !! outputs that `from` was laid out for
     type(hdf5_file), intent(in) :: to  !! writable, made by `make_time_series` with room for more
     type(error_type), allocatable, intent(out) :: error
     integer :: i
@@ -395,6 +400,7 @@ contains
       call copy_rows(from, to, '/history/'//trim(self%columns(i)%name), rows, .false., &
         & error)
     end do
+    if (.not. allocated(error)) call copy_profiles(from, to, self%lines, outputs, room, error)
     if (.not. allocated(error)) call change_attribute(to, '/history', 'rows', rows, error)
     if (.not. allocated(error)) &
       & call change_attribute(to, '/VTKHDF/Steps', 'NSteps', outputs, error)
@@ -455,6 +461,8 @@ contains
           if (allocated(error)) return
         end do
       end do
+      call trim_profiles(file, self%lines, outputs, error)
+      if (allocated(error)) return
       do i = 1, size(scalars)
         call set_rows(file, steps//trim(scalars(i)), 1, outputs, error)
         if (allocated(error)) return

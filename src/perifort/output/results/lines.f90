@@ -1,7 +1,7 @@
 !> Tables that grow line by line beside the results: `iterations.csv`, the convergence of a
-!> relaxation, and `fragments.csv`. They are not part of a checkpoint: a restarted run keeps the
-!> lines up to where it continues, and adds to them. An error is set if the file cannot be read or
-!> written.
+!> relaxation, `fragments.csv`, and the profiles along lines. They are not part of a checkpoint: a
+!> restarted run keeps the lines up to where it continues, and adds to them. An error is set if the
+!> file cannot be read or written.
 module pd_output_results_lines
   use pd_base_error, only: error_type
   use pd_base_kinds, only: i8

@@ -28,7 +28,8 @@ module pd_output_results_results
   use pd_output_results_history, only: csv_type, history_type
   use pd_output_results_lines, only: lines_type
   use pd_output_results_sink, only: sink_type
-  use pd_output_results_types, only: column_type, field_type, kept_type, label_length
+  use pd_output_results_profiles, only: add_profile, head_of_profile
+  use pd_output_results_types, only: column_type, field_type, kept_type, label_length, line_type
   use pd_output_results_vtkhdf, only: vtkhdf_file
   use pd_output_results_vtu, only: remove_series, vtu_series
   use pd_output_results_xdmf, only: xdmf_file
@@ -49,6 +50,9 @@ module pd_output_results_results
     type(history_type) :: history
     type(csv_type) :: csv
     type(lines_type) :: iterations, fragments
+    type(line_type), allocatable :: lines(:)
+    type(lines_type), allocatable :: profiles(:)        !! their tables
+    type(values_type), allocatable :: waiting(:)        !! their values of the output under way
     integer :: points = 0
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
@@ -77,6 +81,7 @@ module pd_output_results_results
     !> Write one field of the output under way, by its number or name: `values(n)`, or
     !> `values(n, components)`.
     generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
+    procedure :: put_line
     procedure :: end_output
     procedure :: add_row
     procedure :: add_iteration
@@ -102,7 +107,7 @@ contains
   !> An error if the description is unusable, if older results are in the way, if the files do not
   !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
-    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept)
+    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, lines)
     class(results_type), intent(out) :: self       !! open on return, unless an error is set
     character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
                                                    !! the current one
@@ -122,6 +127,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(kept_type), intent(in), optional :: kept  !! rows, times and scene of a checkpoint to start
                                                    !! from; absent: a new run
+    type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles in each output
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
@@ -143,6 +149,9 @@ contains
     allocate (self%given(size(fields)), source=.false.)
     self%points = size(positions, 1)
     self%planned_outputs = planned_outputs
+    allocate (self%lines(0))
+    if (present(lines)) self%lines = lines
+    allocate (self%profiles(size(self%lines)), self%waiting(size(self%lines)))
     single = lower_case(precision) == 'single'
     self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
@@ -161,14 +170,15 @@ contains
     if (self%resumed) then
       if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
         & size(positions, 1, kind=i8), fields, planned_outputs, columns, planned_rows, single, &
-        & scene_text, kept, error)
+        & scene_text, kept, error, self%lines)
       if (self%use_vtkhdf .and. .not. allocated(error)) &
         & call cut_back(self, kept%times, scene_text, command, version, error)
       if (.not. allocated(error)) call resume_others(self, kept, error)
       if (allocated(error)) return
     else if (self%use_vtkhdf) then
       call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), positions, fields, &
-        & planned_outputs, columns, planned_rows, single, scene_text, command, version, error)
+        & planned_outputs, columns, planned_rows, single, scene_text, command, version, error, &
+        & self%lines)
       if (allocated(error)) then
         call explain_need(self, 'the layout', self%vtkhdf%layout_bytes(), error)
         call remove_empty(self%directory, self%made_folder)
@@ -209,6 +219,20 @@ contains
     end if
   end subroutine check_views
 
+  !> Begin the tables of the lines, or continue them behind the complete outputs.
+  subroutine begin_profiles(self, go_on, error)
+    class(results_type), intent(inout) :: self
+    logical, intent(in) :: go_on
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = 1, size(self%lines)
+      call self%profiles(i)%begin(in_directory(self%directory, trim(self%lines(i)%name)//'.csv'), &
+        & head_of_profile(self%lines(i)), go_on, self%outputs - 1, error)
+      if (allocated(error)) return
+    end do
+  end subroutine begin_profiles
+
   !> Continue the files beside the HDF5 file.
   subroutine resume_others(self, kept, error)
     class(results_type), intent(inout) :: self
@@ -221,6 +245,7 @@ contains
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%resume(kept%times, error)
     if (size(self%columns) > 0 .and. .not. allocated(error)) call self%csv%replace( &
       & in_directory(self%directory, 'history.csv'), self%columns, kept%rows, error)
+    if (.not. allocated(error)) call begin_profiles(self, .true., error)
     self%started = .not. allocated(error)
   end subroutine resume_others
 
@@ -312,6 +337,43 @@ contains
     if (allocated(self%latest)) self%latest(field)%values = values
   end subroutine put_vector_at
 
+  !> The profiles of a line in the output under way, by its number. An error outside an output, for
+  !> another shape, or if they cannot be written.
+  subroutine put_line(self, number, values, error)
+    class(results_type), intent(inout) :: self   !! with an output under way
+    integer, intent(in) :: number                !! of the line, from 1
+    real(wp), intent(in) :: values(:, :)         !! (components of all its fields, position)
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%in_output .or. number < 1 .or. number > size(self%lines)) then
+      call fail(error, 'line '//to_text(number)//' is given outside an output, or there is none')
+      return
+    end if
+    associate (line => self%lines(number))
+      if (any(shape(values) /= [sum(line%fields%components), size(line%positions, 1)])) then
+        call fail(error, 'line '//trim(line%name)//' is given with another shape')
+        return
+      end if
+    end associate
+    if (self%use_vtkhdf) call self%vtkhdf%put_line(number, values, error)
+    if (allocated(error)) call explain_output(self, error)
+    self%waiting(number)%values = values
+  end subroutine put_line
+
+  !> Write what the tables of the lines get from the output under way.
+  subroutine write_profiles(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    if (.not. self%in_files) return
+    do i = 1, size(self%lines)
+      call add_profile(self%profiles(i), self%lines(i), self%outputs, self%time, &
+        & self%waiting(i)%values, error)
+      if (allocated(error)) return
+    end do
+  end subroutine write_profiles
+
   !> A field of one component, by its name. An error as by its number, and for an unknown name.
   subroutine put_scalar_named(self, name, values, error)
     class(results_type), intent(inout) :: self     !! with an output under way
@@ -391,6 +453,11 @@ contains
       call fail(error, 'field '//trim(self%fields(i)%name)//' is missing from an output')
       return
     end do
+    do i = 1, size(self%lines)
+      if (allocated(self%waiting(i)%values)) cycle
+      call fail(error, 'line '//trim(self%lines(i)%name)//' is missing from an output')
+      return
+    end do
     ! rows first: a file that counts this output holds the history up to it
     call self%history%take(table)
     if (self%use_vtkhdf) then
@@ -401,6 +468,7 @@ contains
     if (.not. allocated(error)) call start_files(self, error)
     if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%end_output(self%time, error)
     if (.not. allocated(error) .and. self%csv%is_open()) call self%csv%append(table, error)
+    if (.not. allocated(error)) call write_profiles(self, error)
     if (.not. allocated(error)) call check_there(self, error)
     if (allocated(error)) then
       call explain_output(self, error)
@@ -408,6 +476,9 @@ contains
       self%outputs = self%outputs + 1
       self%times = [self%times, self%time]
       self%in_output = .false.
+      do i = 1, size(self%lines)
+        deallocate (self%waiting(i)%values)
+      end do
       if (allocated(self%latest)) then
         call move_alloc(self%latest, self%complete)
         allocate (self%latest(size(self%fields)))
@@ -458,6 +529,7 @@ contains
     else
       call remove_file(in_directory(self%directory, 'history.csv'))
     end if
+    if (.not. allocated(error)) call begin_profiles(self, .false., error)
     self%started = .not. allocated(error)
   end subroutine start_files
 
@@ -599,6 +671,7 @@ contains
   subroutine sync(self, error)
     class(results_type), intent(inout) :: self  !! open; before the first output this does nothing
     type(error_type), allocatable, intent(out) :: error
+    integer :: i
 
     if (.not. (self%open .and. self%started)) return
     call write_rows(self, error)
@@ -608,6 +681,9 @@ contains
     if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
     if (.not. allocated(error)) call self%iterations%sync(error)
     if (.not. allocated(error)) call self%fragments%sync(error)
+    do i = 1, size(self%lines)
+      if (.not. allocated(error)) call self%profiles(i)%sync(error)
+    end do
   end subroutine sync
 
   !> What a checkpoint counts on: all rows and outputs but the last `rows` and `outputs`.
@@ -666,6 +742,7 @@ contains
     logical, intent(in), optional :: keep_mark  !! keep the mark of unfinished results; absent: no
     type(error_type), allocatable :: ignored
     logical :: leave, complete
+    integer :: i
 
     if (.not. self%open) return
     leave = .false.
@@ -675,6 +752,9 @@ contains
     self%open = .false.
     if (self%use_vtu) call self%vtu%abandon()
     call self%iterations%close(ignored)
+    do i = 1, size(self%lines)
+      if (.not. allocated(ignored)) call self%profiles(i)%close(ignored)
+    end do
     if (allocated(ignored) .and. .not. self%failed) call move_alloc(ignored, error)
     call self%fragments%close(ignored)
     if (allocated(ignored) .and. .not. (self%failed .or. allocated(error))) &

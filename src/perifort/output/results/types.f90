@@ -3,7 +3,7 @@ module pd_output_results_types
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: field_type, column_type, kept_type, label_length
+  public :: field_type, column_type, line_type, kept_type, label_length
 
   integer, parameter :: label_length = 160  !! longest name of a field or column [characters]
 
@@ -19,8 +19,15 @@ module pd_output_results_types
   type :: column_type
     character(label_length) :: name = ''
     character(32) :: unit = ''             !! SI; '1' for none
-    character(16) :: origin = ''           !! 'run', 'boundary', 'probe' or 'tip': its owner
+    character(16) :: origin = ''           !! 'run', 'boundary', 'probe', ..: what it belongs to
   end type column_type
+
+  !> A line along which every output holds profiles of fields.
+  type :: line_type
+    character(label_length) :: name = ''
+    real(wp), allocatable :: positions(:, :)      !! (n, dim) [m]
+    type(field_type), allocatable :: fields(:)    !! with as many components as the dimension asks
+  end type line_type
 
   !> What of the results a checkpoint counts on.
   type :: kept_type

@@ -21,7 +21,8 @@ module pd_output_results_vtkhdf
     & remove_object, start_hdf5
   use pd_output_results_layout, only: block_rows, copy_scene, copy_static, layout_type, &
     & put_geometry, put_scene, to_single, write_vectors
-  use pd_output_results_types, only: column_type, field_type, kept_type
+  use pd_output_results_profiles, only: put_profile
+  use pd_output_results_types, only: column_type, field_type, kept_type, line_type
   use pd_output_results_views, only: views_fit
   implicit none (type, external)
   private
@@ -52,6 +53,7 @@ module pd_output_results_vtkhdf
     procedure, private :: put_scalar, put_vector
     !> Write one field of the output under way: `values(n)` or `values(n, components)`.
     generic :: put_field => put_scalar, put_vector
+    procedure :: put_line
     procedure :: end_output
     procedure :: append_rows
     procedure :: publish
@@ -70,7 +72,7 @@ contains
   !> `columns` (0 = unknown) at the points `positions(n, 3)` [m]. It is
   !> made under another name until `publish`.
   subroutine create(self, path, positions, fields, planned_outputs, columns, planned_rows, single, &
-    & scene_text, command, version, error)
+    & scene_text, command, version, error, lines)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
     character(*), intent(in) :: path             !! of the file, with its ending
     real(wp), intent(in) :: positions(:, :)      !! (n_points, 3) in point order [m]
@@ -83,11 +85,12 @@ contains
     character(*), intent(in) :: command          !! the command line of the run
     character(*), intent(in) :: version          !! of the program
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles; none without
 
     self%path = path
     self%current = path//'.part'
     call plan_layout(self, size(positions, 1, kind=i8), fields, planned_outputs, columns, &
-      & planned_rows, single)
+      & planned_rows, single, lines)
     call start_hdf5(error)
     if (allocated(error)) return
     call remove_file(path//'.grow')  ! a killed run may have left it
@@ -105,7 +108,8 @@ contains
   end subroutine create
 
   !> What the file is to hold, and room for how much of it.
-  subroutine plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+  subroutine plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, &
+    & lines)
     type(vtkhdf_file), intent(inout) :: self
     integer(i8), intent(in) :: points
     type(field_type), intent(in) :: fields(:)
@@ -113,7 +117,10 @@ contains
     type(column_type), intent(in) :: columns(:)
     integer, intent(in) :: planned_rows
     logical, intent(in) :: single
+    type(line_type), intent(in), optional :: lines(:)
 
+    allocate (self%layout%lines(0))
+    if (present(lines)) self%layout%lines = lines
     allocate (self%layout%fields, source=fields)
     allocate (self%layout%columns, source=columns)
     self%layout%points = points
@@ -128,7 +135,7 @@ contains
   !> `cut`; it is not changed yet. The other arguments are those of `create`. An error
   !> if the file has fewer of them, other times, or the results of another scene.
   subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
-    & scene_text, kept, error)
+    & scene_text, kept, error, lines)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
     character(*), intent(in) :: path             !! of the file, with its ending
     integer(i8), intent(in) :: points            !! their number
@@ -140,11 +147,12 @@ contains
     character(*), intent(in) :: scene_text       !! the resolved scene of this run
     type(kept_type), intent(in) :: kept  !! rows, times and scene that the checkpoint counts on
     type(error_type), allocatable, intent(out) :: error
+    type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles; none without
     character(:), allocatable :: text
 
     self%path = path
     self%current = path
-    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, lines)
     call start_hdf5(error)
     if (allocated(error)) return
     call remove_file(path//'.grow')
@@ -354,6 +362,15 @@ contains
       & self%outputs*self%layout%points, values, self%layout%single, error)
   end subroutine put_vector
 
+  !> Write the profiles of line `i` of the output under way.
+  subroutine put_line(self, i, values, error)
+    class(vtkhdf_file), intent(inout) :: self  !! the results file
+    integer, intent(in) :: i                   !! number of the line, from 1
+    real(wp), intent(in) :: values(:, :)       !! (components of all its fields, position)
+    type(error_type), allocatable, intent(out) :: error
+    call put_profile(self%file, self%layout%lines(i), self%outputs, values, error)
+  end subroutine put_line
+
   !> Complete the output under way at `time` [s]: from here on it counts.
   subroutine end_output(self, time, error)
     class(vtkhdf_file), intent(inout) :: self  !! with one complete output more on return
@@ -450,7 +467,7 @@ contains
     end if
     if (.not. allocated(error)) call self%layout%make_time_series(bigger, error)
     if (.not. allocated(error)) call self%layout%copy_time_series(self%file, &
-      & self%outputs, self%rows, bigger, error)
+      & self%outputs, self%rows, old_capacity, bigger, error)
     if (.not. allocated(error)) then
       call close_file(bigger, error)
     else

@@ -6,6 +6,7 @@ module pd_scene_content_check
   use pd_base_text, only: to_text
   use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
   use pd_scene_content_check_bodies, only: check_body, check_shape, check_material, check_crack
+  use pd_scene_content_check_measures, only: check_measures
   use pd_scene_content_defaults, only: fill_defaults
   use pd_scene_content_expressions, only: at_the_start, check_definitions, check_expression
   use pd_scene_content_groups, only: default_fields, default_probe_fields, table_of
@@ -93,6 +94,8 @@ contains
       call check_tip(scene, i, error, source)
       if (allocated(error)) return
     end do
+    call check_measures(scene, error, source)
+    if (allocated(error)) return
     call check_studies(scene, error, source)
   end subroutine check_scene
 

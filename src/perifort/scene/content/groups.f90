@@ -7,7 +7,8 @@ module pd_scene_content_groups
   use pd_scene_content_types, only: scene_type, header_type, define_group, body_group, &
     & shape_group, region_group, no_fail_group, material_group, horizon_group, crack_group, &
     & initial_group, boundary_group, load_group, time_group, relaxation_group, output_group, &
-    & probe_group, tip_group, study_group, group_table
+    & probe_group, tip_group, section_group, line_group, j_integral_group, study_group, &
+    & group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -61,6 +62,12 @@ contains
       & repeated, probe_group(), all=probes)
     call table%add('tip', 'The tip of a crack in every row of the history: where it is, how '// &
       & 'far and how fast it has come, and whether it branches.', repeated, tip_group(), all=tips)
+    call table%add('section', 'Force and moment carried across a plane (3D), a line (2D) or a '// &
+      & 'point (1D), in every row of the history.', repeated, section_group(), all=sections)
+    call table%add('line', 'Profiles of fields along a line, at each output.', repeated, &
+      & line_group(), all=lines)
+    call table%add('j_integral', 'Energy release rate and stress intensity factors of a crack '// &
+      & 'tip (2D), in every row of the history.', repeated, j_integral_group(), all=j_integrals)
     call table%add('study', 'A key that `perifort study` and `choose` vary. Several groups '// &
       & 'make the product of their values; measure and against are given in one of them '// &
       & 'only. `run` ignores it.', repeated, study_group(), all=studies)
@@ -227,6 +234,36 @@ contains
     if (.not. allocated(scene%tips)) allocate (scene%tips(0))
     groups => scene%tips
   end subroutine tips
+
+  subroutine sections(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%sections)) deallocate (scene%sections)
+    if (present(room)) allocate (scene%sections(room))
+    if (.not. allocated(scene%sections)) allocate (scene%sections(0))
+    groups => scene%sections
+  end subroutine sections
+
+  subroutine lines(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%lines)) deallocate (scene%lines)
+    if (present(room)) allocate (scene%lines(room))
+    if (.not. allocated(scene%lines)) allocate (scene%lines(0))
+    groups => scene%lines
+  end subroutine lines
+
+  subroutine j_integrals(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%j_integrals)) deallocate (scene%j_integrals)
+    if (present(room)) allocate (scene%j_integrals(room))
+    if (.not. allocated(scene%j_integrals)) allocate (scene%j_integrals(0))
+    groups => scene%j_integrals
+  end subroutine j_integrals
 
   subroutine studies(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

@@ -18,11 +18,14 @@ module pd_scene_content_types
   use pd_scene_groups_header, only: header_type
   use pd_scene_groups_horizon, only: horizon_group
   use pd_scene_groups_initial, only: initial_group
+  use pd_scene_groups_j_integral, only: j_integral_group
+  use pd_scene_groups_line, only: line_group
   use pd_scene_groups_load, only: load_group
   use pd_scene_groups_material, only: material_group
   use pd_scene_groups_output, only: output_group
   use pd_scene_groups_probe, only: probe_group
   use pd_scene_groups_relaxation, only: relaxation_group
+  use pd_scene_groups_section, only: section_group
   use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
   use pd_scene_groups_study, only: study_group
   use pd_scene_groups_time, only: time_group
@@ -31,8 +34,9 @@ module pd_scene_content_types
   private
   public :: scene_type, header_type, define_group, body_group, shape_group, region_group, &
     & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
-    & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, study_group, &
-    & name_length, path_length, text_length, unset, is_set, is_given
+    & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
+    & section_group, line_group, j_integral_group, study_group, name_length, path_length, &
+    & text_length, unset, is_set, is_given
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -90,6 +94,9 @@ module pd_scene_content_types
     type(output_group) :: output
     type(probe_group), allocatable :: probes(:)
     type(tip_group), allocatable :: tips(:)
+    type(section_group), allocatable :: sections(:)
+    type(line_group), allocatable :: lines(:)
+    type(j_integral_group), allocatable :: j_integrals(:)
     type(study_group), allocatable :: studies(:)
     type(added_type), allocatable :: added(:)    !! groups of a table with more than these
     type(group_table), allocatable :: table      !! that table; without, the program's own

@@ -15,6 +15,7 @@ module pd_scene_groups_probe
   type, extends(group_type) :: probe_group
     character(name_length) :: name = ''
     real(wp) :: point(3) = unset                 !! [m]
+    logical :: interpolate = .false.             !! the value at the position itself
     character(name_length), allocatable :: fields(:)
   contains
     procedure :: visit
@@ -31,6 +32,8 @@ contains
     call keys%key('name', group%name, 'start of its column names', required=.true., word=.true.)
     call keys%key('point', group%point, 'm', 'position; the nearest point is taken', &
       & required=.true.)
+    call keys%key('interpolate', group%interpolate, 'take the value at the position itself, '// &
+      & 'interpolated between the points around')
     call keys%list('fields', group%fields, 'fields to note', keys%field_names(), &
       & default="'displacement'")
   end subroutine visit

@@ -11,7 +11,7 @@ module pd_study_trade_reference
   use pd_scene_format_table, only: column_of, read_table, table_type
   use pd_scene_content_types, only: name_length
   use pd_study_trade_closed_form, only: closed_form_type, field_at
-  use pd_study_trade_interpolate, only: find_stencil, grid_of_places, rows_around, stencil_type
+  use pd_output_fields_interpolate, only: find_stencil, grid_of_places, rows_around, stencil_type
   use pd_study_trade_measure, only: difference, measure_type, of_column, of_field, record_type
   implicit none (type, external)
   private

@@ -3,12 +3,12 @@
 !> In space a polynomial of second degree is fitted to the places around by weighted least squares;
 !> where one place lies at the position itself, its value is taken. In time a cubic goes through the
 !> four rows around.
-module pd_study_trade_interpolate
+module pd_output_fields_interpolate
   use pd_base_kinds, only: wp, i4
   use pd_family_cells, only: cells_around, cells_type, sort_into_cells
   implicit none (type, external)
   private
-  public :: stencil_type, grid_of_places, find_stencil, rows_around
+  public :: stencil_type, grid_of_places, find_stencil, stencil_among, rows_around
 
   real(wp), parameter :: width = 2.6_wp     !! of the neighbourhood [spacings]
   real(wp), parameter :: same = 1.0e-6_wp   !! places so near are one [spacings]
@@ -40,31 +40,43 @@ contains
     type(stencil_type), intent(out) :: stencil   !! places and weights, whose sum is 1; empty
                                                  !! without any place near
     integer(i4), allocatable :: around(:)
+
+    call cells_around(cells, position, around)
+    call stencil_among(x(:, around), spacing, position, stencil)
+    stencil%place = int(around(stencil%place))
+  end subroutine find_stencil
+
+  !> The stencil of a position among a few places: those within 2.6 spacings are taken.
+  pure subroutine stencil_among(x, spacing, position, stencil)
+    real(wp), intent(in) :: x(:, :)              !! places (dim, place) [m]
+    real(wp), intent(in) :: spacing              !! of the places [m]
+    real(wp), intent(in) :: position(:)          !! [m]
+    type(stencil_type), intent(out) :: stencil   !! as of `find_stencil`
     real(wp), allocatable :: distance(:)
+    integer, allocatable :: around(:)
     integer :: i, nearest, degree
     logical :: found
 
-    call cells_around(cells, position, around)
-    distance = [(norm2(x(:, around(i)) - position)/spacing, i=1, size(around))]
-    around = pack(around, distance <= width)
+    distance = [(norm2(x(:, i) - position)/spacing, i=1, size(x, 2))]
+    around = pack([(i, i=1, size(x, 2))], distance <= width)
     distance = pack(distance, distance <= width)
     if (size(around) == 0) then
       allocate (stencil%place(0), stencil%weight(0))
       return
     end if
     nearest = minloc(distance, dim=1)
-    stencil%place = [int(around(nearest))]
+    stencil%place = [around(nearest)]
     stencil%weight = [1.0_wp]
     if (distance(nearest) <= same) return
     do degree = 2, 1, -1
       call fit(degree, (x(:, around) - spread(position, 2, size(around)))/spacing, distance, &
         & stencil%weight, found)
       if (.not. found) cycle
-      stencil%place = int(around)
+      stencil%place = around
       return
     end do
     stencil%weight = [1.0_wp]
-  end subroutine find_stencil
+  end subroutine stencil_among
 
   !> Weights that give the value at 0 of the polynomial fitted to values at `x` (dim, n), in
   !> spacings. `found` is false if the places do not determine it.
@@ -175,4 +187,4 @@ contains
     end do
   end subroutine rows_around
 
-end module pd_study_trade_interpolate
+end module pd_output_fields_interpolate

@@ -1,17 +1,17 @@
 !> Interpolation between places and instants: exact for what it is made of.
-module test_study_trade_interpolate
+module test_output_fields_interpolate
   use pd_base_kinds, only: wp
   use pd_family_cells, only: cells_type
-  use pd_study_trade_interpolate, only: find_stencil, grid_of_places, rows_around, stencil_type
+  use pd_output_fields_interpolate, only: find_stencil, grid_of_places, rows_around, stencil_type
   use bodies, only: expect, expect_true
   use testdrive, only: error_type, new_unittest, unittest_type
   implicit none (type, external)
   private
-  public :: collect_study_trade_interpolate
+  public :: collect_output_fields_interpolate
 
 contains
 
-  subroutine collect_study_trade_interpolate(testsuite)
+  subroutine collect_output_fields_interpolate(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('second degree is exact in every dimension', test_quadratic), &
@@ -19,7 +19,7 @@ contains
       & new_unittest('too few places', test_few), &
       & new_unittest('a cubic in time is exact', test_time), &
       & new_unittest('no value beyond the last row', test_ends)]
-  end subroutine collect_study_trade_interpolate
+  end subroutine collect_output_fields_interpolate
 
   !> Places of a box of n^dim cells of the edge `h`, shaken by a tenth of it.
   subroutine box(dim, n, h, x)
@@ -146,4 +146,4 @@ contains
     call expect_true(error, size(rows%place) == 1, 'a single row')
   end subroutine test_ends
 
-end module test_study_trade_interpolate
+end module test_output_fields_interpolate
