@@ -61,6 +61,7 @@ module pd_motion_system
     type(memory_type) :: memory                 !! what the motion carries from instant to instant
     logical :: break_late = .false.             !! bonds break after the step's forces
     real(wp) :: time = 0.0_wp                   !! of the present displacements [s]
+    logical :: static = .false.                 !! nothing has mass: static equilibrium
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
     type(watch_type) :: watch                   !! over the energies
     type(condition_fault), allocatable :: fault !! first value of a condition that is not finite

@@ -161,6 +161,7 @@ contains
       end if
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return
+      system%static = set_up%plan%relaxes
       call check_bounds(scene, system, set_up%plan, error)
       if (allocated(error)) return
       call timer%stop('time step')

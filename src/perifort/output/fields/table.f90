@@ -11,6 +11,7 @@ module pd_output_fields_table
   use pd_output_fields_force_density, only: force_density_field
   use pd_output_fields_fragment, only: fragment_field
   use pd_output_fields_principal_stress, only: principal_stress_field
+  use pd_output_fields_reaction, only: reaction_field
   use pd_output_fields_strain, only: strain_field
   use pd_output_fields_stress, only: stress_field
   use pd_output_fields_velocity, only: velocity_field
@@ -49,6 +50,7 @@ contains
     call table%add(principal_stress_field())
     call table%add(bond_stress_field())
     call table%add(fragment_field())
+    call table%add(reaction_field())
   end function all_fields
 
   !> Add a field at the end.
