@@ -891,7 +891,8 @@ contains
     read (unit, '(a)') line
     read (unit, *) step
     close (unit)
-    call expect_true(error, index(line, 'velocity') > 0 .and. step > 10.0_wp, 'other columns: '//line)
+    call expect_true(error, index(line, 'velocity') > 0 .and. step > 10.0_wp, &
+      & 'other columns: '//line)
     call remove_file(path)
     call remove_file(here//'/elsewhere/plate.pvd')
     call remove_file(here//'/elsewhere/history.csv')

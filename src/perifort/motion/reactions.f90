@@ -10,8 +10,8 @@ module pd_motion_reactions
 contains
 
   !> The force on each point that holds its constrained components to their motion,
-  !> V (rho a - f - b) (doc/theory.md, 10), 0 for free ones. Over the points of a boundary it sums to
-  !> the reaction of that.
+  !> V (rho a - f - b) (doc/theory.md, 10), 0 for free ones. Over the points of a boundary it sums
+  !> to the reaction of that.
   subroutine point_reactions(system, reaction)
     type(system_type), intent(in) :: system   !! with forces that are up to date
     real(wp), intent(out) :: reaction(:, :)   !! (n_slots, dim) [N]
@@ -31,8 +31,8 @@ contains
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)
-            reaction(k, c) = system%body%volume(k)*(acceleration(i)/inverse_density(system%model, k) &
-              & - system%state%force(k, c) - applied(k, c))
+            reaction(k, c) = system%body%volume(k)*(acceleration(i) &
+              & /inverse_density(system%model, k) - system%state%force(k, c) - applied(k, c))
           end do
         end do
         deallocate (acceleration)

@@ -113,7 +113,7 @@ contains
   !> that writing its values changes none of the file's own records. To be closed by the caller.
   subroutine settled_properties(properties, status)
     integer(hid_t), intent(out) :: properties  !! HDF5's identifier
-    integer, intent(out) :: status             !! 0: they are there
+    integer, intent(out) :: status             !! is 0 where they are there
 
     call h5pcreate_f(H5P_DATASET_CREATE_F, properties, status)
     ! times of change would be one more record to keep

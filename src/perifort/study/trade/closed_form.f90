@@ -22,7 +22,7 @@ module pd_study_trade_closed_form
     character(:), allocatable :: name
     real(wp) :: modulus = 0.0_wp         !! E; plane strain: E/(1 - nu2) [Pa]
     real(wp) :: ratio = 0.0_wp           !! nu; plane strain: nu/(1 - nu)
-    real(wp) :: across = 0.0_wp          !! 2D: stress zz over xx + yy, nu in plane strain, else 0
+    real(wp) :: across = 0.0_wp          !! stress zz over xx + yy, nu in plane strain, else 0
     ! form_linear: u = gradient (x - origin) + shift
     real(wp) :: gradient(3, 3) = 0.0_wp  !! [-]
     real(wp) :: origin(3) = 0.0_wp       !! of form_wave the held end, of form_hole the centre [m]
