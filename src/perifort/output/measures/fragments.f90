@@ -1,5 +1,5 @@
-!> Fragments are parts of the body that chains of intact bonds join. How many there are and the mass of
-!> the largest are columns of the history; each output has a table of all.
+!> Fragments are parts of the body that chains of intact bonds join. How many there are and the mass
+!> of the largest are columns of the history; each output has a table of all.
 module pd_output_measures_fragments
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4, i8
