@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 PathLike = Union[str, "os.PathLike[str]"]
 
-TIP_COLUMNS = ("x", "y", "z", "length", "projection", "speed", "branches")
+TIP_COLUMNS = ("x", "y", "z", "length", "projection", "speed", "branches", "projection_mean",
+               "projection_least", "projection_most")
 _COMPONENT = re.compile(r"_(x|y|z|[xyz]{2}|[123])$")
 
 
@@ -299,13 +300,44 @@ class Results:
     def _group(self, name: str, names: Sequence[str], kind: str,
                only: Sequence[str] = ()) -> Columns:
         """The columns of a probe, boundary or tip, with those that all rows have."""
-        if name not in names:
-            from .reference import nearest
-            what = "are " + ", ".join(names) if names else "is none"
-            raise KeyError(f"{self.path.name} has no {kind} '{name}'{nearest(name, names)}; "
-                           f"there {what}")
+        self._must_have(kind, name, names)
         shared = {key: self.history[key] for key in ("time", "load_step") if key in self.history}
         return Columns(name, {**shared, **self._columns(name, names, kind, only)})
+
+    def _must_have(self, kind: str, name: str, names: Sequence[str]) -> None:
+        """A name that is not among those of its kind is an error."""
+        if name in names:
+            return
+        from .reference import nearest
+        what = "are " + ", ".join(names) if names else "is none"
+        raise KeyError(f"{self.path.name} has no {kind} '{name}'{nearest(name, names)}; "
+                       f"there {what}")
+
+    @property
+    def lines(self) -> list[str]:
+        """The names of the lines along which outputs have profiles."""
+        with h5py.File(self.path, "r") as file:
+            return sorted(file["lines"]) if "lines" in file else []
+
+    def line(self, name: str, output: int | float | None = None, *,
+             time: float | None = None) -> Columns:
+        """Profiles along a line at an output, which is named as in `field`: `position` (n, dimension)
+        and `distance` from the first position [m], and the line's fields, (n) or (n, components).
+        """
+        self._must_have("line", name, self.lines)
+        k = (self.number(time=float(output)) if isinstance(output, (float, np.floating))
+             else self.number(output, time))
+        with h5py.File(self.path, "r") as file:
+            group = file["lines"][name]
+            position = group["position"][()]
+            fields = {field: (group[field][k], _text(group[field].attrs.get("units", "")))
+                      for field in group if field != "position"}
+        profiles = {"position": Quantity(position, "m", "position"),
+                    "distance": Quantity(np.linalg.norm(position - position[0], axis=1), "m",
+                                         "distance")}
+        for field, (values, unit) in fields.items():
+            profiles[field] = Quantity(values[:, 0] if values.shape[1] == 1 else values, unit, field)
+        return Columns(name, profiles)
 
     # Elsewhere
 

@@ -4,6 +4,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import h5py
 import numpy as np
 import perifort
 from perifort.results import Quantity
@@ -89,6 +90,23 @@ class TestResults(unittest.TestCase):
         self.assertEqual(tip.speed.unit, "m/s")
         with self.assertRaisesRegex(AttributeError, "no column 'z'"):
             tip.z
+
+    def test_line(self):
+        path = write_results(self.folder / "lines" / "lines.vtkhdf")
+        with h5py.File(path, "a") as file:
+            line = file.create_group("lines/cut")
+            line["position"] = np.array([[0.0, 1.0], [3.0, 5.0]])
+            line["damage"] = np.arange(6.0).reshape(3, 2, 1)
+            line["stress"] = np.arange(24.0).reshape(3, 2, 4)
+            line["stress"].attrs["units"] = np.bytes_("Pa")
+        results = perifort.open(path.parent)
+        self.assertEqual(results.lines, ["cut"])
+        cut = results.line("cut", 1)
+        self.assertEqual(cut.distance.tolist(), [0.0, 5.0])
+        self.assertEqual(cut.damage.tolist(), [2.0, 3.0])
+        self.assertEqual((cut.stress.shape, cut.stress.unit, cut.stress[1, 3]), ((2, 4), "Pa", 15.0))
+        with self.assertRaisesRegex(KeyError, "no line 'cat'.*there are cut"):
+            results.line("cat")
 
     def test_no_results(self):
         empty = self.folder / "empty"
