@@ -354,7 +354,8 @@ contains
         end do
         call expect_close(error, net, 0.0_wp, 1.0e-13_wp*sizes, 'net force')
         call expect_close(error, moment, 0.0_wp, 1.0e-13_wp*sizes*side, 'net moment')
-        call account(system, real(i, wp), at_rest=.true.)
+        system%static = .true.
+        call account(system, real(i, wp))
         call evaluate(system, 0.0_wp, breaking=.false.)
         call expect_close(error, system%state%force, force, 1.0e-11_wp*max_abs(force), &
           & 'forces after the commit')

@@ -19,8 +19,8 @@ module test_ranks
   use pd_force_breaking, only: damage_of
   use pd_force_model, only: new_model
   use pd_force_weights, only: build_weights
-  use pd_motion_conditions, only: add_loads_to, load_of, load_type, motion_type, &
-    & number_of_loads
+  use pd_motion_conditions, only: motion_type
+  use pd_motion_loads, only: add_loads_to, load_of, load_type, number_of_loads
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_static_relaxation, only: relaxation_type, run_relaxation
   use pd_motion_system, only: start_system, system_type

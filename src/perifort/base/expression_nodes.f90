@@ -176,10 +176,14 @@ contains
     type(node_type), intent(in) :: node  !! no constant and no variable
     real(wp), intent(in) :: a, b, c      !! its operands, 0 where it has none
     type(ieee_status_type) :: status
+    real(wp), volatile :: operand(3), kept
 
+    ! volatile: the operation must not be moved out from between the two calls
     call begin_quiet(status)
-    value = operate(node, a, b, c)
+    operand = [a, b, c]
+    kept = operate(node, operand(1), operand(2), operand(3))
     call end_quiet(status)
+    value = kept
   end function value_of
 
   !> The operation itself.

@@ -5,7 +5,7 @@
 !> the registers of `lanes` points at a time. All blocks have that length, so that a value has the
 !> same bits on any number of threads.
 module pd_base_field
-  use, intrinsic :: ieee_arithmetic, only: ieee_status_type
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_status_type
   use pd_base_error, only: internal_fault
   use pd_base_expression, only: expression_type
   use pd_base_expression_nodes, only: node_type, value_of, begin_quiet, end_quiet, op_x, op_z, &
@@ -221,21 +221,11 @@ contains
     at_fault = 0
     if (.not. field%in_space) then
       values = scalars(field%expression%root)
-      if (.not. abs_is_finite(scalars(field%expression%root))) at_fault = min(1, size(values))
+      if (.not. ieee_is_finite(scalars(field%expression%root))) at_fault = min(1, size(values))
     else
       call run(field%program, scalars, field%points, field%data, 1, values, at_fault)
     end if
   end subroutine field_values
-
-  !> Whether a value is a number; the comparison must not stop at NaN.
-  logical function abs_is_finite(value) result(is_finite)
-    real(wp), intent(in) :: value
-    type(ieee_status_type) :: status
-
-    call begin_quiet(status)
-    is_finite = abs(value) <= huge(value)
-    call end_quiet(status)
-  end function abs_is_finite
 
   !> Run a program for all points, block by block.
   subroutine run(program, scalars, points, data, number, results, at_fault)

@@ -15,9 +15,10 @@ module pd_motion_system
   use pd_force_reference, only: point_dilatation, point_force
   use pd_force_term, only: term_list_type, term_view_type
   use pd_force_workspace, only: workspace_type
-  use pd_motion_conditions, only: motion_type, load_type, impose, remember_start, free_component, &
-    & number_of_loads, load_of, accelerations_of, acts_along, advance_paths, condition_fault, &
-    & density_of, renew_load, renew_motions
+  use pd_motion_conditions, only: motion_type, impose, remember_start, free_component, &
+    & accelerations_of, advance_paths, condition_fault, renew_motions
+  use pd_motion_loads, only: load_type, number_of_loads, load_of, acts_along, density_of, &
+    & renew_load
   use pd_motion_heating, only: heating_type, heat, apply_factors, apply_rate, is_timed, &
     & heating_fault
   use pd_motion_memory, only: memory_type
@@ -482,27 +483,24 @@ contains
   !> Work of loads and imposed motion since the last call, by the trapezoidal rule, and the
   !> reactions at time `t`. To be called once per step, after `evaluate`. What accelerates the
   !> imposed points enters as their gain in kinetic energy: that is exact, and it holds where an
-  !> imposed velocity jumps (at the end of a ramped displacement), too. With `at_rest` (relaxation,
-  !> where imposed motion has no speed) nothing is accelerated.
+  !> imposed velocity jumps (at the end of a ramped displacement), too. In static
+  !> equilibrium, where imposed motion has no speed, nothing is accelerated.
   !>
   !> Terms of the force come to the present, too: their work is summed, and they bring their history
   !> up to date. So do bond laws: the step is accepted.
-  subroutine account(system, t, at_rest)
+  subroutine account(system, t)
     type(system_type), intent(inout), target :: system
       !! its work, reactions and the histories of its terms are those of this instant on return
     real(wp), intent(in) :: t                 !! time of the displacements [s]
-    logical, intent(in), optional :: at_rest  !! nothing is accelerated; false by default
     real(wp), allocatable :: applied(:, :), acceleration(:), density(:, :)
     type(running_type) :: running
     real(wp) :: force, mass, work, factor, totals(6)
-    logical :: first, moving
+    logical :: first
     type(load_type), pointer :: load
     type(term_view_type) :: view
     integer :: m, l, c, i, k, n
 
     system%time = t
-    moving = .true.
-    if (present(at_rest)) moving = .not. at_rest
     first = .not. allocated(system%last_u)
     if (first) call allocate_account(system)
     if (allocated(system%heating%curves)) call account_heat(system, t, first)
@@ -516,13 +514,13 @@ contains
         motion%reaction = 0.0_wp
         do c = 1, system%body%dim
           allocate (acceleration(size(motion%slots)), source=0.0_wp)
-          if (moving) call accelerations_of(motion, c, t, acceleration)
+          if (.not. system%static) call accelerations_of(motion, c, t, acceleration)
           call new_running(system%body%order, running)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)
             mass = 0.0_wp
-            if (moving) mass = system%body%volume(k)/inverse_density(system%model, k)
+            if (.not. system%static) mass = system%body%volume(k)/inverse_density(system%model, k)
             force = system%state%force(k, c)
             if (allocated(applied)) force = force + applied(k, c)
             force = -force*system%body%volume(k)

@@ -12,16 +12,16 @@ module pd_motion_tangent
   implicit none (type, external)
   private
   public :: apply_tangent, tangent_type, tangent_product, forces_at
-  public :: at_rest, one_sided, central
+  public :: about_undeformed, one_sided, central
 
   !> Differences that make a tangent: -F(h w)/h of the undeformed body, which bears no force without
   !> displacement; (F(u) - F(u + h w))/h; (F(u - h w) - F(u + h w))/(2 h).
-  integer, parameter :: at_rest = 1, one_sided = 2, central = 3
+  integer, parameter :: about_undeformed = 1, one_sided = 2, central = 3
 
   !> How a product with the tangent is formed.
   type :: tangent_type
     type(force_options_type) :: options  !! of the forces
-    integer :: difference = central      !! `at_rest`, `one_sided` or `central`
+    integer :: difference = central      !! `about_undeformed`, `one_sided` or `central`
     real(wp) :: step = 1.0_wp            !! the factor h of the direction [-]
   end type tangent_type
 
@@ -71,7 +71,7 @@ contains
     if (tangent%options%thermal) strain = strain &
       & + largest_of_ranks(system%body%order, maxval(abs(system%model%expansion)))
     if (.not. strain > 0.0_wp) then
-      tangent%difference = at_rest
+      tangent%difference = about_undeformed
       tangent%step = undeformed_step*spacing/length
     else
       ! rounding (epsilon strain/step) and curvature (step^2) of the same size
@@ -91,7 +91,7 @@ contains
       !! its state stays as it is; its workspace changes
     type(tangent_type), intent(in) :: tangent
       !! kind of the difference, its step and what the forces take in
-    real(wp), intent(in), contiguous :: u(:, :)          !! where; 0 if `at_rest` [m]
+    real(wp), intent(in), contiguous :: u(:, :)          !! where; 0 if `about_undeformed` [m]
     real(wp), intent(in), contiguous :: w(:, :)          !! direction (n_slots, dim) [m]
     real(wp), intent(inout), contiguous :: kw(:, :)      !! product (n_slots, dim) [N/m3]
     real(wp), allocatable, intent(inout) :: moved(:, :)  !! room, made where there is none yet
@@ -103,7 +103,7 @@ contains
 
     associate (step => tangent%step, options => tangent%options)
       select case (tangent%difference)
-      case (at_rest)
+      case (about_undeformed)
         if (abs(step - 1) > 0.0_wp) then
           call make_room()
           call displace(u, step, w, moved)

@@ -12,9 +12,9 @@ module pd_set_up_conditions
   use pd_body_generate, only: touch
   use pd_body_regions, only: in_region, values_on
   use pd_body_shapes, only: inside
-  use pd_motion_conditions, only: motion_type, load_type, add_part, &
-    & moved_by_displacement, moved_by_velocity, &
+  use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
     & vary_in_time
+  use pd_motion_loads, only: load_type, add_part
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve
   use pd_motion_heating, only: heating_type, new_heating, new_timed_heat, timed_heat_type
   implicit none (type, external)

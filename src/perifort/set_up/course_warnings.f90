@@ -7,7 +7,7 @@ module pd_set_up_course_warnings
   use pd_base_warnings, only: warnings_type
   use pd_motion_curve, only: curve_type
   use pd_set_up_plan, only: plan_type
-  use pd_motion_conditions, only: load_of, load_type, number_of_loads
+  use pd_motion_loads, only: load_of, load_type, number_of_loads
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: given
   use pd_scene_content_change, only: scan_scene

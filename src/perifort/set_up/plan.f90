@@ -10,7 +10,7 @@ module pd_set_up_plan
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
     & stable_step_of, may_be_unstable, lowest_eigenvalue
   use pd_force_term, only: term_view_type
-  use pd_motion_conditions, only: number_of_loads
+  use pd_motion_loads, only: number_of_loads
   use pd_motion_system, only: system_type, inverse_density, view_of
   use pd_motion_explicit_time_step, only: stiffness_bound, stable_step, printed_step, book_step, &
     & chapter_stiffness, constant_stiffness, integrator_limit, damped_step

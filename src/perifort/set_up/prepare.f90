@@ -20,7 +20,7 @@ module pd_set_up_prepare
   use pd_force_generic_bonds, only: begin_laws, refresh_bonds
   use pd_force_model, only: new_model
   use pd_force_term, only: term_list_type
-  use pd_motion_conditions, only: add_loads_to, load_type
+  use pd_motion_loads, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system, explain_condition
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type
@@ -161,7 +161,6 @@ contains
       end if
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return
-      system%static = set_up%plan%relaxes
       call check_bounds(scene, system, set_up%plan, error)
       if (allocated(error)) return
       call timer%stop('time step')

@@ -7,7 +7,8 @@ module pd_set_up_terms
   use pd_force_springs, only: new_springs
   use pd_force_term, only: term_list_type
   use pd_law_material, only: material_type
-  use pd_motion_conditions, only: load_of, load_type, motion_type
+  use pd_motion_conditions, only: motion_type
+  use pd_motion_loads, only: load_of, load_type
   use pd_motion_curve, only: constant_curve, ramp
   use pd_scene_content_types, only: is_set, scene_type
   use pd_set_up_conditions, only: volume_of

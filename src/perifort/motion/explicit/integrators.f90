@@ -49,6 +49,7 @@ contains
     logical :: sound
     integer :: n, seen
 
+    system%static = .false.
     instant%dt = dt
     seen = system%memory%step
     if (seen == not_begun) call begin_memory(system, integrator)

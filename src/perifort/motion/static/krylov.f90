@@ -8,11 +8,11 @@ module pd_motion_static_krylov
     & new_running, new_sums, running_type, total_of, total_of_running, summed_type => sums_type
   use pd_body_body, only: share_halo
   use pd_force_model, only: force_options_type, options_of
-  use pd_motion_conditions, only: number_of_loads
+  use pd_motion_loads, only: number_of_loads
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
   use pd_force_term, only: term_view_type
   use pd_motion_system, only: system_type, add_loads, view_of
-  use pd_motion_tangent, only: at_rest, forces_at, one_sided, tangent_product, tangent_type
+  use pd_motion_tangent, only: about_undeformed, forces_at, one_sided, tangent_product, tangent_type
   implicit none (type, external)
   private
   public :: make_room, linearise, take_residual, first_direction
@@ -229,7 +229,7 @@ contains
         & krylov%moved, krylov%forces)
     else
       ! directions are so small that they need no other factor
-      tangent%difference = at_rest
+      tangent%difference = about_undeformed
       call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
         & krylov%moved)
     end if

@@ -73,6 +73,7 @@ contains
     integer :: i, first, parts
     logical :: amid, dynamic, unfinished
 
+    system%static = .true.
     instant%dt = 1.0_wp
     call check_terms(system, error)
     if (allocated(error)) return
@@ -133,7 +134,7 @@ contains
         if (allocated(system%memory%base)) deallocate (system%memory%base)
         system%memory%trend = system%memory%trend(:0, :)
         ! the forces that did the work are those before the bonds break
-        call account(system, instant%time, at_rest=.true.)
+        call account(system, instant%time)
         call break_now(system, number)
         if (number == 0) exit
         parts = rigid%pieces%number
@@ -257,7 +258,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     system%state%v = 0.0_wp
-    call account(system, instant%time, at_rest=.true.)
+    call account(system, instant%time)
     instant%settled = .true.
     system%memory%step = instant%step
     system%memory%load_step = instant%load_step

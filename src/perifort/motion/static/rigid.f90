@@ -8,7 +8,7 @@ module pd_motion_static_rigid
   use pd_base_text, only: to_text
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
   use pd_force_term, only: term_view_type
-  use pd_motion_conditions, only: load_of, load_type, number_of_loads
+  use pd_motion_loads, only: load_of, load_type, number_of_loads
   use pd_motion_system, only: system_type, add_loads, view_of
   implicit none (type, external)
   private

@@ -4,7 +4,8 @@ module pd_motion_static_start
   use pd_base_kinds, only: wp, i1
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, largest_of_ranks
   use pd_base_text, only: to_text
-  use pd_motion_conditions, only: impose, number_of_loads
+  use pd_motion_conditions, only: impose
+  use pd_motion_loads, only: number_of_loads
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
   use pd_motion_system, only: system_type, add_loads

@@ -11,7 +11,7 @@ module pd_output_report_overview
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_set_up_conditions, only: no_fail_mask, region_mask
-  use pd_motion_conditions, only: load_of, load_type
+  use pd_motion_loads, only: load_of, load_type
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -115,7 +115,7 @@ contains
     end associate
   end function lengths
 
-  !> Points of each region, boundary, load and no-fail zone.
+  !> Points of each region, boundary, load, line and no-fail zone.
   function counts(scene, system) result(text)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in), target :: system
@@ -141,6 +141,10 @@ contains
         text = text//line('load '//to_text(i), counted(points_of_load(i), &
           & 'point')//', '//place(group%side, group%region))
       end associate
+    end do
+    do i = 1, size(scene%lines)
+      text = text//line('line '//to_text(i), trim(scene%lines(i)%name)//': '// &
+        & counted(scene%lines(i)%points, 'position'))
     end do
     do i = 1, size(scene%no_fail)
       text = text//line('no-fail zone '//to_text(i), &

@@ -8,6 +8,7 @@ module pd_study_trade_analytic
   use pd_base_text, only: newline, to_text
   use pd_body_generate, only: horizon_of
   use pd_law_laws, only: law_table_type
+  use pd_law_weighted, only: weighted_law_type
   use pd_family_volume, only: reach, volume_correction, volume_rule_number, volume_rule_type
   use pd_motion_system, only: system_type
   use pd_scene_content_expressions, only: has_expressions
@@ -141,6 +142,26 @@ contains
     if (n > 0) has_history = laws%items(n)%law%bond_history + laws%items(n)%law%point_history > 0
   end function has_history
 
+  !> Whether the law of the first material is one of the chapter's, with its influence function.
+  logical function has_chapters_law(scene)
+    type(scene_type), intent(in) :: scene
+    type(law_table_type) :: laws
+    integer :: n
+
+    has_chapters_law = .false.
+    laws = laws_of(scene)
+    n = laws%number_of(scene%materials(1)%model)
+    if (n == 0) return
+    if (scene%materials(1)%influence /= '') laws%items(n)%law%influence = &
+      & scene%materials(1)%influence
+    select type (law => laws%items(n)%law)
+    class is (weighted_law_type)
+      has_chapters_law = .not. law%has_factors()
+    class default  ! a law with a force of its own
+      continue
+    end select
+  end function has_chapters_law
+
   !> A bar released from uniform strain, held at one end.
   subroutine fit_vibration(scene, form, reason)
     type(scene_type), intent(in) :: scene
@@ -272,8 +293,7 @@ contains
 
     if (form%dim /= 1) then
       reason = 'it is for dimension 1'
-    else if (scene%materials(1)%model == 'lps' .or. .not. any(scene%materials(1)%influence &
-      & == [character(8) :: '', 'inverse'])) then
+    else if (.not. has_chapters_law(scene)) then
       reason = "it is for the chapter's laws with influence = 'inverse'"
     else if (scene%time%method /= 'explicit') then
       reason = "it needs &time method = 'explicit'"
