@@ -87,6 +87,7 @@ contains
     scene%probes(1)%point(:2) = 0.0_wp
     scene%probes(1)%fields = [character(64) :: 'velocity', 'dilatation']
     scene%probes(1)%interpolate = .true.
+    deallocate (scene%sections, scene%lines)
     allocate (scene%sections(1), scene%lines(1))
     scene%sections(1)%name = 'cut'
     scene%sections(1)%point = [6.0_wp, 6.0_wp, 0.0_wp]*spacing
