@@ -38,6 +38,7 @@ contains
       & new_unittest('a list, bonds that break late', test_list), &
       & new_unittest('temperatures that vary in time', test_heated), &
       & new_unittest('conditions that are expressions of t', test_expressions), &
+      & new_unittest('pins in motion and in equilibrium', test_pins), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
       & new_unittest('no row of a load step that has not converged', test_no_row), &
@@ -577,6 +578,38 @@ contains
       call expect_same_results(error, 'whole', 'pieces', merge(3, 4, i < 3))
     end do
   end subroutine test_expressions
+
+  !> A plate that breaks beside a pin, and one that is bent about pins, cut after every iteration.
+  subroutine test_pins(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: solvers(2) = [character(18) :: 'conjugate_gradient', &
+      & 'dynamic_relaxation']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    do i = 0, 2
+      if (allocated(error)) return
+      if (i == 0) then
+        call plate(scene)
+      else
+        call slow_plate(scene)
+        scene%relaxation%solver = solvers(i)
+      end if
+      scene%boundaries(1)%motion = 'pin'
+      if (i > 0) then
+        scene%boundaries(1)%displacement(1) = 0.0_wp
+        scene%boundaries(2)%motion = 'pin'
+        scene%materials(1)%critical_stretch = unset
+      end if
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 10, 'it is not cut')
+      call expect_same_results(error, 'whole', 'pieces', merge(6, 2, i == 0))
+    end do
+  end subroutine test_pins
 
   !> Two load steps, in the second of which bonds break and it relaxes again; cut after every
   !> iteration and every load step, with a load beside the imposed displacements.

@@ -7,11 +7,13 @@ module pd_motion_conditions
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_text, only: to_text
   use pd_motion_curve, only: curve_type
+  use pd_motion_pose, only: pose_type, arm_of, cross, displacement_of, keep_pose, spin_of, &
+    & spin_rate_of
   implicit none (type, external)
   private
   public :: motion_type, free_component, moved_by_displacement, moved_by_velocity, impose, &
     & remember_start, vary_in_time, advance_paths, keep_paths, accelerations_of, renew_motions, &
-    & condition_fault, note_fault
+    & condition_fault, note_fault, guide, keep_poses
 
   integer, parameter :: free_component = 0
   integer, parameter :: moved_by_displacement = 1
@@ -53,6 +55,10 @@ module pd_motion_conditions
     real(wp), allocatable :: start(:, :)    !! displacement at t = 0 (slot, dim) [m]
     integer(i1), allocatable :: held(:, :)  !! 1 where this motion holds, not a later one
     real(wp) :: reaction(3) = 0.0_wp        !! force the boundary exerts on the body [N]
+    logical :: is_pin = .false.             !! its points move as one rigid body, which `kind` and
+                                            !! what else is imposed guide by its centre
+    type(pose_type), allocatable :: pose    !! of a pin, once the system is ready
+    real(wp) :: moment(3) = 0.0_wp          !! of a pin, about its centre [N m]
   end type motion_type
 
 contains
@@ -64,6 +70,10 @@ contains
     integer :: m, c
 
     do m = 1, size(motions)
+      if (allocated(motions(m)%pose)) then
+        motions(m)%start = reshape(motions(m)%pose%place(:size(u, 2)), [1, size(u, 2)])
+        cycle
+      end if
       if (.not. allocated(motions(m)%start)) &
         & allocate (motions(m)%start(size(motions(m)%slots), size(u, 2)))
       do c = 1, size(u, 2)
@@ -73,16 +83,21 @@ contains
   end subroutine remember_start
 
   !> Set displacement and velocity of the constrained components at time `t` [s].
-  subroutine impose(motions, t, u, v)
+  subroutine impose(motions, t, u, v, but_pins)
     type(motion_type), intent(in) :: motions(:)   !! (any number) with `start` and `held` set
     real(wp), intent(in) :: t  !! time; in relaxation 0 to 1 over the load steps [s]
     real(wp), intent(inout) :: u(:, :)            !! displacements (n_slots, dim) [m]
     real(wp), intent(inout), optional :: v(:, :)  !! velocities (n_slots, dim) [m/s]
+    logical, intent(in), optional :: but_pins     !! whether pins are left as they are
     real(wp) :: factor, rate, path
     integer :: m, c, i
 
     do m = 1, size(motions)
       associate (motion => motions(m))
+        if (allocated(motion%pose)) then
+          if (.not. present(but_pins)) call impose_pose(motion, t, u, v)
+          cycle
+        end if
         if (all(motion%kind == free_component)) cycle
         factor = motion%curve%value(t)
         rate = motion%curve%slope(t)
@@ -110,6 +125,58 @@ contains
       end associate
     end do
   end subroutine impose
+
+  !> Set displacement and velocity of a pin's points: all its components.
+  subroutine impose_pose(motion, t, u, v)
+    type(motion_type), intent(in) :: motion       !! a pin
+    real(wp), intent(in) :: t                     !! time [s]
+    real(wp), intent(inout) :: u(:, :)            !! displacements (n_slots, dim) [m]
+    real(wp), intent(inout), optional :: v(:, :)  !! velocities (n_slots, dim) [m/s]
+    real(wp) :: place(3), velocity(3), spin(3), moved(3)
+    integer :: i, k
+
+    call guide(motion, t, place, velocity)
+    spin = spin_of(motion%pose)
+    do i = 1, size(motion%slots)
+      k = motion%slots(i)
+      moved = displacement_of(motion%pose, i, place)
+      u(k, :) = moved(:size(u, 2))
+      if (.not. present(v)) cycle
+      moved = velocity + cross(spin, arm_of(motion%pose, i))
+      v(k, :) = moved(:size(u, 2))
+    end do
+  end subroutine impose_pose
+
+  !> Displacement and velocity of a pin's centre at time `t`: what is imposed, else what its pose
+  !> has.
+  subroutine guide(motion, t, place, velocity)
+    type(motion_type), intent(in) :: motion  !! a pin with its `start`
+    real(wp), intent(in) :: t                !! time [s]
+    real(wp), intent(out) :: place(3)        !! [m]
+    real(wp), intent(out) :: velocity(3)     !! [m/s]
+    real(wp), allocatable :: places(:, :), speeds(:, :)
+    integer :: c, at, component
+
+    place = motion%pose%place
+    velocity = motion%pose%velocity
+    if (any(motion%by_time)) then
+      places = motion%place
+      speeds = motion%speed
+      if (abs(t - motion%time) > 0.0_wp) call places_at(motion, t, places, speeds, at, component)
+    end if
+    do c = 1, motion%pose%dim
+      if (motion%by_time(c)) then
+        place(c) = places(1, c)
+        velocity(c) = speeds(1, c)
+      else if (motion%kind(c) == moved_by_displacement) then
+        place(c) = motion%amplitude(c)*motion%curve%value(t)
+        velocity(c) = motion%amplitude(c)*motion%curve%slope(t)
+      else if (motion%kind(c) == moved_by_velocity) then
+        place(c) = motion%start(1, c) + motion%amplitude(c)*motion%curve%integral(t)
+        velocity(c) = motion%amplitude(c)*motion%curve%value(t)
+      end if
+    end do
+  end subroutine guide
 
   !> What a component of point `i` is at factor 1.
   pure real(wp) function amplitude_of(motion, i, c) result(amplitude)
@@ -234,6 +301,37 @@ contains
     end do
   end subroutine impose_by_time
 
+  !> Accelerations of component `c` of a pin's points at time `t`: of its centre, and of turning.
+  subroutine accelerations_of_pin(motion, c, t, acceleration)
+    type(motion_type), intent(in) :: motion        !! a pin
+    integer, intent(in) :: c
+    real(wp), intent(in) :: t
+    real(wp), intent(out) :: acceleration(:)
+    real(wp) :: of_centre(1), spin(3), rate(3), arm(3), turning(3)
+    integer :: i, at
+
+    of_centre = 0.0_wp
+    if (motion%by_time(c)) then
+      if (motion%kind(c) == moved_by_displacement) then
+        call field_values(motion%timed(c)%second, t, of_centre, at)
+      else
+        call field_values(motion%timed(c)%rate, t, of_centre, at)
+      end if
+      if (at > 0) of_centre = 0.0_wp
+    else if (motion%kind(c) == moved_by_velocity) then
+      of_centre = motion%amplitude(c)*motion%curve%slope(t)
+    else if (motion%kind(c) == free_component) then
+      of_centre = motion%pose%force(c)/motion%pose%mass
+    end if
+    spin = spin_of(motion%pose)
+    rate = spin_rate_of(motion%pose)
+    do i = 1, size(acceleration)
+      arm = arm_of(motion%pose, i)
+      turning = cross(rate, arm) + cross(spin, cross(spin, arm))
+      acceleration(i) = of_centre(1) + turning(c)
+    end do
+  end subroutine accelerations_of_pin
+
   !> Accelerations of component `c` at time `t` [m/s2]: for the force that moves the points.
   subroutine accelerations_of(motion, c, t, acceleration)
     type(motion_type), intent(in) :: motion        !! an imposed motion
@@ -243,6 +341,10 @@ contains
     real(wp) :: slope
     integer :: at, i
 
+    if (allocated(motion%pose)) then
+      call accelerations_of_pin(motion, c, t, acceleration)
+      return
+    end if
     acceleration = 0.0_wp
     if (motion%by_time(c)) then
       if (motion%kind(c) == moved_by_displacement) then
@@ -269,7 +371,7 @@ contains
     do m = 1, size(motions)
       associate (motion => motions(m))
         if (.not. any(motion%by_time .and. motion%kind == moved_by_velocity)) cycle
-        allocate (path(size(motion%slots)))
+        allocate (path(size(motion%path, 1)))
         do c = 1, size(motion%path, 2)
           if (.not. motion%by_time(c) .or. motion%kind(c) /= moved_by_velocity) cycle
           call path_between(motion%timed(c)%value, motion%path_time, t, path, at)
@@ -294,6 +396,17 @@ contains
       motions(m)%time = never
     end do
   end subroutine keep_paths
+
+  !> Keep where pins are, or put them back.
+  subroutine keep_poses(archive, motions)
+    class(archive_type), intent(inout) :: archive   !! a checkpoint that is written or read
+    type(motion_type), intent(inout) :: motions(:)  !! (any number) get their poses where it reads
+    integer :: m
+
+    do m = 1, size(motions)
+      if (allocated(motions(m)%pose)) call keep_pose(archive, to_text(m), motions(m)%pose)
+    end do
+  end subroutine keep_poses
 
   !> Note the first value of a condition that is not finite.
   pure subroutine note_fault(group, number, key, slot, t, fault)

@@ -6,7 +6,7 @@ module pd_motion_keep
   use pd_base_checksum, only: checksum_type
   use pd_base_kinds, only: wp, i1, i8
   use pd_force_generic_points, only: keep_laws
-  use pd_motion_conditions, only: keep_paths
+  use pd_motion_conditions, only: keep_paths, keep_poses
   use pd_motion_heating, only: keep_heating
   use pd_motion_memory, only: keep_memory
   use pd_motion_system, only: system_type
@@ -42,17 +42,19 @@ contains
     call archive%keep('last force', system%last_force)
     call archive%keep('last velocity', system%last_v)
     call archive%keep('loaded and held', system%loaded_and_held)
-    allocate (reactions(3, size(system%motions)))
+    allocate (reactions(6, size(system%motions)))
     do m = 1, size(system%motions)
-      reactions(:, m) = system%motions(m)%reaction
+      reactions(:, m) = [system%motions(m)%reaction, system%motions(m)%moment]
     end do
     call archive%keep('reactions', reactions)
     do m = 1, size(system%motions)
-      system%motions(m)%reaction = reactions(:, m)
+      system%motions(m)%reaction = reactions(:3, m)
+      system%motions(m)%moment = reactions(4:, m)
     end do
     if (allocated(system%heating%curves)) &
       & call keep_heating(archive, system%heating, system%model%expansion)
     call keep_paths(archive, system%motions)
+    call keep_poses(archive, system%motions)
     call system%terms%keep(archive)
     call keep_memory(archive, system%memory)
   end subroutine keep_system

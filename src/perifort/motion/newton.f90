@@ -5,7 +5,7 @@ module pd_motion_newton
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: newton_type, krylov_type, ritz_type, sums_type, keep_newton
+  public :: newton_type, krylov_type, frame_type, ritz_type, sums_type, keep_newton
 
   !> What the loop along a direction sums up, squares over the free components.
   type :: sums_type
@@ -26,6 +26,14 @@ module pd_motion_newton
     real(wp) :: beta = 0.0_wp                 !! share of the last direction in this one
   end type ritz_type
 
+  !> The free rigid motions of a pin at a configuration.
+  type :: frame_type
+    integer :: number = 0                   !! of them
+    real(wp) :: centre(3) = 0.0_wp          !! about which its points turn [m]
+    real(wp) :: size = 1.0_wp               !! makes rotations comparable [m]
+    real(wp) :: combination(6, 6) = 0.0_wp  !! of three translations and three rotations
+  end type frame_type
+
   !> A solve of the linear equations.
   type :: krylov_type
     real(wp), allocatable :: residual(:, :)   !! f + b on free components, else 0 [N/m3]
@@ -36,12 +44,16 @@ module pd_motion_newton
     real(wp) :: largest = 0.0_wp              !! component of the direction [m]
     real(wp) :: rho = 0.0_wp                  !! residual . preconditioned residual
     real(wp) :: norm = 0.0_wp                 !! curvature if the preconditioner were the stiffness
+    real(wp), allocatable :: of_pins(:, :)    !! residual along the free motions (6, motions); of
+                                              !! size 0 without pins
     logical :: deformed = .false.             !! the tangent at `origin`, else at no displacement
     type(ritz_type) :: ritz
     ! made anew wherever the solve continues
     real(wp), allocatable :: inverse(:, :)    !! the preconditioner: 1/mass, 0 where held [m4/N]
     real(wp), allocatable :: product(:, :)    !! stiffness times direction [N/m3]
     real(wp), allocatable :: moved(:, :)      !! displacements of a difference [m]
+    real(wp), allocatable :: mass(:, :)       !! what `inverse` is of, where there are pins [N/m4]
+    type(frame_type), allocatable :: frames(:)  !! (motions) of pins at the origin
   end type krylov_type
 
   !> Newton's iterations and the solve under way.
@@ -78,6 +90,7 @@ contains
       call archive%keep('direction', krylov%direction)
       call archive%keep('origin', krylov%origin)
       call archive%keep('forces at the origin', krylov%forces)
+      call archive%keep('residual of pins', krylov%of_pins)
       call archive%keep('scale', krylov%scale)
       call archive%keep('largest', krylov%largest)
       call archive%keep('rho', krylov%rho)

@@ -22,6 +22,7 @@ module pd_motion_system
   use pd_motion_heating, only: heating_type, heat, apply_factors, apply_rate, is_timed, &
     & heating_fault
   use pd_motion_memory, only: memory_type
+  use pd_motion_pose, only: fit_pose, moments_about, new_pose
   use pd_motion_energy_watch, only: watch_type
   implicit none (type, external)
   private
@@ -101,6 +102,8 @@ contains
     if (.not. allocated(system%state%damage)) allocate (system%state%damage(merge(n, 0, &
       & system%model%breaking)), source=0.0_wp)
     call hold_components(system)
+    call make_poses(system)
+    call find_loaded(system)
     call remember_start(system%motions, system%state%u)
     call renew_conditions(system, 0.0_wp)
     call impose(system%motions, 0.0_wp, system%state%u, system%state%v)
@@ -127,6 +130,36 @@ contains
     view%step = max(0, system%memory%step)
   end subroutine view_of
 
+  !> Make the rigid bodies of pins, in their places of the initial displacements and with the
+  !> momentum of the initial velocities.
+  subroutine make_poses(system)
+    type(system_type), intent(inout) :: system  !! with `u` and `v` of the start
+    real(wp), allocatable :: density(:, :), masses(:)
+    real(wp) :: totals(6)
+    integer :: m, i
+
+    do m = 1, size(system%motions)
+      associate (motion => system%motions(m), body => system%body)
+        if (.not. motion%is_pin) cycle
+        masses = [(body%volume(motion%slots(i))/inverse_density(system%model, &
+          & int(motion%slots(i))), i=1, size(motion%slots))]
+        if (allocated(motion%pose)) deallocate (motion%pose)
+        allocate (motion%pose)
+        call new_pose(body, motion%slots, masses, motion%pose)
+        call fit_pose(body, motion%slots, system%state%u, motion%pose)
+        ! momentum sums like force: of mass times velocity over volume
+        allocate (density(body%dim, size(motion%slots)))
+        do i = 1, size(motion%slots)
+          density(:, i) = masses(i)/body%volume(motion%slots(i))*system%state%v(motion%slots(i), :)
+        end do
+        totals = moments_about(body, motion%slots, motion%pose, density)
+        deallocate (density)
+        motion%pose%velocity = totals(:3)/motion%pose%mass
+        motion%pose%momentum = totals(4:)
+      end associate
+    end do
+  end subroutine make_poses
+
   !> Note which components are constrained; where several motions claim one, the last holds it.
   pure subroutine hold_components(system)
     type(system_type), intent(inout) :: system
@@ -136,7 +169,7 @@ contains
     allocate (holder(system%body%n_slots, system%body%dim), source=0_i4)
     do m = 1, size(system%motions)
       do c = 1, system%body%dim
-        if (system%motions(m)%kind(c) /= free_component) &
+        if (system%motions(m)%kind(c) /= free_component .or. system%motions(m)%is_pin) &
           & holder(system%motions(m)%slots, c) = int(m, i4)
       end do
     end do
@@ -347,9 +380,10 @@ contains
         call fill(int(bonds%j(i)))
       end do
     end do
-    if (abs(pairing%offset) > 0.0_wp) &
-      & call impose(system%motions, t + pairing%offset, others(:, :, 1))
-    if (two) call impose(system%motions, t + pairing%held, others(:, :, 2))
+    ! a pin's pose is that of the present instant alone: its points move on with their velocities
+    if (abs(pairing%offset) > 0.0_wp) call impose(system%motions, t + pairing%offset, &
+      & others(:, :, 1), but_pins=.true.)
+    if (two) call impose(system%motions, t + pairing%held, others(:, :, 2), but_pins=.true.)
 
   contains
 
@@ -361,9 +395,13 @@ contains
 
       v = system%state%v(k, :)
       if (abs(pairing%kick) > 0.0_wp) then
-        v = v + pairing%kick*inverse_density(system%model, k)*system%state%force(k, :)
-        if (allocated(loads)) &
-          & v = v + pairing%kick*inverse_density(system%model, k)*loads(k, :)
+        ! constrained components are imposed below, and those of pins know their velocities
+        where (system%held(k, :) == 0_i1) v = v + pairing%kick*inverse_density(system%model, k) &
+          & *system%state%force(k, :)
+        if (allocated(loads)) then
+          where (system%held(k, :) == 0_i1) v = v + pairing%kick &
+            & *inverse_density(system%model, k)*loads(k, :)
+        end if
       end if
       do o = 1, size(others, 3)
         others(k, :, o) = system%state%u(k, :) + pairing%offset*v
@@ -512,6 +550,7 @@ contains
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
         motion%reaction = 0.0_wp
+        if (motion%is_pin) call account_moment(system, t, applied, motion)
         do c = 1, system%body%dim
           allocate (acceleration(size(motion%slots)), source=0.0_wp)
           if (.not. system%static) call accelerations_of(motion, c, t, acceleration)
@@ -563,6 +602,34 @@ contains
     call system%terms%account(view, system%external_work, system%dissipated)
     call system%terms%advance(view)
   end subroutine account
+
+  !> The moment about its centre by which a pin is turned: of what accelerates its points beyond
+  !> the forces on them. Turning is free, so that it vanishes but for rounding, or in static
+  !> equilibrium for the tolerance.
+  subroutine account_moment(system, t, applied, motion)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t
+    real(wp), allocatable, intent(in) :: applied(:, :)  !! loads (n_slots, dim), where any act here
+    type(motion_type), intent(inout) :: motion          !! a pin; gets its moment
+    real(wp) :: density(system%body%dim, size(motion%slots)), acceleration(size(motion%slots))
+    real(wp) :: totals(6)
+    integer :: c, i, k
+
+    density = 0.0_wp
+    do c = 1, system%body%dim
+      if (.not. system%static) then
+        call accelerations_of(motion, c, t, acceleration)
+        density(c, :) = acceleration*motion%pose%masses/system%body%volume(motion%slots)
+      end if
+      do i = 1, size(motion%slots)
+        k = motion%slots(i)
+        density(c, i) = density(c, i) - system%state%force(k, c)
+        if (allocated(applied)) density(c, i) = density(c, i) - applied(k, c)
+      end do
+    end do
+    totals = moments_about(system%body, motion%slots, motion%pose, density)
+    motion%moment = totals(4:)
+  end subroutine account_moment
 
   !> Commit the histories of the bond laws.
   subroutine commit(system)
@@ -684,14 +751,26 @@ contains
     do l = 1, number_of_loads(system%terms)
       load => load_of(system%terms, l)
       n = n + size(load%slots)
+    end do
+    call find_loaded(system)
+    n = n*system%body%dim
+    allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
+  end subroutine allocate_account
+
+  !> Find out whether a constrained component also bears a load.
+  subroutine find_loaded(system)
+    type(system_type), intent(inout), target :: system
+    type(load_type), pointer :: load
+    integer :: l
+
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
       if (any(system%held(load%slots, :) == 1_i1)) system%loaded_and_held = .true.
     end do
     ! other external terms may act anywhere
     if (system%terms%outside > number_of_loads(system%terms)) &
       & system%loaded_and_held = system%loaded_and_held .or. any(system%held == 1_i1)
-    n = n*system%body%dim
-    allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
-  end subroutine allocate_account
+  end subroutine find_loaded
 
   !> Velocities at the time `t` of the displacements [m/s], half a kick [s] on from those that the
   !> integrator keeps.

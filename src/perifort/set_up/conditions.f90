@@ -8,6 +8,7 @@ module pd_set_up_conditions
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, load_group, is_set
   use pd_scene_groups_course, only: ramp_of
+  use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
   use pd_body_regions, only: in_region, values_on
@@ -41,6 +42,7 @@ contains
     do m = 1, size(motions)
       associate (group => scene%boundaries(m), motion => motions(m))
         motion%name = trim(group%name)
+        motion%is_pin = group%motion == 'pin'
         if (group%side /= '') then
           chosen = body%layer == m .and. body%point > 0
         else
@@ -73,7 +75,40 @@ contains
           & any(motion%by_time))
       end associate
     end do
+    call check_pins_apart(scene, body, motions, error)
   end subroutine motions_of_scene
+
+  !> An error if another boundary holds a point of a pin, or a pin's points are at one place.
+  subroutine check_pins_apart(scene, body, motions, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    type(motion_type), intent(in) :: motions(:)  !! in the order of the groups
+    type(error_type), allocatable, intent(out) :: error
+    logical, allocatable :: of_pin(:)
+    integer :: m, other
+
+    if (.not. any(motions%is_pin)) return
+    allocate (of_pin(body%n_slots))
+    do m = 1, size(motions)
+      if (.not. motions(m)%is_pin) cycle
+      if (size(motions(m)%slots) == 1 .and. body%dim > 1) then
+        call scene_fault(error, scene, 'boundary', m, 'motion', 'a pin of one point', &
+          & 'a single point has no rotation: leave out motion, or take a region with more points')
+        return
+      end if
+      of_pin = .false.
+      of_pin(motions(m)%slots) = .true.
+      do other = 1, size(motions)
+        if (other == m .or. scene%boundaries(other)%absorbing) cycle
+        if (.not. any(of_pin(motions(other)%slots))) cycle
+        call scene_fault(error, scene, 'boundary', max(m, other), 'motion', &
+          & '&boundary number '//to_text(min(m, other))//' and number '//to_text(max(m, other))// &
+          & ' share points, and one of them is a pin', &
+          & 'the points of a pin move as one rigid body: part the regions')
+        return
+      end do
+    end do
+  end subroutine check_pins_apart
 
   !> A component of an imposed motion that is given by an expression. What has no t is an amplitude,
   !> of each point if it has x, y or z. An error is set if a value is not finite.
@@ -94,7 +129,12 @@ contains
     motion%kind(c) = kind
     call expression_of(scene, text, expression)
     if (expression%in_time) then
-      call vary_in_time(motion, c, expression, body%x(motion%slots, :))
+      if (motion%is_pin) then
+        ! the same at every place
+        call vary_in_time(motion, c, expression, body%x(motion%slots(:1), :))
+      else
+        call vary_in_time(motion, c, expression, body%x(motion%slots, :))
+      end if
       return
     end if
     call values_on(scene, text, body, motion%slots, 'boundary', number, key//'_'//xyz(c:c), &

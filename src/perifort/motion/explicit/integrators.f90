@@ -12,6 +12,7 @@ module pd_motion_explicit_integrators
   use pd_base_text, only: to_text
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
+  use pd_motion_pins, only: gather_pins, move_pins
   use pd_motion_watch_fault, only: explain_fault, faulty_slot, points_at_once, stays_within
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_energy_watch, only: watch_type
@@ -76,6 +77,7 @@ contains
         ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
         instant%kick = 0.0_wp
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
+        call gather_pins(system, instant%time, instant%kick)
         call account(system, instant%time)
         call system%watch%supplied(system%external_work)
         call observer%observe(system, instant, error)
@@ -86,6 +88,7 @@ contains
       if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, squares, sound)
+        call move_pins(system, instant%time, dt)
       else
         call advance(system, integrator, instant%time, dt, start)
         sound = faulty_slot(system, system%state%v, dt, squares) == 0

@@ -16,6 +16,7 @@ module pd_motion_explicit_spectrum
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: bond_factors_of, force_options_type, model_type, options_of, q_of, t_of
   use pd_force_workspace, only: workspace_type
+  use pd_motion_pins, only: held_but_for_pins
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
   implicit none (type, external)
@@ -297,13 +298,15 @@ contains
     type(system_type), intent(in) :: system
     real(wp), allocatable, intent(out) :: scale(:, :, :)
     integer, intent(out) :: free
+    integer(i1), allocatable :: held(:, :)
     integer :: k, c
 
+    held = held_but_for_pins(system)
     allocate (scale(system%body%n_slots, system%body%dim, 2), source=0.0_wp)
     free = 0
     do c = 1, system%body%dim
       do k = 1, system%body%n_slots
-        if (system%body%point(k) == 0 .or. system%held(k, c) == 1_i1) cycle
+        if (system%body%point(k) == 0 .or. held(k, c) == 1_i1) cycle
         scale(k, c, 1) = sqrt(inverse_density(system%model, k)/system%body%volume(k))
         scale(k, c, 2) = sqrt(inverse_density(system%model, k)*system%body%volume(k))
         if (owned(system%body, k)) free = free + 1

@@ -9,6 +9,9 @@ module pd_motion_static_balance
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text
   use pd_force_forces, only: energy_pass
+  use pd_motion_newton, only: frame_type
+  use pd_motion_pins, only: has_pins
+  use pd_motion_static_pins, only: add_drive, drive_pins, frame_pins, squares_of
   use pd_motion_watch_fault, only: place
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_residual, only: relaxation_type, squared_force
@@ -188,6 +191,7 @@ contains
         piece%rho = terms(6)
       end associate
     end do
+    if (has_pins(system)) call weigh_pins(system, relaxation, rigid, loads, balance)
     allocate (borne, mold=loads)
     if (system%terms%inside > 0) then
       call forces_of_terms(system, t, borne)
@@ -204,6 +208,33 @@ contains
     end if
     call add_groups(system, rigid, loads, borne, balance)
   end subroutine weigh
+
+  !> What drives the free motions of pins is residual; of all forces on their points, which count as
+  !> support, it is the part that no rigidity bears.
+  subroutine weigh_pins(system, relaxation, rigid, loads, balance)
+    type(system_type), intent(in) :: system
+    type(relaxation_type), intent(in) :: relaxation
+    type(rigid_type), intent(in) :: rigid
+    real(wp), intent(in) :: loads(:, :)           !! (n_slots, dim) force density [N/m3]
+    type(balance_type), intent(inout) :: balance  !! gets what is out of balance
+    type(frame_type), allocatable :: frames(:)
+    real(wp), allocatable :: drives(:, :), left(:, :)
+    integer :: m
+
+    associate (u => system%state%u)
+      call frame_pins(system, relaxation%mass, u, frames)
+      drives = drive_pins(system, frames, u, system%state%force + loads)
+      allocate (left(size(u, 1), size(u, 2)), source=0.0_wp)
+      call add_drive(system, frames, u, drives, 1.0_wp, left, relaxation%mass)
+    end associate
+    do m = 1, size(frames)
+      if (frames(m)%number == 0) cycle
+      associate (piece => balance%piece(rigid%pieces%of(system%motions(m)%slots(1))))
+        piece%residual = piece%residual + squares_of(system, m, left, .true.)
+        piece%rho = piece%rho + sum(drives(:, m)**2)
+      end associate
+    end do
+  end subroutine weigh_pins
 
   !> Net forces and moments of each boundary, of the terms of the force and of the loads on every
   !> piece, and their sums.

@@ -17,6 +17,7 @@ module pd_motion_static_conjugate_gradient
     & smallest_curvature
   use pd_motion_newton, only: newton_type, krylov_type, sums_type
   use pd_motion_observer, only: observer_type, instant_type, add_note
+  use pd_motion_pins, only: fit_pins, held_but_for_pins, snap_pins
   use pd_motion_static_residual, only: relaxation_type, squared_force
   use pd_motion_static_rigid, only: rigid_type, remove_free_motions
   use pd_motion_static_start, only: move_along
@@ -101,6 +102,7 @@ contains
       if (allocated(error)) return
       change = trend
       call move_along(system, rigid, instant%time, change)
+      call fit_pins(system)
       call begin(system, instant%time, change, .false., newton)
       newton%least = newton%sums%residual
     end if
@@ -316,10 +318,11 @@ contains
     type(instant_type), intent(inout) :: instant
     type(newton_type), intent(inout) :: newton
     integer, intent(out) :: ended
-    real(wp), allocatable :: predicted(:, :)
+    real(wp), allocatable :: predicted(:, :), of_pins(:, :)
 
     associate (krylov => newton%krylov, sums => newton%sums, linear => newton%linear)
       predicted = krylov%residual
+      of_pins = krylov%of_pins
       call evaluate_residual(system, instant%time, krylov, sums)
       call weigh(system, relaxation, rigid, instant%time, balance)
       instant%residual = relative_residual(balance)
@@ -332,6 +335,7 @@ contains
       ended = under_way
       ! the directions are conjugate with the linear residual
       krylov%residual = predicted
+      krylov%of_pins = of_pins
       newton%next_check = linear%residual &
         & *merge(between_last_checks, between_checks, newton%asked)**2
     end associate
@@ -396,14 +400,15 @@ contains
     if (.not. allocated(error)) call move_alloc(system%memory%newton, newton)
   end subroutine show
 
-  !> The true forces at the present displacements, the residual that the loads at `t` leave, and its
-  !> sums.
+  !> The true forces at the present displacements, with pins rigid, the residual that the loads at
+  !> `t` leave, and its sums.
   subroutine evaluate_residual(system, t, krylov, sums)
     type(system_type), intent(inout) :: system
     real(wp), intent(in) :: t
     type(krylov_type), intent(inout) :: krylov
     type(sums_type), intent(out) :: sums
 
+    call snap_pins(system, t)
     call renew_forces(system, t)
     call take_residual(system, t, krylov, sums)
   end subroutine evaluate_residual
@@ -420,7 +425,7 @@ contains
     integer :: halving
 
     whole = sums%residual
-    step = merge(system%state%u - krylov%origin, 0.0_wp, system%held == 0_i1)
+    step = merge(system%state%u - krylov%origin, 0.0_wp, held_but_for_pins(system) == 0_i1)
     system%state%u = system%state%u - step
     call evaluate_residual(system, t, krylov, sums)
     base = sums%residual

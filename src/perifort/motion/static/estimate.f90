@@ -5,6 +5,8 @@ module pd_motion_static_estimate
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_motion_static_krylov, only: make_room, linearise, take_residual, first_direction, &
     & next_direction, apply_stiffness, go_along, volume_inner, note_length, smallest_curvature
+  use pd_motion_pins, only: held_but_for_pins
+  use pd_motion_static_pins, only: add_drive
   use pd_motion_newton, only: krylov_type, sums_type
   use pd_motion_static_residual, only: relaxation_type
   use pd_motion_static_rigid, only: rigid_type, remove_free_motions
@@ -41,6 +43,7 @@ contains
     type(sums_type) :: sums
     real(wp), allocatable :: u(:, :), force(:, :), first(:, :), energy(:)
     type(running_type) :: running
+    integer(i1), allocatable :: held(:, :)
     real(wp) :: curvature, gained, rho, totals(6)
     integer :: p, i, k
 
@@ -52,6 +55,9 @@ contains
     call remove_free_motions(system, rigid, krylov%residual)
     where (.not. krylov%inverse > 0.0_wp) krylov%residual = 0.0_wp
     allocate (first, source=krylov%residual)
+    if (size(krylov%of_pins) > 0) call add_drive(system, krylov%frames, krylov%origin, &
+      & krylov%of_pins, 1.0_wp, first, krylov%mass)
+    held = held_but_for_pins(system)
     call first_direction(system, krylov)
     rho = sums%rho
     gained = 0.0_wp
@@ -79,7 +85,7 @@ contains
         do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
           k = rigid%pieces%slots(i)
           call add_point(system%body%order, system%body%point(k), [system%body%volume(k) &
-            & *sum((system%state%u(k, :) - u(k, :))*first(k, :), mask=system%held(k, :) == 0_i1)], &
+            & *sum((system%state%u(k, :) - u(k, :))*first(k, :), mask=held(k, :) == 0_i1)], &
             & running)
         end do
         totals = total_of_running(system%body%order, running)

@@ -10,6 +10,8 @@ module pd_motion_static_krylov
   use pd_force_model, only: force_options_type, options_of
   use pd_motion_loads, only: number_of_loads
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
+  use pd_motion_pins, only: has_pins
+  use pd_motion_static_pins, only: aim_pins, drive_pins, frame_pins, go_pins
   use pd_force_term, only: term_view_type
   use pd_motion_system, only: system_type, add_loads, view_of
   use pd_motion_tangent, only: about_undeformed, forces_at, one_sided, tangent_product, tangent_type
@@ -42,6 +44,11 @@ contains
     allocate (krylov%product, krylov%inverse, source=0.0_wp*mass)
     where (mass > 0.0_wp .and. system%held == 0_i1) krylov%inverse = 1/mass
     call share_halo(system%body, krylov%inverse)
+    if (.not. allocated(krylov%of_pins)) allocate (krylov%of_pins(6, &
+      & merge(size(system%motions), 0, has_pins(system))), source=0.0_wp)
+    if (size(krylov%of_pins) == 0) return
+    krylov%mass = mass
+    call frame_pins(system, mass, krylov%origin, krylov%frames)
   end subroutine make_room
 
   !> The residual from the system's forces and the loads at `t`, and its sums.
@@ -54,6 +61,9 @@ contains
 
     krylov%residual = system%state%force
     call add_loads(system, t, 1.0_wp, .false., krylov%residual)
+    if (size(krylov%of_pins) > 0) then
+      krylov%of_pins = drive_pins(system, krylov%frames, krylov%origin, krylov%residual)
+    end if
     where (.not. krylov%inverse > 0.0_wp) krylov%residual = 0.0_wp
     ! a step of length 0 moves nothing and sums everything
     krylov%product = 0.0_wp
@@ -80,6 +90,10 @@ contains
     largest = largest_of_ranks(system%body%order, largest)
     krylov%scale = 1.0_wp
     krylov%rho = volume_inner(system, krylov%residual, krylov%direction)
+    if (size(krylov%of_pins) > 0) then
+      call aim_pins(system, 1.0_wp, krylov, largest)
+      krylov%rho = krylov%rho + sum(krylov%of_pins**2)
+    end if
     krylov%norm = krylov%rho
     krylov%largest = largest
     krylov%ritz = ritz_type()
@@ -112,6 +126,9 @@ contains
       end do
     end do
     largest = largest_of_ranks(system%body%order, largest)
+    if (size(krylov%of_pins) > 0) then
+      call aim_pins(system, krylov%scale, krylov, largest)
+    end if
     krylov%largest = largest
     if (largest > largest_size*system%family%rule%delta) &
       & call rescale(krylov, direction_size*system%family%rule%delta/largest)
@@ -192,6 +209,7 @@ contains
 
     krylov%origin = system%state%u
     krylov%deformed = deformed
+    if (size(krylov%of_pins) > 0) call frame_pins(system, krylov%mass, krylov%origin, krylov%frames)
     if (.not. deformed) return
     if (.not. allocated(krylov%forces)) allocate (krylov%forces, mold=krylov%origin)
     call forces_at(system, krylov%origin, krylov%forces, forces_of(system, deformed))
@@ -297,6 +315,9 @@ contains
     sums%change = totals(3)
     sums%displacement = totals(4)
     sums%support = force_of_supports(system)
+    if (size(krylov%of_pins) > 0) then
+      call go_pins(system, length, krylov, sums)
+    end if
     call share_halo(system%body, system%state%u)
   end subroutine go_along
 

@@ -15,6 +15,9 @@ module pd_motion_static_relaxation
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type, add_note
   use pd_motion_static_residual, only: relaxation_type
+  use pd_motion_newton, only: frame_type
+  use pd_motion_pins, only: fit_pins, has_pins
+  use pd_motion_static_pins, only: add_drive, check_pins, drive_pins, frame_pins, squares_of
   use pd_motion_static_rigid, only: rigid_type, find_free_motions, check_balance, turn_back
   use pd_motion_watch_fault, only: faulty_slot, greatest_stretch, place
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
@@ -78,6 +81,9 @@ contains
     call check_terms(system, error)
     if (allocated(error)) return
     call find_free_motions(system, rigid)
+    call check_pins(system, rigid, merge(status_input, status_no_answer, &
+      & system%memory%step == not_begun), error)
+    if (allocated(error)) return
     do i = max(1, system%memory%load_step), relaxation%load_steps
       call renew_conditions(system, real(i, wp)/relaxation%load_steps)
       if (allocated(system%fault)) call explain_condition(system, status_input, error)
@@ -140,7 +146,9 @@ contains
         parts = rigid%pieces%number
         call find_free_motions(system, rigid)
         call add_note(instant, loose_text(system, rigid, parts))
-        call check_balance(system, rigid, instant%time, status_no_answer, error)
+        call check_pins(system, rigid, status_no_answer, error)
+        if (.not. allocated(error)) &
+          & call check_balance(system, rigid, instant%time, status_no_answer, error)
         if (allocated(error)) then
           call show_good(good, system, observer, error)
           return
@@ -246,6 +254,7 @@ contains
     associate (memory => system%memory, krylov => system%memory%newton%krylov)
       allocate (krylov%residual, krylov%direction, krylov%origin, krylov%forces, &
         & memory%newton%best, mold=system%state%u)
+      allocate (krylov%of_pins(6, merge(size(system%motions), 0, has_pins(system))))
       if (relaxation%load_steps > 1) allocate (memory%trend, memory%start, mold=system%state%u)
     end associate
   end subroutine fill_memory
@@ -294,6 +303,7 @@ contains
         memory%load_step = instant%load_step
         memory%next_judgement = 0
         call move_along(system, rigid, instant%time, no_trend)
+        call fit_pins(system)
         call evaluate(system, instant%time, breaking=.false.)
         memory%base = system%state%u
         call weigh(system, relaxation, rigid, instant%time, balance)
@@ -312,6 +322,7 @@ contains
       do iteration = max(1, memory%iteration), min(relaxation%maximum_iterations, patience)
         if (iteration > memory%iteration) then
           call move(system%state%u, rate)                          ! 7.29b
+          call fit_pins(system)
           a_before = a
           call evaluate(system, instant%time, breaking=.false.)
           call fictitious_acceleration(system, relaxation, instant%time, a)
@@ -412,12 +423,13 @@ contains
     memory%change = sums%change
   end subroutine remember
 
-  !> a = F/lambda of the free components, 0 elsewhere.
+  !> a = F/lambda of the free components and of the free motions of pins, 0 elsewhere.
   subroutine fictitious_acceleration(system, relaxation, t, a)
     type(system_type), intent(in) :: system
     type(relaxation_type), intent(in) :: relaxation
     real(wp), intent(in) :: t
     real(wp), intent(out) :: a(:, :)
+    type(frame_type), allocatable :: frames(:)
     integer :: k, c
 
     a = system%state%force
@@ -432,6 +444,20 @@ contains
         end if
       end do
     end do
+    if (.not. has_pins(system)) return
+    call frame_pins(system, relaxation%mass, system%state%u, frames)
+    call add_drive(system, frames, system%state%u, drives_of(), 1.0_wp, a)
+
+  contains
+
+    !> What drives the free motions of pins.
+    function drives_of() result(drives)
+      real(wp), allocatable :: drives(:, :), density(:, :)
+
+      density = system%state%force
+      call add_loads(system, t, 1.0_wp, .false., density)
+      drives = drive_pins(system, frames, system%state%u, density)
+    end function drives_of
   end subroutine fictitious_acceleration
 
   !> u = u + rate (a step of 1).
@@ -471,7 +497,7 @@ contains
     type(sums_type), intent(out) :: sums
     type(summed_type) :: parts
     real(wp) :: terms(block_points, 6), u2, totals(6)
-    integer :: block, i, k, c, n, at, slots(block_points)
+    integer :: block, i, k, c, n, at, m, slots(block_points)
 
     call new_sums(system%body%order, 6, parts)
     !$omp parallel do schedule(static) default(none) &
@@ -505,6 +531,11 @@ contains
     sums%displacement = totals(4)
     sums%moved = totals(5)
     sums%stiffness = totals(6)
+    ! the residual of pins is that of their free motions
+    do m = 1, size(system%motions)
+      if (system%motions(m)%is_pin) sums%residual = sums%residual &
+        & + squares_of(system, m, a*relaxation%mass, .true.)
+    end do
   end subroutine add_up
 
 end module pd_motion_static_relaxation

@@ -1,6 +1,7 @@
 !> Rigid motions of the pieces of a body, and which of them the constraints leave free. In a static
 !> problem nothing resists those, so the loads must not drive them.
 module pd_motion_static_rigid
+  use pd_base_eigen, only: eigenvectors, solve_symmetric
   use pd_base_kinds, only: wp, i1
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
     & largest_of_ranks, largest_over
@@ -8,12 +9,15 @@ module pd_motion_static_rigid
   use pd_base_text, only: to_text
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
   use pd_force_term, only: term_view_type
+  use pd_motion_conditions, only: free_component
+  use pd_motion_pins, only: held_but_for_pins
   use pd_motion_loads, only: load_of, load_type, number_of_loads
+  use pd_motion_pose, only: cross
   use pd_motion_system, only: system_type, add_loads, view_of
   implicit none (type, external)
   private
   public :: rigid_type, piece_type, find_free_motions, check_balance, remove_free_motions
-  public :: turn_back, fit_rigid_motion
+  public :: turn_back, fit_rigid_motion, motion_at
 
   real(wp), parameter :: balanced = 1.0e-10_wp  !! net force and moment over the applied ones
   real(wp), parameter :: held_at_all = 1.0e-12_wp
@@ -45,6 +49,7 @@ contains
     type(rigid_type), intent(out) :: rigid           !! pieces and free motions
     type(load_type), pointer :: load
     real(wp), allocatable :: resistance(:, :, :)
+    integer(i1), allocatable :: held(:, :)
     integer :: p, l, i
 
     call find_pieces(system%body, system%family, rigid%pieces)
@@ -56,9 +61,11 @@ contains
       end associate
     end do
     call find_resistance(system, rigid, resistance)
+    call resist_by_pins(system, rigid, resistance)
+    held = held_but_for_pins(system)
     do p = 1, rigid%pieces%number
       associate (pieces => rigid%pieces)
-        call describe_piece(system, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
+        call describe_piece(system, held, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), &
           & resistance(:, :, p), rigid%piece(p))
       end associate
     end do
@@ -147,11 +154,37 @@ contains
     end do
   end subroutine find_resistance
 
-  !> Free motions of the piece that consists of `slots`.
-  subroutine describe_piece(system, slots, of_terms, piece)
+  !> Add what pins resist: the imposed components of their centres, so that a point of a pin counts
+  !> as one that is held.
+  subroutine resist_by_pins(system, rigid, resistance)
     type(system_type), intent(in) :: system
+    type(rigid_type), intent(in) :: rigid               !! pieces in their places
+    real(wp), intent(inout) :: resistance(:, :, :)      !! (6, 6, pieces) [-] added to
+    real(wp) :: mode(6)
+    integer :: m, c, i, p
+
+    do m = 1, size(system%motions)
+      associate (motion => system%motions(m))
+        if (.not. motion%is_pin) cycle
+        p = rigid%pieces%of(motion%slots(1))
+        do c = 1, system%body%dim
+          if (motion%kind(c) == free_component) cycle
+          mode = motion_at(rigid%piece(p)%centre, rigid%piece(p)%size, &
+            & motion%pose%centre(:system%body%dim), c)
+          do i = 1, 6
+            resistance(:, i, p) = resistance(:, i, p) + size(motion%slots)*mode(i)*mode
+          end do
+        end do
+      end associate
+    end do
+  end subroutine resist_by_pins
+
+  !> Free motions of the piece that consists of `slots`.
+  subroutine describe_piece(system, held_to, slots, of_terms, piece)
+    type(system_type), intent(in) :: system
+    integer(i1), intent(in) :: held_to(:, :)    !! (n_slots, dim) 1 where constrained, but for pins
     integer, intent(in) :: slots(:)
-    real(wp), intent(in) :: of_terms(6, 6)      !! resistance of the terms of the force [-]
+    real(wp), intent(in) :: of_terms(6, 6)      !! resistance of terms of the force and of pins [-]
     type(piece_type), intent(inout) :: piece    !! in its place
     type(running_type) :: of_mass(6), of_resistance(6)
     real(wp) :: resistance(6, 6), vectors(6, 6), mass(6, 6), mode(6), values(6), held(6)
@@ -171,7 +204,7 @@ contains
             if (abs(mode(i)) <= 0.0_wp) cycle
             held = mode(i)*mode
             call add_point(order, system%body%point(k), held*system%body%volume(k), of_mass(i))
-            if (system%held(k, c) == 1_i1) &
+            if (held_to(k, c) == 1_i1) &
               & call add_point(order, system%body%point(k), held, of_resistance(i))
           end do
         end do
@@ -439,12 +472,6 @@ contains
     end do
   end subroutine move_rigidly
 
-  pure function cross(a, b) result(c)
-    real(wp), intent(in) :: a(3), b(3)
-    real(wp) :: c(3)
-    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-  end function cross
-
   !> Move a piece as a rigid body on from displacements `u` so that it comes as near as it can to
   !> `target` (n_slots, dim) [m] in the least squares of `weight` (n_slots, dim), by Newton's
   !> iterations on the finite motion, to the last digit of what is left of the displacements.
@@ -458,7 +485,7 @@ contains
       !! (n_slots, dim) of each component, 0 for those that do not count
     real(wp), intent(inout) :: u(:, :)
       !! (n_slots, dim) displacements; those of the piece change [m]
-    real(wp) :: matrix(6, 6), vectors(6, 6), values(6), side(6), mode(6), part(6), centre(3)
+    real(wp) :: matrix(6, 6), side(6), mode(6), part(6), centre(3)
     type(running_type) :: of_matrix(6), of_side
     integer :: turn, n, k, c, i
 
@@ -488,12 +515,7 @@ contains
           do i = 1, 6
             matrix(:, i) = total_of_running(system%body%order, of_matrix(i))
           end do
-          call eigenvectors(matrix, values, vectors)
-          mode = 0.0_wp
-          do i = 1, 6
-            if (values(i) > 1.0e-10_wp*maxval(values)) &
-              & mode = mode + vectors(:, i)*dot_product(vectors(:, i), side)/values(i)
-          end do
+          mode = solve_symmetric(matrix, side)
           ! at most a radian at a time
           mode = mode/max(1.0_wp, norm2(mode(4:))/piece%size)
           call move_rigidly(system, piece, slots, mode, u)
@@ -503,38 +525,5 @@ contains
       end associate
     end associate
   end subroutine fit_rigid_motion
-
-  !> Eigenvalues and eigenvectors of a small symmetric matrix by Jacobi's rotations.
-  pure subroutine eigenvectors(matrix, values, vectors)
-    real(wp), intent(in) :: matrix(6, 6)
-    real(wp), intent(out) :: values(6), vectors(6, 6)
-    real(wp) :: a(6, 6), rotation(6, 6), angle
-    integer :: sweep, i, j
-
-    a = matrix
-    vectors = 0.0_wp
-    do i = 1, 6
-      vectors(i, i) = 1.0_wp
-    end do
-    do sweep = 1, 30
-      do i = 1, 5
-        do j = i + 1, 6
-          if (abs(a(i, j)) <= 0.0_wp) cycle
-          angle = 0.5_wp*atan2(2*a(i, j), a(j, j) - a(i, i))
-          rotation = 0.0_wp
-          rotation(1, 1) = 1.0_wp; rotation(2, 2) = 1.0_wp; rotation(3, 3) = 1.0_wp
-          rotation(4, 4) = 1.0_wp; rotation(5, 5) = 1.0_wp; rotation(6, 6) = 1.0_wp
-          rotation(i, i) = cos(angle); rotation(j, j) = cos(angle)
-          rotation(i, j) = sin(angle); rotation(j, i) = -sin(angle)
-          a = matmul(transpose(rotation), matmul(a, rotation))
-          a(i, j) = 0.0_wp; a(j, i) = 0.0_wp
-          vectors = matmul(vectors, rotation)
-        end do
-      end do
-    end do
-    do i = 1, 6
-      values(i) = a(i, i)
-    end do
-  end subroutine eigenvectors
 
 end module pd_motion_static_rigid

@@ -4,6 +4,7 @@ module pd_output_measures_boundary
   use pd_base_kinds, only: wp
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_motion_conditions, only: motion_type
+  use pd_motion_pose, only: rotation_of
   use pd_motion_system, only: system_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
   use pd_output_results_types, only: column_type
@@ -18,6 +19,7 @@ module pd_output_measures_boundary
   type, extends(measure_type) :: boundary_measure_type
     character(:), allocatable :: name
     integer :: number = 0                !! of its group and of its motion
+    logical :: is_pin = .false.          !! has moments and rotations, too
   contains
     procedure :: columns => columns_of_boundary
     procedure :: row => row_of_boundary
@@ -36,21 +38,29 @@ contains
       if (scene%boundaries(i)%name == '') cycle
       measure%name = trim(scene%boundaries(i)%name)
       measure%number = i
+      measure%is_pin = scene%boundaries(i)%motion == 'pin'
       call measures%add(measure)
     end do
   end subroutine add_boundaries
 
-  !> The force that the boundary exerts on the body, and the mean displacement.
+  !> The force that the boundary exerts on the body, and the mean displacement; of a pin the moment
+  !> about its centre and its rotation, too.
   function columns_of_boundary(measure, dim) result(columns)
     class(boundary_measure_type), intent(in) :: measure
     integer, intent(in) :: dim
     type(column_type), allocatable :: columns(:)
-    integer :: c
+    integer :: c, n, axes
 
-    allocate (columns(2*dim))
+    axes = merge(rotations(dim), 0, measure%is_pin)
+    allocate (columns(2*dim + 2*axes))
     do c = 1, dim
       columns(c) = column_type(measure%name//'_reaction_'//xyz(c), 'N', 'boundary')
       columns(dim + c) = column_type(measure%name//'_displacement_'//xyz(c), 'm', 'boundary')
+    end do
+    do n = 1, axes
+      c = 3 - axes + n
+      columns(2*dim + n) = column_type(measure%name//'_moment_'//xyz(c), 'N m', 'boundary')
+      columns(2*dim + axes + n) = column_type(measure%name//'_rotation_'//xyz(c), 'rad', 'boundary')
     end do
   end function columns_of_boundary
 
@@ -60,11 +70,25 @@ contains
     type(row_source_type), intent(in) :: now
     real(wp), intent(out) :: values(:)
 
-    associate (motion => now%system%motions(measure%number), dim => size(values)/2)
+    real(wp) :: rotation(3)
+    integer :: axes
+
+    associate (motion => now%system%motions(measure%number), dim => now%system%body%dim)
       values(:dim) = motion%reaction(:dim)
-      values(dim + 1:) = mean_displacement(now%system, motion)
+      values(dim + 1:2*dim) = mean_displacement(now%system, motion)
+      if (.not. measure%is_pin) return
+      axes = rotations(dim)
+      rotation = rotation_of(motion%pose)
+      values(2*dim + 1:2*dim + axes) = motion%moment(4 - axes:)
+      values(2*dim + axes + 1:) = rotation(4 - axes:)
     end associate
   end subroutine row_of_boundary
+
+  !> Axes about which a body can rotate: none, z, or all.
+  pure integer function rotations(dim)
+    integer, intent(in) :: dim   !! dimension of the scene
+    rotations = (dim*(dim - 1))/2
+  end function rotations
 
   !> The mean displacement of a boundary's points, weighted by their volumes (dim) [m].
   function mean_displacement(system, motion) result(mean)

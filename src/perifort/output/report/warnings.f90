@@ -109,6 +109,7 @@ contains
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
         if (scene%boundaries(m)%region == '' .or. size(motion%slots) < 2) cycle
+        if (motion%is_pin) cycle
         if (any(motion%kind(:system%body%dim) == free_component)) cycle
         call notes%add('clamp '//to_text(m), '&boundary number '//to_text(m)//" holds all "// &
           & "components of the region '"//trim(scene%boundaries(m)%region)// &

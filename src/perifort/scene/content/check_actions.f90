@@ -14,6 +14,9 @@ module pd_scene_content_check_actions
   private
   public :: check_initial, check_boundary, check_load
 
+  character(*), parameter :: in_no_pin = 'a pin moves as a whole: an expression of t alone '// &
+    & 'guides its centre'
+
 contains
 
   !> One `&initial`; in relaxation its temperature change grows over the load steps by default. An
@@ -103,6 +106,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
     character(*), parameter :: directions = 'xyz'
+    character(:), allocatable :: variables, why
     integer :: i, d
     logical :: timed
 
@@ -117,18 +121,27 @@ contains
       if (allocated(error)) return
       call check_components(boundary%velocity, d, 'velocity', 'boundary', number, error, source)
       if (allocated(error)) return
+      variables = 'xyzt'
+      why = ''
+      if (boundary%motion == 'pin') then
+        variables = 't'
+        why = in_no_pin
+      end if
       call check_vector_expressions(scene, boundary%displacement_text, 'boundary', number, &
-        & 'displacement', 'xyzt', '', error, source, timed)
+        & 'displacement', variables, why, error, source, timed)
       call check_vector_expressions(scene, boundary%velocity_text, 'boundary', number, &
-        & 'velocity', 'xyzt', '', error, source, timed)
+        & 'velocity', variables, why, error, source, timed)
       if (allocated(error)) return
       if (boundary%absorbing) then
         call check_absorbing(scene, number, error, source)
         if (allocated(error)) return
+      else if (boundary%motion == 'pin') then
+        call check_pin(scene, number, error, source)
+        if (allocated(error)) return
       else if (.not. any(is_given(boundary%displacement, boundary%displacement_text)) .and. &
         & .not. any(is_given(boundary%velocity, boundary%velocity_text))) then
         call rule_fault(error, 'boundary', number, '', 'group &boundary imposes nothing', &
-          & 'expected displacement_x.. or velocity_x.., or absorbing', source)
+          & "expected displacement_x.. or velocity_x.., absorbing, or motion = 'pin'", source)
         return
       end if
       do i = 1, d
@@ -175,6 +188,9 @@ contains
       else if (is_set(boundary%ramp_time) .or. allocated(boundary%times)) then
         key = merge('times    ', 'ramp_time', allocated(boundary%times))
         note = 'its dashpots act from the start'
+      else if (boundary%motion == 'pin') then
+        key = 'motion'
+        note = 'its layer is free: leave out motion'
       else if (boundary%name /= '') then
         key = 'name'
         note = 'its forces are those of dashpots; the history has no reaction of them'
@@ -198,6 +214,22 @@ contains
       direction = directions(c:c)
     end function first_of
   end subroutine check_absorbing
+
+  !> A `&boundary` whose points move as one rigid body: not every integrator knows it.
+  subroutine check_pin(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    associate (time => scene%time)
+      if (time%method /= 'explicit') return
+      if (time%integrator == 'forward_backward' .or. time%integrator == 'velocity_verlet') return
+      call rule_fault(error, 'boundary', number, 'motion', "motion = 'pin' with &time "// &
+        & "integrator = '"//trim(time%integrator)//"'", "the motion of a pin is integrated by "// &
+        & "'forward_backward' and 'velocity_verlet' alone", source)
+    end associate
+  end subroutine check_pin
 
   !> The springs of a `&load`: a stiffness for each direction, none negative.
   subroutine check_springs(scene, number, error, source)

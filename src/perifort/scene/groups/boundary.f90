@@ -15,6 +15,7 @@ module pd_scene_groups_boundary
     character(name_length) :: body = ''          !! '' = all bodies together
     character(name_length) :: side = ''          !! 'x_min' .. 'z_max': adds a layer
     character(name_length) :: region = ''        !! existing points instead
+    character(name_length) :: motion = 'imposed' !! or 'pin': the points move as one rigid body
     real(wp) :: displacement(3) = unset          !! imposed, unset = free [m]
     real(wp) :: velocity(3) = unset              !! imposed, unset = free [m/s]
     character(text_length) :: displacement_text(3) = ''  !! instead: expressions of x, y, z, t
@@ -40,6 +41,9 @@ contains
     call keys%key('side', group%side, 'adds a layer as wide as the horizon outside this side', &
       & allowed=sides)
     call keys%key('region', group%region, 'name of a region, instead of side')
+    call keys%key('motion', group%motion, 'what the components are given for: each point, or '// &
+      & 'the centre of a rigid body of all points that is free to rotate', &
+      & allowed=[character(7) :: 'imposed', 'pin'])
     call keys%triple('displacement', group%displacement, 'm', 'imposed displacement', 'free', &
       & group%displacement_text)
     call keys%triple('velocity', group%velocity, 'm/s', 'imposed velocity', 'free', &

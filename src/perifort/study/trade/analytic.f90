@@ -120,6 +120,8 @@ contains
       reason = 'the scene has gravity'
     else if (any(scene%boundaries%absorbing)) then
       reason = 'the scene has an absorbing boundary'
+    else if (any(scene%boundaries%motion == 'pin')) then
+      reason = 'a boundary is a pin'
     end if
     do i = 1, size(scene%loads)
       if (allocated(scene%loads(i)%times)) reason = 'a load has its own times'
