@@ -19,7 +19,8 @@ module perifort
   use pd_base_version, only: program_version
   use pd_driver, only: run_scene
   use pd_motion_observer, only: instant_type, observer_type
-  use pd_motion_system, only: energies_type, system_type
+  use pd_motion_account, only: energies_type
+  use pd_motion_system, only: system_type
   use pd_motion_view, only: damage_of, displacements_of, find_energies, force_densities_of, &
     & number_of_points, point_near, positions_of, velocities_of, volumes_of
   use pd_force_term, only: force_term_type, term_list_type, term_view_type, has_tangent, &

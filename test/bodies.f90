@@ -8,7 +8,8 @@ module bodies
   use pd_law_material, only: material_type, new_material
   use pd_set_up_prepare, only: set_up_type, prepare
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density
+  use pd_motion_account, only: energies_type, energies_of
+  use pd_motion_system, only: system_type, add_loads, inverse_density
   use pd_scene_content_types, only: scene_type, name_length
   use comparisons, only: expect => close_number, text_of
   use testdrive, only: error_type, test_failed

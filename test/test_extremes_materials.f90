@@ -6,7 +6,8 @@ module test_extremes_materials
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_watch_fault, only: check_strain_energy
   use pd_motion_explicit_integrators, only: run_explicit
-  use pd_motion_system, only: energies_of, energies_type, evaluate
+  use pd_motion_account, only: energies_of, energies_type
+  use pd_motion_system, only: evaluate
   use pd_motion_explicit_time_step, only: stiffness_bound
   use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type

@@ -7,8 +7,8 @@ module test_motion_dissipation
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, add_loads, inverse_density, &
-    & velocities_now
+  use pd_motion_account, only: energies_type, energies_of, velocities_now
+  use pd_motion_system, only: system_type, add_loads, inverse_density
   use pd_scene_content_types, only: scene_type
   use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed

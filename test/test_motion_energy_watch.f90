@@ -9,7 +9,8 @@ module test_motion_energy_watch
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
-  use pd_motion_system, only: system_type, energies_type, energies_of, inverse_density
+  use pd_motion_account, only: energies_type, energies_of
+  use pd_motion_system, only: system_type, inverse_density
   use pd_motion_energy_watch, only: watch_type
   use pd_scene_content_types, only: scene_type
   use testdrive, only: check, error_type, new_unittest, skip_test, unittest_type

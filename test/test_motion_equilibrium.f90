@@ -8,7 +8,8 @@ module test_motion_equilibrium
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_motion_static_rigid, only: rigid_type, find_free_motions, turn_back
-  use pd_motion_system, only: system_type, energies_type, energies_of
+  use pd_motion_account, only: energies_type, energies_of
+  use pd_motion_system, only: system_type
   use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed

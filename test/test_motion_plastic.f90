@@ -12,7 +12,8 @@ module test_motion_plastic
   use pd_set_up_move, only: move
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_observer, only: instant_type, observer_type
-  use pd_motion_system, only: account, energies_of, energies_type, evaluate, system_type
+  use pd_motion_account, only: account, energies_of, energies_type
+  use pd_motion_system, only: evaluate, system_type
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs

@@ -10,7 +10,8 @@ module test_softening_cracks
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_static_relaxation, only: run_relaxation
-  use pd_motion_system, only: energies_of, energies_type, system_type
+  use pd_motion_account, only: energies_of, energies_type
+  use pd_motion_system, only: system_type
   use pd_output_report_begin, only: run_options_type
   use pd_output_results_files, only: file_bytes
   use pd_scene_content_read, only: read_scene_text

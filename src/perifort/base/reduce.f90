@@ -17,10 +17,11 @@ module pd_base_reduce
   private
   public :: sums_type, running_type
   public :: new_sums, add_block, total_of, new_running, add_point, total_of_running
-  public :: inner, sum_over, largest_over, least_over, first_where, first_largest
+  public :: inner, sum_over, sum_listed, largest_over, least_over, first_where, first_largest
   public :: largest_of_ranks, sum_of_ranks, count_of_ranks, noise, noise_after
 
   integer, parameter :: most_running = 6    !! sums that one `running_type` forms
+  integer, parameter :: worth_blocks = 4096 !! points of a list that is summed in blocks
 
   !> Some sums at once, block by block; blocks may be added by different threads.
   type :: sums_type
@@ -281,6 +282,52 @@ contains
       total = running%total
     end if
   end function total_of_running
+
+  !> The sum of `terms` of some points, on all ranks: the same bits as adding one after another, but
+  !> threads share the blocks.
+  real(wp) function sum_listed(order, points, terms) result(total)
+    type(order_type), intent(in) :: order    !! which points are owned
+    integer(i4), intent(in) :: points(:)     !! numbers here, ascending
+    real(wp), intent(in) :: terms(:)         !! (points)
+    type(running_type) :: running
+    type(sums_type) :: sums
+    real(wp) :: of_block(block_points, 1), totals(most_running), one(1)
+    integer(i8) :: number
+    integer :: begin(order%blocks + 1), b, i
+
+    if (associated(order%ranks) .or. size(points) < worth_blocks) then
+      call new_running(order, running)
+      do i = 1, size(points)
+        call add_point(order, points(i), terms(i:i), running)
+      end do
+      totals = total_of_running(order, running)
+      total = totals(1)
+      return
+    end if
+    ! the first point of each block in the list
+    b = 1
+    begin(1) = 1
+    do i = 1, size(points)
+      number = points(i) + order%before
+      do while (order%first_block + b - 1 < block_of(number))
+        b = b + 1
+        begin(b) = i
+      end do
+    end do
+    begin(b + 1:) = size(points) + 1
+    call new_sums(order, 1, sums)
+    !$omp parallel do schedule(static) default(none) shared(order, points, terms, begin, sums) &
+    !$omp private(b, i, of_block)
+    do b = 1, order%blocks
+      of_block = 0.0_wp
+      do i = begin(b), begin(b + 1) - 1
+        of_block(place_of(points(i) + order%before), 1) = terms(i)
+      end do
+      call add_block(order, b, of_block, sums)
+    end do
+    one = total_of(order, sums)
+    total = one(1)
+  end function sum_listed
 
   ! ---------------------------------------------------------------- sums of arrays over slots
 

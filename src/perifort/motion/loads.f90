@@ -30,6 +30,8 @@ module pd_motion_loads
     real(wp), allocatable :: density(:, :)  !! at factor 1 (slot, dim) [N/m3]
     type(curve_type) :: curve
     type(load_part_type), allocatable :: parts(:)  !! to be added to `density`; the factor is then 1
+    logical :: acts(3) = .true.             !! whether components are not all 0
+    integer, allocatable :: on_held(:)      !! which of its slots have constrained components
     real(wp) :: time = never                !! of `now` [s]
     real(wp), allocatable :: now(:, :)      !! density with its parts (slot, dim) [N/m3]
   contains
@@ -48,10 +50,18 @@ contains
       !! without terms other than loads; with these loads at its end on return
     type(load_type), intent(inout) :: loads(:)
       !! (any number) external, without stiffness and summed apart on return
-    integer :: l
+    integer :: l, c, i
 
     if (terms%number() > number_of_loads(terms)) call internal_fault('loads come first')
     do l = 1, size(loads)
+      do c = 1, size(loads(l)%density, 2)
+        loads(l)%acts(c) = any(abs(loads(l)%density(:, c)) > 0.0_wp)
+      end do
+      if (allocated(loads(l)%parts)) then
+        do i = 1, size(loads(l)%parts)
+          loads(l)%acts(loads(l)%parts(i)%component) = .true.
+        end do
+      end if
       loads(l)%external = .true.
       loads(l)%tangent = no_stiffness
       loads(l)%summed_apart = .true.
@@ -182,13 +192,7 @@ contains
   pure logical function acts_along(load, c) result(acts)
     type(load_type), intent(in) :: load  !! the load
     integer, intent(in) :: c             !! component
-    integer :: i
-
-    acts = any(abs(load%density(:, c)) > 0.0_wp)
-    if (.not. allocated(load%parts)) return
-    do i = 1, size(load%parts)
-      acts = acts .or. load%parts(i)%component == c
-    end do
+    acts = load%acts(c)
   end function acts_along
 
   !> Force densities at time `t` of a load that has parts; its factor is 1.

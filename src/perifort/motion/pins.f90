@@ -4,7 +4,7 @@ module pd_motion_pins
   use pd_base_kinds, only: wp, i1
   use pd_motion_conditions, only: free_component, guide, impose, motion_type
   use pd_motion_pose, only: drift, fit_pose, moments_about
-  use pd_motion_system, only: add_loads, system_type
+  use pd_motion_system, only: apply_to_held, system_type
   implicit none (type, external)
   private
   public :: has_pins, held_but_for_pins, gather_pins, move_pins, fit_pins, snap_pins
@@ -37,14 +37,10 @@ contains
     type(system_type), intent(inout) :: system  !! with the forces of this instant
     real(wp), intent(in) :: t     !! [s]
     real(wp), intent(in) :: kick  !! half a step, 0 at the start [s]
-    real(wp), allocatable :: applied(:, :)
     integer :: m
 
     if (.not. has_pins(system)) return
-    if (system%loaded_and_held) then
-      allocate (applied(system%body%n_slots, system%body%dim), source=0.0_wp)
-      call add_loads(system, t, 1.0_wp, .false., applied)
-    end if
+    call apply_to_held(system, t)
     do m = 1, size(system%motions)
       if (system%motions(m)%is_pin) call gather(system%motions(m))
     end do
@@ -60,7 +56,8 @@ contains
 
       do i = 1, size(motion%slots)
         density(:, i) = system%state%force(motion%slots(i), :)
-        if (allocated(applied)) density(:, i) = density(:, i) + applied(motion%slots(i), :)
+        if (allocated(system%applied)) &
+          & density(:, i) = density(:, i) + system%applied(motion%slots(i), :)
       end do
       totals = moments_about(system%body, motion%slots, motion%pose, density)
       motion%pose%force = totals(:3)

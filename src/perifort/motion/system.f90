@@ -4,31 +4,28 @@ module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
-  use pd_base_reduce, only: add_point, inner, new_running, running_type, total_of_running
   use pd_body_body, only: body_type, not_finite_text, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds
   use pd_force_generic_pass, only: renew_pulls
-  use pd_force_generic_points, only: commit_laws
-  use pd_force_forces, only: internal_force, energy_pass, whole, up_to_marks, after_marks
+  use pd_force_forces, only: internal_force, whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of, p_of
   use pd_force_reference, only: point_dilatation, point_force
   use pd_force_term, only: term_list_type, term_view_type
   use pd_force_workspace, only: workspace_type
   use pd_motion_conditions, only: motion_type, impose, remember_start, free_component, &
-    & accelerations_of, advance_paths, condition_fault, renew_motions
+    & condition_fault, renew_motions
   use pd_motion_loads, only: load_type, number_of_loads, load_of, acts_along, density_of, &
     & renew_load
-  use pd_motion_heating, only: heating_type, heat, apply_factors, apply_rate, is_timed, &
-    & heating_fault
+  use pd_motion_heating, only: heating_type, heat, heating_fault
   use pd_motion_memory, only: memory_type
   use pd_motion_pose, only: fit_pose, moments_about, new_pose
   use pd_motion_energy_watch, only: watch_type
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & renew_forces, renew_conditions, explain_condition, break_now, account, energies_type, &
-    & energies_of, add_loads, inverse_density, velocities_now, view_of, stored_energy
+    & renew_forces, renew_conditions, explain_condition, break_now, add_loads, inverse_density, &
+    & view_of, find_loaded, apply_to_held
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -65,6 +62,7 @@ module pd_motion_system
     real(wp) :: time = 0.0_wp                   !! of the present displacements [s]
     logical :: static = .false.                 !! nothing has mass: static equilibrium
     logical :: loaded_and_held = .false.        !! some constrained component also bears a load
+    real(wp), allocatable :: applied(:, :)      !! loads where both, as last asked for [N/m3]
     type(watch_type) :: watch                   !! over the energies
     type(condition_fault), allocatable :: fault !! first value of a condition that is not finite
     real(wp) :: stable_step = 0.0_wp            !! the integrator's limit, 0: unknown [s]
@@ -79,11 +77,8 @@ module pd_motion_system
     real(wp) :: held = 0.0_wp    !! the offset that the work of imposed motion implies [s]
   end type pairing_type
 
-  !> Energies at one instant [J].
-  type :: energies_type
-    real(wp) :: kinetic = 0.0_wp
-    real(wp) :: strain = 0.0_wp
-  end type energies_type
+  !> Points of a load from which on threads share it.
+  integer, parameter :: worth_threads = 4096
 
 contains
 
@@ -501,6 +496,9 @@ contains
 
       factor = scale*load%curve%value(t)
       do c = 1, size(values, 2)
+        if (.not. acts_along(load, c)) cycle
+        !$omp parallel do schedule(static) if (size(load%slots) >= worth_threads) default(none) &
+        !$omp private(i, k, by) shared(model, load, density, values, c, factor, per_density)
         do i = 1, size(load%slots)
           k = load%slots(i)
           by = factor
@@ -518,303 +516,73 @@ contains
     inverse_density = 1.0_wp/model%materials(model%material(k))%density
   end function inverse_density
 
-  !> Work of loads and imposed motion since the last call, by the trapezoidal rule, and the
-  !> reactions at time `t`. To be called once per step, after `evaluate`. What accelerates the
-  !> imposed points enters as their gain in kinetic energy: that is exact, and it holds where an
-  !> imposed velocity jumps (at the end of a ramped displacement), too. In static
-  !> equilibrium, where imposed motion has no speed, nothing is accelerated.
-  !>
-  !> Terms of the force come to the present, too: their work is summed, and they bring their history
-  !> up to date. So do bond laws: the step is accepted.
-  subroutine account(system, t)
-    type(system_type), intent(inout), target :: system
-      !! its work, reactions and the histories of its terms are those of this instant on return
-    real(wp), intent(in) :: t                 !! time of the displacements [s]
-    real(wp), allocatable :: applied(:, :), acceleration(:), density(:, :)
-    type(running_type) :: running
-    real(wp) :: force, mass, work, factor, totals(6)
-    logical :: first
-    type(load_type), pointer :: load
-    type(term_view_type) :: view
-    integer :: m, l, c, i, k, n
-
-    system%time = t
-    first = .not. allocated(system%last_u)
-    if (first) call allocate_account(system)
-    if (allocated(system%heating%curves)) call account_heat(system, t, first)
-    if (system%loaded_and_held) then
-      allocate (applied(system%body%n_slots, system%body%dim), source=0.0_wp)
-      call add_loads(system, t, 1.0_wp, .false., applied)
-    end if
-    n = 0
-    do m = 1, size(system%motions)
-      associate (motion => system%motions(m))
-        motion%reaction = 0.0_wp
-        if (motion%is_pin) call account_moment(system, t, applied, motion)
-        do c = 1, system%body%dim
-          allocate (acceleration(size(motion%slots)), source=0.0_wp)
-          if (.not. system%static) call accelerations_of(motion, c, t, acceleration)
-          call new_running(system%body%order, running)
-          do i = 1, size(motion%slots)
-            if (motion%held(i, c) == 0_i1) cycle
-            k = motion%slots(i)
-            mass = 0.0_wp
-            if (.not. system%static) mass = system%body%volume(k)/inverse_density(system%model, k)
-            force = system%state%force(k, c)
-            if (allocated(applied)) force = force + applied(k, c)
-            force = -force*system%body%volume(k)
-            call add_work(system, n, first, work, system%state%u(k, c), force, mass, &
-              & system%state%v(k, c))
-            call add_point(system%body%order, system%body%point(k), &
-              & [mass*acceleration(i) + force, work], running)
-          end do
-          totals = total_of_running(system%body%order, running)
-          motion%reaction(c) = totals(1)
-          deallocate (acceleration)
-          system%external_work = system%external_work + totals(2)
-        end do
-      end associate
-    end do
-    do l = 1, number_of_loads(system%terms)
-      load => load_of(system%terms, l)
-      factor = load%curve%value(t)
-      if (allocated(load%parts)) call density_of(load, t, density)
-      do c = 1, system%body%dim
-        if (.not. acts_along(load, c) .and. &
-          & .not. associated(system%body%order%ranks)) cycle
-        call new_running(system%body%order, running)
-        do i = 1, size(load%slots)
-          k = load%slots(i)
-          force = load%density(i, c)
-          if (allocated(load%parts)) force = density(i, c)
-          call add_work(system, n, first, work, system%state%u(k, c), &
-            & force*factor*system%body%volume(k))
-          call add_point(system%body%order, system%body%point(k), [work], running)
-        end do
-        totals = total_of_running(system%body%order, running)
-        system%external_work = system%external_work + totals(1)
-      end do
-    end do
-    call advance_paths(system%motions, t)
-    if (system%model%generic) call commit(system)
-    if (system%terms%number() == number_of_loads(system%terms)) return
-    call view_of(system, t, view)
-    call system%terms%account(view, system%external_work, system%dissipated)
-    call system%terms%advance(view)
-  end subroutine account
-
-  !> The moment about its centre by which a pin is turned: of what accelerates its points beyond
-  !> the forces on them. Turning is free, so that it vanishes but for rounding, or in static
-  !> equilibrium for the tolerance.
-  subroutine account_moment(system, t, applied, motion)
-    type(system_type), intent(in) :: system
-    real(wp), intent(in) :: t
-    real(wp), allocatable, intent(in) :: applied(:, :)  !! loads (n_slots, dim), where any act here
-    type(motion_type), intent(inout) :: motion          !! a pin; gets its moment
-    real(wp) :: density(system%body%dim, size(motion%slots)), acceleration(size(motion%slots))
-    real(wp) :: totals(6)
-    integer :: c, i, k
-
-    density = 0.0_wp
-    do c = 1, system%body%dim
-      if (.not. system%static) then
-        call accelerations_of(motion, c, t, acceleration)
-        density(c, :) = acceleration*motion%pose%masses/system%body%volume(motion%slots)
-      end if
-      do i = 1, size(motion%slots)
-        k = motion%slots(i)
-        density(c, i) = density(c, i) - system%state%force(k, c)
-        if (allocated(applied)) density(c, i) = density(c, i) - applied(k, c)
-      end do
-    end do
-    totals = moments_about(system%body, motion%slots, motion%pose, density)
-    motion%moment = totals(4:)
-  end subroutine account_moment
-
-  !> Commit the histories of the bond laws.
-  subroutine commit(system)
-    type(system_type), intent(inout) :: system
-    real(wp) :: dissipated, plastic
-
-    call commit_laws(system%body, system%family, system%model, system%workspace%generic, &
-      & system%state%u, system%state%damage, dissipated, plastic)
-    system%plastic_energy = system%plastic_energy + plastic
-    system%dissipated = system%dissipated + dissipated
-  end subroutine commit
-
-  !> Work of varying temperature since the last call: the strain energy that it changes at fixed
-  !> displacements, by the trapezoidal rule. The energy is quadratic in the thermal strain, so that
-  !> a central difference gives its rate exactly.
-  subroutine account_heat(system, t, first)
-    type(system_type), intent(inout) :: system
-    real(wp), intent(in) :: t         !! of the present instant [s]
-    logical, intent(in) :: first      !! whether nothing has been accounted yet
-    real(wp) :: rate
-    integer :: i, last
-
-    associate (heating => system%heating)
-      do i = 1, size(heating%curves)
-        last = size(heating%curves(i)%times)
-        rate = 0.0_wp
-        ! past its last time a course is constant
-        if (is_timed(heating, i)) then
-          rate = rate_by_time()
-        else if (t < heating%curves(i)%times(last) .or. &
-          & abs(heating%factors(i) - heating%last_factors(i)) > 0.0_wp) then
-          rate = energy_at(heating%factors(i) + 0.5_wp) - energy_at(heating%factors(i) - 0.5_wp)
-          call apply_factors(heating, heating%factors, system%model%expansion)
-        end if
-        if (.not. first) system%external_work = system%external_work + (heating%last_rates(i) &
-          & + rate)/2*(heating%factors(i) - heating%last_factors(i))
-        heating%last_factors(i) = heating%factors(i)
-        heating%last_rates(i) = rate
-      end do
-    end associate
-
-  contains
-
-    !> The rate of the strain energy that the temperature's rate makes at fixed displacements [W].
-    real(wp) function rate_by_time() result(rate)
-      real(wp) :: h
-
-      rate = 0.0_wp
-      call apply_rate(system%heating, i, t, 0.5_wp, system%model%expansion, h)
-      if (h > 0.0_wp) then
-        rate = strain_energy(system)
-        call apply_rate(system%heating, i, t, -0.5_wp, system%model%expansion, h)
-        rate = (rate - strain_energy(system))/h
-      end if
-      call apply_factors(system%heating, system%heating%factors, system%model%expansion)
-    end function rate_by_time
-
-    !> Strain energy with another factor of the `i`-th course [J].
-    real(wp) function energy_at(factor)
-      real(wp), intent(in) :: factor
-      real(wp) :: factors(size(system%heating%factors))
-
-      factors = system%heating%factors
-      factors(i) = factor
-      call apply_factors(system%heating, factors, system%model%expansion)
-      energy_at = strain_energy(system)
-    end function energy_at
-  end subroutine account_heat
-
-  !> Strain energy of the present displacements [J].
-  real(wp) function strain_energy(system) result(energy)
-    type(system_type), intent(inout) :: system
-    real(wp), allocatable :: density(:)
-
-    allocate (density(system%body%n_slots))
-    call energy_pass(system%family, system%model, system%workspace, system%state%u, density)
-    energy = inner(system%body%order, density, system%body%volume)
-  end function strain_energy
-
-  !> What the terms of the force store at the present displacements [J].
-  real(wp) function stored_energy(system) result(energy)
-    type(system_type), intent(in), target :: system  !! at the instant of its time
-    type(term_view_type) :: view
-
-    call view_of(system, system%time, view)
-    energy = system%terms%energy(view)
-  end function stored_energy
-
-  !> One component's `work` since its last force and place; `n` counts the components. With `mass`
-  !> and the imposed velocity `v` its gain in kinetic energy comes on top.
-  pure subroutine add_work(system, n, first, work, u, force, mass, v)
-    type(system_type), intent(inout) :: system
-    integer, intent(inout) :: n
-    logical, intent(in) :: first
-    real(wp), intent(out) :: work
-    real(wp), intent(in) :: u, force
-    real(wp), intent(in), optional :: mass, v
-
-    n = n + 1
-    work = 0.0_wp
-    if (.not. first) work = (system%last_force(n) + force)/2*(u - system%last_u(n))
-    system%last_u(n) = u
-    system%last_force(n) = force
-    if (.not. present(v)) return
-    if (.not. first) work = work + mass/2*(v - system%last_v(n))*(v + system%last_v(n))
-    system%last_v(n) = v
-  end subroutine add_work
-
-  !> Room for the last force and place of every component that does work.
-  subroutine allocate_account(system)
-    type(system_type), intent(inout), target :: system
-    type(load_type), pointer :: load
-    integer :: n, m, l
-
-    n = 0
-    do m = 1, size(system%motions)
-      n = n + size(system%motions(m)%slots)
-    end do
-    do l = 1, number_of_loads(system%terms)
-      load => load_of(system%terms, l)
-      n = n + size(load%slots)
-    end do
-    call find_loaded(system)
-    n = n*system%body%dim
-    allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
-  end subroutine allocate_account
-
-  !> Find out whether a constrained component also bears a load.
+  !> Find out which points with constrained components also bear a load.
   subroutine find_loaded(system)
     type(system_type), intent(inout), target :: system
+      !! with its constraints; gets `loaded_and_held`, and its loads their points of this kind
     type(load_type), pointer :: load
-    integer :: l
+    integer :: l, i
 
     do l = 1, number_of_loads(system%terms)
       load => load_of(system%terms, l)
-      if (any(system%held(load%slots, :) == 1_i1)) system%loaded_and_held = .true.
+      load%on_held = pack([(i, i=1, size(load%slots))], any(system%held(load%slots, :) == 1_i1, 2))
+      if (size(load%on_held) > 0) system%loaded_and_held = .true.
     end do
     ! other external terms may act anywhere
     if (system%terms%outside > number_of_loads(system%terms)) &
       & system%loaded_and_held = system%loaded_and_held .or. any(system%held == 1_i1)
   end subroutine find_loaded
 
-  !> Velocities at the time `t` of the displacements [m/s], half a kick [s] on from those that the
-  !> integrator keeps.
-  subroutine velocities_now(system, t, kick, v)
-    type(system_type), intent(in) :: system  !! with the forces of this instant
-    real(wp), intent(in) :: t     !! time of the displacements [s]
-    real(wp), intent(in) :: kick  !! time that velocities lag behind, 0 if they do not [s]
-    real(wp), allocatable, intent(out) :: v(:, :)  !! (n_slots, dim) [m/s]
-    integer :: k, c
+  !> Bring the system's `applied` to time `t`: the force density of loads and other external terms on
+  !> all points with a constrained component; it is not allocated where none acts there.
+  subroutine apply_to_held(system, t)
+    type(system_type), intent(inout), target :: system  !! gets `applied`
+    real(wp), intent(in) :: t                           !! time of the loads [s]
+    type(load_type), pointer :: load
+    integer :: l
 
-    allocate (v, source=system%state%v)
-    if (kick <= 0.0_wp) return
-    do c = 1, size(v, 2)
-      !$omp parallel do schedule(static) default(none) shared(system, kick, v, c) private(k)
-      do k = 1, size(v, 1)
-        v(k, c) = v(k, c) + kick*system%state%force(k, c)*inverse_density(system%model, k)
-      end do
+    if (.not. system%loaded_and_held) return
+    if (.not. allocated(system%applied)) allocate (system%applied(system%body%n_slots, &
+      & system%body%dim), source=0.0_wp)
+    if (system%terms%outside > number_of_loads(system%terms)) then
+      system%applied = 0.0_wp
+      call add_loads(system, t, 1.0_wp, .false., system%applied)
+      return
+    end if
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      system%applied(load%slots(load%on_held), :) = 0.0_wp
     end do
-    call add_loads(system, t, kick, .true., v)
-    where (system%held == 1) v = system%state%v
-  end subroutine velocities_now
+    do l = 1, number_of_loads(system%terms)
+      load => load_of(system%terms, l)
+      call apply(load)
+    end do
 
-  !> Kinetic and stored energy [J]: strain energy of the bonds and what terms of the force store.
-  !> `v` are the velocities at the instant of the displacements.
-  subroutine energies_of(system, v, energies)
-    type(system_type), intent(inout), target :: system
-      !! its state stays as it is; its workspace changes
-    real(wp), intent(in) :: v(:, :)               !! (n_slots, dim) [m/s]
-    type(energies_type), intent(out) :: energies  !! those of this instant
-    real(wp), allocatable :: density(:), mass(:)
-    integer :: k, c
+  contains
 
-    allocate (density(system%body%n_slots), mass(system%body%n_slots))
-    energies%strain = strain_energy(system)
-    if (system%terms%inside > 0) energies%strain = energies%strain + stored_energy(system)
-    !$omp parallel do schedule(static) default(none) shared(system, v, density, mass) private(k, c)
-    do k = 1, system%body%n_slots
-      mass(k) = system%body%volume(k)/inverse_density(system%model, k)
-      density(k) = 0.0_wp
+    !> One load.
+    subroutine apply(load)
+      type(load_type), intent(in) :: load
+      real(wp), allocatable :: density(:, :)
+      real(wp) :: factor
+      integer :: n, i, c
+
+      factor = load%curve%value(t)
+      if (allocated(load%parts)) call density_of(load, t, density)
       do c = 1, system%body%dim
-        density(k) = density(k) + v(k, c)**2
+        if (.not. acts_along(load, c)) cycle
+        do n = 1, size(load%on_held)
+          i = load%on_held(n)
+          associate (sum_of_loads => system%applied(load%slots(i), c))
+            if (allocated(density)) then
+              sum_of_loads = sum_of_loads + factor*density(i, c)
+            else
+              sum_of_loads = sum_of_loads + factor*load%density(i, c)
+            end if
+          end associate
+        end do
       end do
-    end do
-    energies%kinetic = inner(system%body%order, mass, density)/2
-  end subroutine energies_of
+    end subroutine apply
+  end subroutine apply_to_held
 
 end module pd_motion_system

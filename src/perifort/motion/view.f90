@@ -3,7 +3,8 @@
 module pd_motion_view
   use pd_base_kinds, only: wp
   use pd_motion_observer, only: instant_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
+  use pd_motion_account, only: energies_type, energies_of, velocities_now
+  use pd_motion_system, only: system_type
   implicit none (type, external)
   private
   public :: number_of_points, point_near, positions_of, volumes_of, displacements_of, &

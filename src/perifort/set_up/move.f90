@@ -5,7 +5,8 @@ module pd_set_up_move
   use pd_motion_explicit_integrators, only: begin_steps => begin_memory, run_explicit
   use pd_motion_observer, only: observer_type
   use pd_motion_static_relaxation, only: fill_memory, run_relaxation
-  use pd_motion_system, only: account, system_type
+  use pd_motion_account, only: account
+  use pd_motion_system, only: system_type
   use pd_set_up_plan, only: plan_type
   implicit none (type, external)
   private

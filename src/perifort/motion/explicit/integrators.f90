@@ -16,8 +16,9 @@ module pd_motion_explicit_integrators
   use pd_motion_watch_fault, only: explain_fault, faulty_slot, points_at_once, stays_within
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_energy_watch, only: watch_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, pairing_type, evaluate, &
-    & account, add_loads, inverse_density, velocities_now, explain_condition
+  use pd_motion_account, only: energies_type, energies_of, account, velocities_now
+  use pd_motion_system, only: system_type, pairing_type, evaluate, add_loads, inverse_density, &
+    & explain_condition
   implicit none (type, external)
   private
   public :: run_explicit, begin_memory

@@ -22,8 +22,9 @@ module pd_motion_static_relaxation
   use pd_motion_watch_fault, only: faulty_slot, greatest_stretch, place
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_static_start, only: move_along, loose_text
-  use pd_motion_system, only: system_type, bring_temperature, evaluate, break_now, account, &
-    & add_loads, explain_condition, renew_conditions
+  use pd_motion_account, only: account
+  use pd_motion_system, only: system_type, bring_temperature, evaluate, break_now, add_loads, &
+    & explain_condition, renew_conditions
   implicit none (type, external)
   private
   public :: relaxation_type, run_relaxation, fill_memory

@@ -7,7 +7,8 @@ module pd_motion_watch_fault
   use pd_base_text, only: newline, to_text, with_unit
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_force_reference, only: bond_state_type, state_of_bond
-  use pd_motion_system, only: system_type, energies_type
+  use pd_motion_account, only: energies_type
+  use pd_motion_system, only: system_type
   implicit none (type, external)
   private
   public :: faulty_slot, stays_within, points_at_once, explain_fault, check_strain_energy, place, &

@@ -6,7 +6,8 @@ module pd_motion_watch_rescue
   use pd_base_snapshot, only: snapshot_type
   use pd_motion_keep, only: keep_system
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
+  use pd_motion_account, only: energies_type, energies_of, velocities_now
+  use pd_motion_system, only: system_type
   implicit none (type, external)
   private
   public :: good_state_type, keep_good, show_good

@@ -13,7 +13,8 @@ module pd_output_measures_measure
   use pd_base_kinds, only: wp
   use pd_base_warnings, only: warnings_type
   use pd_motion_observer, only: instant_type
-  use pd_motion_system, only: energies_type, system_type
+  use pd_motion_account, only: energies_type
+  use pd_motion_system, only: system_type
   use pd_output_fields_field, only: moment_type
   use pd_output_results_types, only: column_type
   use pd_scene_content_types, only: scene_type

@@ -1,7 +1,8 @@
 !> The balance of energy over the rows of a run's history.
 module pd_output_report_balance
   use pd_base_kinds, only: wp
-  use pd_motion_system, only: energies_type, system_type
+  use pd_motion_account, only: energies_type
+  use pd_motion_system, only: system_type
   implicit none (type, external)
   private
   public :: balance_type

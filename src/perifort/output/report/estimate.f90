@@ -11,7 +11,8 @@ module pd_output_report_estimate
   use pd_motion_observer, only: observer_type, instant_type
   use pd_set_up_plan, only: plan_type
   use pd_motion_static_relaxation, only: run_relaxation
-  use pd_motion_system, only: system_type, energies_type, energies_of, velocities_now
+  use pd_motion_account, only: energies_type, energies_of, velocities_now
+  use pd_motion_system, only: system_type
   use pd_output_report_contact, only: touching_points
   use pd_output_fields_field, only: output_field_type
   use pd_output_fields_table, only: field_table_type

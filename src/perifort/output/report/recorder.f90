@@ -10,7 +10,8 @@ module pd_output_report_recorder
   use pd_base_text, only: newline, to_text
   use pd_motion_watch_fault, only: check_strain_energy
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, energies_of, velocities_now
+  use pd_motion_account, only: energies_of, velocities_now
+  use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields

@@ -20,7 +20,8 @@ module pd_study_limits_vibration
   use pd_motion_conditions, only: motion_type, moved_by_displacement
   use pd_motion_curve, only: constant_curve
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_system, only: system_type, start_system, inverse_density, energies_type, energies_of
+  use pd_motion_account, only: energies_type, energies_of
+  use pd_motion_system, only: system_type, start_system, inverse_density
   use pd_motion_tangent, only: apply_tangent
   implicit none (type, external)
   private

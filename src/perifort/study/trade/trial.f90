@@ -20,7 +20,8 @@ module pd_study_trade_trial
   use pd_output_report_schedule, only: history_interval
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_static_relaxation, only: run_relaxation
-  use pd_motion_system, only: energies_of, energies_type, system_type, velocities_now
+  use pd_motion_account, only: energies_of, energies_type, velocities_now
+  use pd_motion_system, only: system_type
   use pd_output_report_summary, only: memory_of
   use pd_output_results_types, only: column_type
   use pd_scene_content_types, only: scene_type
