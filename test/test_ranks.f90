@@ -12,7 +12,8 @@ module test_ranks
   use pd_base_error, only: fault_type => error_type
   use pd_base_order, only: ascending_order, block_points, number_points, order_type, ranks_type
   use pd_base_reduce, only: add_point, first_largest, first_where, inner, largest_over, &
-    & least_over, new_running, noise, noise_after, running_type, sum_over, total_of_running
+    & least_over, new_running, noise, noise_after, running_type, sum_listed, sum_over, &
+    & total_of_running
   use pd_body_body, only: allocate_points, body_type, gather, keep_points, own_points
   use pd_family_cracks, only: cut_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
@@ -142,7 +143,7 @@ contains
     type(order_type) :: order
     type(running_type) :: running
     real(wp), allocatable :: a(:), b(:), in_slots(:, :)
-    integer(i4), allocatable :: slot(:), other(:)
+    integer(i4), allocatable :: slot(:), other(:), some(:)
     real(wp) :: total, product, first_total, first_product, totals(6)
     real(long) :: exact
     integer :: i, way, state, room
@@ -190,6 +191,17 @@ contains
       end do
       totals = total_of_running(order, running)
       call expect(error, totals(1), first_total, 0.0_wp, 'the sum of points one by one')
+      call expect(error, sum_listed(order, [(int(i, i4), i=1, n)], a), first_total, 0.0_wp, &
+        & 'the sum of listed points')
+      ! some blocks have no point of the list
+      some = pack([(int(i, i4), i=1, n)], [(mod(i, 3) == 0 .and. mod(i/2000, 2) == 1, i=1, n)])
+      call new_running(order, running)
+      do i = 1, size(some)
+        call add_point(order, some(i), a(some(i):some(i)), running)
+      end do
+      totals = total_of_running(order, running)
+      call expect(error, sum_listed(order, some, a(some)), totals(1), 0.0_wp, &
+        & 'the sum of some points')
       call expect(error, largest_over(order, in_slots(:, 1)), maxval(a), 0.0_wp, 'the largest')
       call expect(error, least_over(order, in_slots(:, 1)), minval(a), 0.0_wp, 'the least')
       call expect_true(error, first_largest(order, in_slots(:, 2)) == maxloc(b, dim=1), &

@@ -243,7 +243,7 @@ contains
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer(i8), intent(in) :: next
     type(running_type), intent(inout) :: running
-    real(wp) :: value
+    real(wp) :: value, terms(block_points)
     integer :: s, l
 
     if (running%block > 0_i8) then
@@ -261,8 +261,13 @@ contains
       running%block = next
       return
     end if
+    terms = 0.0_wp
     do s = 1, most_running
-      running%total(s) = (running%total(s) + sum_of_lanes(running%block_lane(:, s)))
+      ! by the loop that sums blocks elsewhere: where sum_of_lanes is compiled into this loop over
+      ! sums, gfortran 12 takes the lanes one after another
+      terms(:lanes) = running%block_lane(:, s)
+      value = sum_of_block(terms)
+      running%total(s) = (running%total(s) + value)
     end do
     running%block_lane = 0.0_wp
     running%block = next

@@ -11,7 +11,8 @@ module pd_motion_account
   use pd_motion_heating, only: apply_factors, apply_rate, is_timed
   use pd_motion_loads, only: acts_along, density_of, load_of, load_type, number_of_loads
   use pd_motion_pose, only: moments_about
-  use pd_motion_system, only: add_loads, apply_to_held, find_loaded, inverse_density, system_type, view_of
+  use pd_motion_system, only: add_loads, apply_to_held, find_loaded, inverse_density, system_type, &
+    & view_of
   implicit none (type, external)
   private
   public :: account, energies_type, energies_of, stored_energy, velocities_now

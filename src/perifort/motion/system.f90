@@ -533,8 +533,8 @@ contains
       & system%loaded_and_held = system%loaded_and_held .or. any(system%held == 1_i1)
   end subroutine find_loaded
 
-  !> Bring the system's `applied` to time `t`: the force density of loads and other external terms on
-  !> all points with a constrained component; it is not allocated where none acts there.
+  !> Bring the system's `applied` to time `t`: the force density of loads and other external terms
+  !> on all points with a constrained component; it is not allocated where none acts there.
   subroutine apply_to_held(system, t)
     type(system_type), intent(inout), target :: system  !! gets `applied`
     real(wp), intent(in) :: t                           !! time of the loads [s]
