@@ -39,6 +39,7 @@ contains
       & new_unittest('temperatures that vary in time', test_heated), &
       & new_unittest('conditions that are expressions of t', test_expressions), &
       & new_unittest('pins in motion and in equilibrium', test_pins), &
+      & new_unittest('contact with friction', test_contact), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
       & new_unittest('no row of a load step that has not converged', test_no_row), &
@@ -578,6 +579,38 @@ contains
       call expect_same_results(error, 'whole', 'pieces', merge(3, 4, i < 3))
     end do
   end subroutine test_expressions
+
+  !> Two blocks that graze each other, cut after every step.
+  subroutine test_contact(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call plate(scene)
+    deallocate (scene%bodies, scene%cracks, scene%boundaries, scene%contacts, scene%initial)
+    allocate (scene%bodies(2), scene%cracks(0), scene%boundaries(0), scene%contacts(1), &
+      & scene%initial(1))
+    scene%bodies%name = ['low ', 'high']
+    scene%bodies(1)%lower(:2) = 0.0_wp
+    scene%bodies(1)%upper(:2) = [12, 6]*spacing
+    scene%bodies(2)%lower(:2) = [3, 6]*spacing
+    scene%bodies(2)%upper(:2) = [9, 12]*spacing
+    scene%bodies(1)%points(:2) = [12, 6]
+    scene%bodies(2)%points(:2) = [6, 6]
+    allocate (scene%contacts(1)%between(2))
+    scene%contacts(1)%between(:) = ['low ', 'high']
+    scene%contacts(1)%friction = 0.3_wp
+    scene%contacts(1)%stiffness = 4.0_wp
+    scene%initial(1)%velocity_text(1) = '50*(y > 0.006)'
+    scene%initial(1)%velocity_text(2) = '-400*(y > 0.006)'
+    call run(scene, 'whole', fault, threads=2)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    call expect_true(error, pieces > 10, 'it is not cut')
+    call expect_same_results(error, 'whole', 'pieces', 6)
+  end subroutine test_contact
 
   !> A plate that breaks beside a pin, and one that is bent about pins, cut after every iteration.
   subroutine test_pins(error)

@@ -10,7 +10,7 @@ module pd_family_cracks
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private
-  public :: cut_bonds, crosses, crack_type, new_crack, points_on, extents_of
+  public :: cut_bonds, part_bodies, crosses, crack_type, new_crack, points_on, extents_of
 
   integer, parameter :: segment = 1, parallelogram = 2, disc = 3
   real(wp), parameter :: on_plane = 1.0e-6_wp  !! [spacings]
@@ -85,6 +85,36 @@ contains
     end do
     cut = cut/2_i8
   end subroutine cut_bonds
+
+  !> Break every bond between bodies of different sides; `parted` is their number (unordered).
+  subroutine part_bodies(side, body, family, parted)
+    integer, intent(in) :: side(:)               !! (bodies) 0: of no side, its bonds stay
+    type(body_type), intent(in) :: body          !! arranged in the slots of the family
+    class(family_type), intent(inout) :: family  !! with these bonds broken at both ends on return
+    integer(i8), intent(out) :: parted           !! bonds that were intact, each counted once
+    type(bonds_type) :: bonds
+    integer :: k, i, mine, its
+
+    parted = 0_i8
+    !$omp parallel default(none) shared(side, body, family) private(bonds, k, i, mine, its) &
+    !$omp reduction(+:parted)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      mine = side(body%body(k))
+      if (mine == 0) cycle
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        its = side(body%body(bonds%j(i)))
+        if (its == 0 .or. its == mine .or. .not. bonds%intact(i)) cycle
+        call family%break_bond(k, i)
+        parted = parted + 1_i8
+      end do
+    end do
+    !$omp end parallel
+    parted = parted/2_i8
+  end subroutine part_bodies
 
   !> Whether no bond from `x` shorter than `distance` can reach the crack's plane.
   pure logical function far(crack, x, distance)

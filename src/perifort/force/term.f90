@@ -123,6 +123,7 @@ module pd_force_term
     real(wp), allocatable :: last_u(:, :)      !! displacements and forces at the last instant
     real(wp), allocatable :: last_force(:, :)  !! that was accounted [m], [N/m3]
     real(wp) :: last_energy = 0.0_wp           !! that it stored then [J]
+    real(wp) :: lost = 0.0_wp                  !! of a term that is not conservative: it took [J]
   end type item_type
 
   !> Terms in their order. It is a term itself: the sum of those that are not external.
@@ -146,6 +147,8 @@ module pd_force_term
     procedure :: keep => keep_list
     procedure :: describe => describe_list
     procedure :: without_tangent
+    procedure :: accounts_of
+    procedure :: has
   end type term_list_type
 
 contains
@@ -395,6 +398,7 @@ contains
             supplied = supplied + work
           else
             lost = lost - work - (stored - item%last_energy)
+            item%lost = item%lost - work - (stored - item%last_energy)
           end if
         end if
         item%last_u = view%u
@@ -418,6 +422,7 @@ contains
         call archive%keep('last place of term '//to_text(i), item%last_u)
         call archive%keep('last force of term '//to_text(i), item%last_force)
         call archive%keep('last energy of term '//to_text(i), item%last_energy)
+        call archive%keep('loss of term '//to_text(i), item%lost)
       end associate
     end do
   end subroutine keep_list
@@ -434,6 +439,39 @@ contains
       if (one /= '') text = text//one//new_line('a')
     end do
   end function describe_list
+
+  !> What the terms of a name that are not conservative store and have taken, as last accounted.
+  subroutine accounts_of(self, name, stored, lost)
+    class(term_list_type), intent(in) :: self  !! the list
+    character(*), intent(in) :: name           !! of the terms
+    real(wp), intent(out) :: stored            !! [J]
+    real(wp), intent(out) :: lost              !! since the start [J]
+    integer :: i
+
+    stored = 0.0_wp
+    lost = 0.0_wp
+    do i = 1, self%number()
+      associate (item => self%items(i))
+        if (.not. allocated(item%term%name)) cycle
+        if (item%term%name /= name) cycle
+        stored = stored + item%last_energy
+        lost = lost + item%lost
+      end associate
+    end do
+  end subroutine accounts_of
+
+  !> Whether there is a term of this name.
+  pure logical function has(self, name)
+    class(term_list_type), intent(in) :: self  !! the list
+    character(*), intent(in) :: name           !! of a term
+    integer :: i
+
+    has = .false.
+    do i = 1, self%number()
+      if (.not. allocated(self%items(i)%term%name)) cycle
+      has = has .or. self%items(i)%term%name == name
+    end do
+  end function has
 
   !> The name of the first term whose force depends on displacements and that has no tangent; '' if
   !> there is none.

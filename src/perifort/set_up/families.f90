@@ -49,7 +49,8 @@ contains
     end if
     if (suits) then
       allocate (lattice)
-      call new_lattice_family(system%body, rule, size(scene%cracks) > 0 .or. any_critical(scene), &
+      call new_lattice_family(system%body, rule, size(scene%cracks) + size(scene%contacts) &
+        & > 0 .or. any_critical(scene), &
         & mixed, lattice, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return

@@ -64,7 +64,7 @@ contains
     case default; members = 4*pi/3*min(ratio, 1.0e6_wp)**3
     end select
     members = min(points, members)
-    breaking = size(scene%cracks) > 0 .or. any_critical(scene)
+    breaking = size(scene%cracks) + size(scene%contacts) > 0 .or. any_critical(scene)
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking

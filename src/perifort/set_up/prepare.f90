@@ -12,7 +12,7 @@ module pd_set_up_prepare
   use pd_body_layers, only: layer_count_type, layer_count_text
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
-  use pd_family_cracks, only: cut_bonds
+  use pd_family_cracks, only: cut_bonds, part_bodies
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_rule_number
@@ -27,8 +27,8 @@ module pd_set_up_prepare
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_conditions, only: motions_of_scene, loads_of_scene, heating_of_scene, &
     & in_no_fail_zones
-  use pd_set_up_terms, only: add_dashpots_of_scene, add_springs_of_scene, gravity_of_scene, &
-    & leave_uncorrected
+  use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
+    & gravity_of_scene, leave_uncorrected, sides_of_contact
   use pd_set_up_families, only: make_family, finish_family
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
@@ -42,6 +42,7 @@ module pd_set_up_prepare
     type(system_type) :: system
     type(plan_type) :: plan
     integer(i8) :: cut = 0_i8                      !! bonds cut by cracks
+    integer(i8) :: parted = 0_i8                   !! bonds left out between bodies that touch
     integer :: isolated = 0                        !! points without a bond
     type(warnings_type) :: warnings                !! found before the first step
     type(warnings_type) :: notes                   !! what is right and may surprise
@@ -122,6 +123,7 @@ contains
       call add_loads_to(system%terms, loads)
       call add_springs_of_scene(scene, system%body, system%terms)
       call add_dashpots_of_scene(scene, system%body, materials, system%motions, system%terms)
+      call add_contacts_of_scene(scene, system%body, delta, system%terms)
       if (present(terms)) call system%terms%add(terms)
       call timer%stop('conditions')
 
@@ -144,7 +146,14 @@ contains
           & to_text(i)//' cuts no bond, or only bonds that another crack has cut', tell=.false.)
         set_up%cut = set_up%cut + cut
       end do
-      if (set_up%cut > 0_i8) then
+      do i = 1, size(scene%contacts)
+        call part_bodies(sides_of_contact(scene, i), system%body, system%family, cut)
+        set_up%parted = set_up%parted + cut
+        if (cut > 0_i8) call set_up%notes%add('parted '//to_text(i), '&contact number '// &
+          & to_text(i)//' leaves out '//to_text(cut)//' bonds between bodies that touch', &
+          & tell=.false.)
+      end do
+      if (set_up%cut + set_up%parted > 0_i8) then
         call refresh_bonds(system%family, system%workspace%generic)
         allocate (system%state%damage(system%body%n_slots), source=0.0_wp)
         call damage_of(system%body, system%family, system%state%damage)

@@ -3,6 +3,8 @@ module pd_set_up_terms
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type
   use pd_body_waves, only: longitudinal_speed, shear_speed
+  use pd_force_contact, only: contact_rule_type, contact_type, new_contact, of_friction, &
+    & of_normal_force
   use pd_force_dashpots, only: new_dashpots
   use pd_force_springs, only: new_springs
   use pd_force_term, only: term_list_type
@@ -15,6 +17,7 @@ module pd_set_up_terms
   implicit none (type, external)
   private
   public :: gravity_of_scene, add_springs_of_scene, add_dashpots_of_scene, leave_uncorrected
+  public :: add_contacts_of_scene, sides_of_contact
 
 contains
 
@@ -105,6 +108,60 @@ contains
     share = max(0.0_wp, 1 - abs(row - min(0.2_wp*max(0, rows - 2)*(1 + (rows - 3)/6.0_wp), &
       & rows - 1.0_wp)))
   end function share
+
+  !> On which side of a `&contact` each body is: bodies of different sides are never bonded; 0 where
+  !> it is not named. With 'all' every body is of one side.
+  function sides_of_contact(scene, number) result(side)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    integer, intent(in) :: number          !! of the `&contact`
+    integer, allocatable :: side(:)        !! (bodies)
+    integer :: b
+
+    allocate (side(size(scene%bodies)), source=0)
+    associate (contact => scene%contacts(number))
+      do b = 1, size(side)
+        if (contact%within /= '') then
+          side(b) = merge(1, 0, scene%bodies(b)%name == contact%within)
+        else if (contact%between(1) == 'all') then
+          side(b) = 1
+        else
+          side(b) = findloc(contact%between, scene%bodies(b)%name, dim=1)
+        end if
+      end do
+    end associate
+  end function sides_of_contact
+
+  !> Every `&contact`: a term for the force along the line between points and, with friction, one
+  !> for that across it, so that each has its account.
+  subroutine add_contacts_of_scene(scene, body, delta, terms)
+    type(scene_type), intent(in) :: scene         !! a checked scene
+    type(body_type), intent(in) :: body           !! its points, arranged in slots
+    real(wp), intent(in) :: delta                 !! horizon [m]
+    type(term_list_type), intent(inout) :: terms  !! with the contacts on return
+    type(contact_rule_type) :: rule
+    type(contact_type) :: contact
+    integer :: i
+
+    do i = 1, size(scene%contacts)
+      associate (group => scene%contacts(i))
+        rule%side = sides_of_contact(scene, i)
+        rule%pieces = maxval(rule%side) == 1
+        rule%stiffness = group%stiffness
+        rule%distance = 0.0_wp
+        if (is_set(group%distance)) rule%distance = group%distance
+        rule%friction = group%friction
+        rule%returned = 1.0_wp
+        if (is_set(group%restitution)) rule%returned = group%restitution**2
+        rule%damping = 0.0_wp
+        if (is_set(group%damping)) rule%damping = group%damping
+        call new_contact(body, delta, rule, of_normal_force, contact)
+        call terms%add(contact)
+        if (.not. rule%friction > 0.0_wp) cycle
+        call new_contact(body, delta, rule, of_friction, contact)
+        call terms%add(contact)
+      end associate
+    end do
+  end subroutine add_contacts_of_scene
 
   !> Take the surface correction from the points of absorbing layers, whose softness their mass
   !> balances.

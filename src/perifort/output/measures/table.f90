@@ -2,6 +2,7 @@
 module pd_output_measures_table
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_boundary, only: add_boundaries
+  use pd_output_measures_contact, only: add_contacts
   use pd_output_measures_fragments, only: add_fragments
   use pd_output_measures_j_integral, only: add_j_integrals
   use pd_output_measures_measure, only: measure_list_type
@@ -22,6 +23,7 @@ contains
     type(measure_list_type), intent(out) :: measures     !! not begun yet
 
     allocate (measures%items(0))
+    call add_contacts(scene, measures)
     call add_fragments(scene, measures)
     call add_boundaries(scene, measures)
     call add_probes(scene, table, measures)

@@ -32,7 +32,8 @@ contains
     if (first > 0) text = 'at t = '//to_text(time)//' s points '// &
       & to_text(first)//' and '//to_text(second)// &
       & ', which share no intact bond, are closer than half a spacing: '// &
-      & 'there is no contact: pieces pass through each other'
+      & trim(merge('their &contact is too soft, or they have none      ', &
+      & 'there is no contact: pieces pass through each other', system%terms%has('contact')))
   end function contact_warning
 
   !> Parts of the body have turned where the dilatation is projected.

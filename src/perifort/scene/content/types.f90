@@ -12,6 +12,7 @@ module pd_scene_content_types
   use pd_scene_format_keys, only: keys_type, mode_describe
   use pd_scene_groups_body, only: body_group
   use pd_scene_groups_boundary, only: boundary_group
+  use pd_scene_groups_contact, only: contact_group
   use pd_scene_groups_crack, only: crack_group
   use pd_scene_groups_define, only: define_group
   use pd_scene_groups_group, only: group_type
@@ -35,8 +36,8 @@ module pd_scene_content_types
   public :: scene_type, header_type, define_group, body_group, shape_group, region_group, &
     & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
     & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
-    & section_group, line_group, j_integral_group, study_group, name_length, path_length, &
-    & text_length, unset, is_set, is_given
+    & section_group, line_group, j_integral_group, study_group, contact_group, name_length, &
+    & path_length, text_length, unset, is_set, is_given
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -89,6 +90,7 @@ module pd_scene_content_types
     type(initial_group), allocatable :: initial(:)
     type(boundary_group), allocatable :: boundaries(:)
     type(load_group), allocatable :: loads(:)
+    type(contact_group), allocatable :: contacts(:)
     type(time_group) :: time
     type(relaxation_group) :: relaxation
     type(output_group) :: output
