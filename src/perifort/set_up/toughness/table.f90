@@ -12,23 +12,41 @@ module pd_set_up_toughness_table
 
   real(wp), parameter :: same = 1.0e-7_wp  !! how far numbers of a row and of a scene may differ
 
-  !> A lattice in 2D or 3D, surface factors of whole families, influence 'inverse'.
+  !> A lattice in 2D or 3D, with the surface factors of whole families and influence 'inverse'.
+  !> Plane strain at nu is plane stress at nu/(1 - nu): the moduli within the plane are the same.
   type :: row_type
     integer :: dim = 2                      !! 2 or 3
-    logical :: plane_strain = .false.       !! 2D
     integer :: volume = volume_linear       !! volume correction
     real(wp) :: horizon = 0.0_wp            !! [spacings]
-    real(wp) :: poissons_ratio = 0.0_wp     !! [-]
+    real(wp) :: poissons_ratio = 0.0_wp     !! of 3D or plane stress [-]
     real(wp) :: largest = 0.0_wp            !! largest G/Gc within a period
     real(wp) :: mean = 0.0_wp               !! mean G/Gc
     real(wp) :: diagonal = 0.0_wp           !! largest G/Gc along diagonals of cells
   end type row_type
 
-  logical, parameter :: stress = .false., strain = .true.
-
   ! rows begin here
   type(row_type), parameter :: rows(*) = [ &
-    & row_type(2, stress, volume_linear, 3.015_wp, 1/3.0_wp, 1.5189_wp, 1.1625_wp, 1.4575_wp)]
+    & row_type(2, volume_linear, 3.015_wp, 0.2_wp, 1.3207_wp, 1.0641_wp, 1.2640_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.22_wp, 1.3515_wp, 1.0807_wp, 1.2915_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.25_wp, 1.3987_wp, 1.1025_wp, 1.3337_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.3_wp, 1.4773_wp, 1.1378_wp, 1.4068_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.33_wp, 1.5147_wp, 1.1600_wp, 1.4524_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 1/3.0_wp, 1.5189_wp, 1.1625_wp, 1.4575_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.35_wp, 1.5398_wp, 1.1746_wp, 1.4835_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.4_wp, 1.6027_wp, 1.2101_wp, 1.5644_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 3/7.0_wp, 1.6388_wp, 1.2296_wp, 1.6126_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 0.5_wp, 1.7282_wp, 1.2747_wp, 1.7402_wp), &
+    & row_type(2, volume_linear, 3.015_wp, 2/3.0_wp, 1.9161_wp, 1.3417_wp, 2.1059_wp), &
+    & row_type(2, volume_none, 3.015_wp, 1/3.0_wp, 1.5188_wp, 1.2151_wp, 1.3557_wp), &
+    & row_type(2, volume_linear_extended, 3.015_wp, 1/3.0_wp, 1.4830_wp, 1.2000_wp, 1.4054_wp), &
+    & row_type(2, volume_exact, 3.015_wp, 1/3.0_wp, 1.5016_wp, 1.2093_wp, 1.3948_wp), &
+    & row_type(2, volume_linear, 4.015_wp, 0.25_wp, 1.2984_wp, 1.0307_wp, 1.1530_wp), &
+    & row_type(2, volume_linear, 4.015_wp, 1/3.0_wp, 1.3835_wp, 1.0979_wp, 1.2501_wp), &
+    & row_type(3, volume_linear, 3.015_wp, 0.2_wp, 1.1806_wp, 1.0528_wp, 1.1933_wp), &
+    & row_type(3, volume_linear, 3.015_wp, 0.25_wp, 1.2879_wp, 1.1130_wp, 1.3022_wp), &
+    & row_type(3, volume_linear, 3.015_wp, 0.3_wp, 1.3848_wp, 1.1832_wp, 1.4076_wp), &
+    & row_type(3, volume_linear, 3.015_wp, 1/3.0_wp, 1.4341_wp, 1.2272_wp, 1.4643_wp), &
+    & row_type(3, volume_linear, 3.015_wp, 0.4_wp, 1.8066_wp, 1.3369_wp, 1.4056_wp)]
   ! rows end here
 
 contains
@@ -42,6 +60,7 @@ contains
     real(wp), intent(out) :: diagonal  !! largest G/Gc along diagonals of cells; 0 if not found
     logical, intent(out) :: found      !! the lattice is in the table
     type(row_type) :: row
+    real(wp) :: ratio
     integer :: i
 
     largest = 0.0_wp
@@ -51,12 +70,13 @@ contains
     if (law%has_factors()) return
     ! without a dilatation surface factors multiply all forces alike
     if (.not. subject%corrected .and. abs(law%material%a) > 0.0_wp) return
+    ratio = law%material%poissons_ratio
+    if (subject%dim == 2 .and. subject%plane_strain) ratio = ratio/(1 - ratio)
     do i = 1, size(rows)
       row = rows(i)
       if (row%dim /= subject%dim .or. row%volume /= subject%rule%kind) cycle
-      if (row%dim == 2 .and. (row%plane_strain .neqv. subject%plane_strain)) cycle
       if (abs(row%horizon - subject%rule%delta) > same) cycle
-      if (abs(row%poissons_ratio - law%material%poissons_ratio) > same) cycle
+      if (abs(row%poissons_ratio - ratio) > same) cycle
       largest = row%largest
       mean = row%mean
       diagonal = row%diagonal
