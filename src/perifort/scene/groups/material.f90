@@ -67,8 +67,8 @@ contains
       & 'breaks', above=0.0_wp, default='none: bonds never break')
     call keys%key('critical_energy_release_rate', group%critical_energy_release_rate, 'J/m2', &
       & 'energy release rate Gc, instead of critical_stretch', above=0.0_wp)
-    call keys%key('critical', group%critical, 'how the critical stretch follows from Gc: a crack '// &
-      & 'grows through the lattice at Gc, or the formula of the chapter', &
+    call keys%key('critical', group%critical, 'how the critical stretch follows from Gc: a '// &
+      & 'crack grows through the lattice at Gc, or the formula of the chapter', &
       & allowed=critical_names, default="'lattice', where it can be had")
     call keys%key('scatter', group%scatter, '-', 'Weibull modulus of the critical stretches '// &
       & 'of bonds, whose mean is the given one', above=0.0_wp, default='none: all are equal')

@@ -67,7 +67,7 @@ contains
       allocate (disc%first(n), source=1)
       allocate (disc%last(n), source=0)
       ! the dilatation of a held point within reach of a free one is that of its whole family
-      outer = radius + 2*disc%margin
+      outer = radius + merge(2, 1, abs(disc%dilatation) > 0.0_wp)*disc%margin
       do j = 1, n
         do i = 1, n
           x = i - half - 0.5_wp

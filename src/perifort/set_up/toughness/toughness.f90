@@ -117,7 +117,7 @@ contains
           & 'table; its solve took '//duration_text(wall_time() - begin), tell=.false.)
       end if
       material%critical_stretch = material%critical_stretch/sqrt(material%toughness)
-    class default
+    class default  ! a law with a force of its own
       reason = "the lattice is not solved for model = '"//trim(law%name)//"'"
     end select
   end subroutine solve
