@@ -33,6 +33,7 @@ module pd_set_up_prepare
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
   use pd_set_up_plan, only: plan_type, make_plan
+  use pd_set_up_toughness_toughness, only: set_critical_by_lattice
   implicit none (type, external)
   private
   public :: prepare, set_up_type
@@ -88,6 +89,9 @@ contains
       call materials_of_scene(scene, delta, materials, laws, error)
       if (allocated(error)) return
       call timer%stop('points')
+      call timer%start('lattice toughness')
+      call set_critical_by_lattice(scene, system%body, delta, materials, laws, set_up%notes)
+      call timer%stop('lattice toughness')
 
       call timer%start('families')
       call make_family(scene, volume_rule_type(volume_rule_number( &

@@ -62,12 +62,30 @@ contains
         & line('Rayleigh wave', with_unit(rayleigh_speed(m), 'm/s', 4))
     end if
     if (m%critical_stretch >= never) return
-    text = text//line('crit. stretch', to_text(m%critical_stretch, 4))// &
-      & line('Gc', with_unit(energy_of(m%critical_stretch, law), 'J/m2', 4)// &
-      & ', from the critical stretch at this horizon')
+    text = text//line('crit. stretch', to_text(m%critical_stretch, 4))
+    if (m%toughness > 0.0_wp) then
+      text = text//line('Gc', with_unit(energy_of(m%critical_stretch*sqrt(m%toughness), law), &
+        & 'J/m2', 4)//', at which a crack grows through the lattice')// &
+        & line('', 'with the critical stretch of the formula, '// &
+        & to_text(m%critical_stretch*sqrt(m%toughness), 4)//', it would need')// &
+        & line('', to_text(m%toughness, 4)//' Gc at most and '//to_text(m%mean_toughness, 4)// &
+        & ' on average'//diagonal_text(m))
+    else
+      text = text//line('Gc', with_unit(energy_of(m%critical_stretch, law), 'J/m2', 4)// &
+        & ', from the critical stretch at this horizon')
+    end if
     if (m%scatter > 0.0_wp) text = text//line('scatter', 'Weibull modulus '// &
       & to_text(m%scatter, 4)//', seed '//to_text(m%seed)//', about the mean critical stretch')
   end function material_lines
+
+  !> The toughness along diagonals of cells, where it is known.
+  pure function diagonal_text(m) result(text)
+    type(material_type), intent(in) :: m
+    character(:), allocatable :: text
+    text = ''
+    if (m%diagonal_toughness > 0.0_wp) text = ', at 45 degrees '// &
+      & to_text(m%diagonal_toughness, 4)//' Gc'
+  end function diagonal_text
 
   !> The critical energy release rate of a critical stretch, which grows with a power of it; 0 for a
   !> law without one [J/m2].

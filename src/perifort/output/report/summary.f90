@@ -148,7 +148,8 @@ contains
       end if
       if (model%breaking) then
         text = text//line('fracture', 'bonds can break'// &
-          & trim(merge(' in tension and in compression', repeat(' ', 30), model%compression)))
+          & trim(merge(' in tension and in compression', repeat(' ', 30), model%compression)))// &
+          & lattices(model)
       else if (any(scene%materials%critical_stretch > 0.0_wp) .or. &
         & any(scene%materials%critical_energy_release_rate > 0.0_wp)) then
         text = text//line('fracture', 'no bond can break: all points lie in no-fail zones')
@@ -159,6 +160,23 @@ contains
       text = text//line('precision', precision_of(scene, system))
     end associate
   end function forces
+
+  !> The critical stretches that follow from the lattice's toughness.
+  pure function lattices(model) result(text)
+    type(model_type), intent(in) :: model
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(model%materials)
+      associate (m => model%materials(i))
+        if (.not. m%toughness > 0.0_wp) cycle
+        text = text//line(trim(merge('crit. stretch', repeat(' ', 13), text == '')), &
+          & to_text(m%critical_stretch, 4)//', 1/'//to_text(sqrt(m%toughness), 4)// &
+          & ' of the formula''s: the toughness of the lattice (material '//to_text(i)//')')
+      end associate
+    end do
+  end function lattices
 
   !> The bond laws, where they are not the chapter's with its influence function.
   function laws_of(model) result(text)

@@ -257,6 +257,11 @@ contains
         call rule_fault(error, 'material', number, 'critical_energy_release_rate', &
           & "'critical_stretch' and 'critical_energy_release_rate' are both given", &
           & 'give one of them; each follows from the other', source)
+      else if (material%critical /= '' .and. .not. &
+        & is_set(material%critical_energy_release_rate)) then
+        call rule_fault(error, 'material', number, 'critical', &
+          & "'critical' without 'critical_energy_release_rate'", "it says how the critical "// &
+          & "stretch follows from that; a given 'critical_stretch' holds as it is", source)
       else if (is_set(material%scatter) .and. .not. (is_set(material%critical_stretch) .or. &
         & is_set(material%critical_energy_release_rate))) then
         call rule_fault(error, 'material', number, 'scatter', &

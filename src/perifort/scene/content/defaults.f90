@@ -11,6 +11,7 @@
 !> | 0.2     | relaxation, `&output history_every`: 1, before max(1, maximum_iterations/2000)    |
 !> | 0.2     | relaxation, temperature changes of `&initial`: by a ramp over the load steps,     |
 !> |         | before at once                                                                    |
+!> | 0.2     | `&material critical`: 'lattice', before 'chapter'                                 |
 module pd_scene_content_defaults
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
@@ -47,6 +48,13 @@ contains
       scene%horizon%dilatation = 'unprojected'
       if (before_0_2(scene)) scene%horizon%dilatation = 'projected'
     end if
+    do i = 1, size(scene%materials)
+      associate (material => scene%materials(i))
+        if (material%critical /= '' .or. .not. is_set(material%critical_energy_release_rate)) cycle
+        material%critical = 'lattice'
+        if (before_0_2(scene)) material%critical = 'chapter'
+      end associate
+    end do
     if (scene%time%method /= 'relaxation' .or. .not. before_0_2(scene)) return
     if (scene%output%history_every == 0) &
       & scene%output%history_every = max(1, scene%relaxation%maximum_iterations/rows_wanted)

@@ -10,7 +10,11 @@ module pd_scene_groups_material
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
   private
-  public :: material_group
+  public :: material_group, critical_names
+
+  !> How the critical stretch follows from Gc.
+  character(name_length), parameter :: critical_names(2) = [character(name_length) :: 'lattice', &
+    & 'chapter']
 
   !> `&material`
   type, extends(group_type) :: material_group
@@ -23,6 +27,7 @@ module pd_scene_groups_material
     real(wp) :: density = unset                            !! rho [kg/m3]
     real(wp) :: critical_stretch = unset                   !! s_c [-]
     real(wp) :: critical_energy_release_rate = unset       !! Gc [J/m2]
+    character(name_length) :: critical = ''                !! how s_c follows from Gc; '': not said
     real(wp) :: scatter = unset                            !! Weibull modulus [-]
     integer :: seed = 1                                    !! of the scatter
     logical :: break_in_compression = .false.
@@ -62,6 +67,9 @@ contains
       & 'breaks', above=0.0_wp, default='none: bonds never break')
     call keys%key('critical_energy_release_rate', group%critical_energy_release_rate, 'J/m2', &
       & 'energy release rate Gc, instead of critical_stretch', above=0.0_wp)
+    call keys%key('critical', group%critical, 'how the critical stretch follows from Gc: a '// &
+      & 'crack grows through the lattice at Gc, or the formula of the chapter', &
+      & allowed=critical_names, default="'lattice', where it can be had")
     call keys%key('scatter', group%scatter, '-', 'Weibull modulus of the critical stretches '// &
       & 'of bonds, whose mean is the given one', above=0.0_wp, default='none: all are equal')
     call keys%key('seed', group%seed, '', 'of the random numbers of scatter', at_least=0)
