@@ -11,6 +11,8 @@
 !> | 0.2     | relaxation, `&output history_every`: 1, before max(1, maximum_iterations/2000)    |
 !> | 0.2     | relaxation, temperature changes of `&initial`: by a ramp over the load steps,     |
 !> |         | before at once                                                                    |
+!> | 0.2     | `&relaxation growth`: 'events' where bonds can break and all acts in proportion   |
+!> |         | to t, before 'load_steps'                                                         |
 module pd_scene_content_defaults
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
@@ -48,6 +50,7 @@ contains
       if (before_0_2(scene)) scene%horizon%dilatation = 'projected'
     end if
     if (scene%time%method /= 'relaxation' .or. .not. before_0_2(scene)) return
+    if (scene%relaxation%growth == '') scene%relaxation%growth = 'load_steps'
     if (scene%output%history_every == 0) &
       & scene%output%history_every = max(1, scene%relaxation%maximum_iterations/rows_wanted)
     do i = 1, size(scene%initial)
