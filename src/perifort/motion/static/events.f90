@@ -38,6 +38,8 @@ module pd_motion_static_events
   !> A bond is at its limit if its stretch is so near to it, in tolerances of the equilibrium, but
   !> within these bounds: a stretch is not known better than the displacements.
   real(wp), parameter :: tolerances = 10.0_wp, finest = 1.0e-9_wp, coarsest = 1.0e-3_wp
+  !> An equilibrium that only says where the next one is needs no smaller tolerance than this.
+  real(wp), parameter :: rough = 1.0e-3_wp
   !> Bonds with the same stretch differ by rounding.
   real(wp), parameter :: same = 1.0e-12_wp
   !> The slope of the ratio over the load factor is that of the last two equilibria, if it is so near
@@ -64,11 +66,14 @@ contains
     type(instant_type) :: instant
     type(rigid_type) :: rigid
     type(good_state_type) :: good
+    type(relaxation_type) :: roughly
     real(wp) :: ratio
     logical :: amid, stands
 
     system%static = .true.
     instant%dt = 1.0_wp
+    roughly = relaxation
+    roughly%tolerance = max(rough, relaxation%tolerance)
     call check_terms(system, error)
     if (allocated(error)) return
     call find_free_motions(system, rigid)
@@ -107,7 +112,11 @@ contains
         amid = .false.
         call keep_instant(instant)
         call bring_temperature(system, instant%time)
-        call find_equilibrium(system, relaxation, rigid, instant, observer, error)
+        if (memory%purpose == after_break .and. .not. relaxation%load_controlled) then
+          call find_equilibrium(system, roughly, rigid, instant, observer, error)
+        else
+          call find_equilibrium(system, relaxation, rigid, instant, observer, error)
+        end if
         if (allocated(error)) exit
         call turn_where_free(system, relaxation, rigid, instant)
         ratio = greatest_ratio(system)
@@ -236,8 +245,8 @@ contains
     case (event)
       stands = .not. below .and. ratio <= 1 + accuracy(relaxation)
     case (after_break)
-      stands = relaxation%load_controlled .or. &
-        & (.not. below .and. ratio <= 1 + accuracy(relaxation))
+      ! else it is a rough one
+      stands = relaxation%load_controlled
     case (unloaded)
       stands = .true.
     case default
