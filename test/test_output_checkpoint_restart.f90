@@ -590,7 +590,6 @@ contains
     integer :: pieces, i
 
     call slow_plate(scene)
-    scene%relaxation%growth = 'load_steps'
     do i = 1, size(solvers)
       if (allocated(error)) return
       scene%relaxation%solver = solvers(i)
@@ -616,6 +615,7 @@ contains
 
     call slow_plate(scene)
     scene%relaxation%load_steps = 2
+    scene%relaxation%growth = 'events'
     scene%relaxation%tolerance = 1.0e-2_wp
     scene%relaxation%most_events = 4
     do i = 1, size(controls)
@@ -644,6 +644,7 @@ contains
     scene%cracks(1)%to(:2) = [2.0_wp, 3.0_wp]*spacing
     scene%time%method = 'relaxation'
     scene%relaxation%load_steps = 1
+    scene%relaxation%growth = 'load_steps'
     scene%relaxation%tolerance = 0.1_wp
     scene%output%every = 1
     scene%output%history_every = 5
