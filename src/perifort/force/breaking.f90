@@ -84,7 +84,8 @@ contains
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
     !$omp parallel default(none) &
-    !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws, of_limit) &
+    !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
+    !$omp shared(of_limit) &
     !$omp firstprivate(before) private(bonds, g, m, k, i, breaks)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 4)

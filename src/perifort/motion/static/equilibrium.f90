@@ -1,4 +1,5 @@
-!> One static equilibrium, by either solver, and what is done with it: what all rules of growth share.
+!> One static equilibrium, by either solver, and what is done with it: what all rules of growth
+!> share.
 module pd_motion_static_equilibrium
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, fail, status_input
@@ -127,7 +128,7 @@ contains
 
   !> An equilibrium that counts, whose forces are known: let the observer see it.
   subroutine settle(system, instant, observer, error)
-    type(system_type), intent(inout) :: system       !! its work and reactions are brought up to date
+    type(system_type), intent(inout) :: system       !! gets its work and reactions
     type(instant_type), intent(inout) :: instant     !! which one it is; loses its note
     class(observer_type), intent(inout) :: observer  !! is called once
     type(error_type), allocatable, intent(out) :: error

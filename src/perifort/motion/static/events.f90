@@ -42,8 +42,8 @@ module pd_motion_static_events
   real(wp), parameter :: rough = 1.0e-3_wp
   !> Bonds with the same stretch differ by rounding.
   real(wp), parameter :: same = 1.0e-12_wp
-  !> The slope of the ratio over the load factor is that of the last two equilibria, if it is so near
-  !> to that of the line through the origin, else the latter.
+  !> The slope of the ratio over the load factor is that of the last two equilibria, if it is so
+  !> near to that of the line through the origin, else the latter.
   real(wp), parameter :: flattest = 0.5_wp, steepest = 2.0_wp
   !> Equilibria that one event may take: with a nearly linear response it is one or two.
   integer, parameter :: most_tries = 25
@@ -193,8 +193,8 @@ contains
       if (memory%tries > most_tries) then
         call fail(error, 'the load factor at which the next bond breaks is not found near '// &
           & to_text(memory%factor, 6)//': at the equilibrium there the largest stretch is '// &
-          & to_text(ratio, 6)//' of its limit. The response is too far from linear for growth = '// &
-          & '''events''; use growth = ''load_steps''', status_no_answer)
+          & to_text(ratio, 6)//' of its limit. The response is too far from linear for growth '// &
+          & '= ''events''; use growth = ''load_steps''', status_no_answer)
         return
       end if
       next = load_factor_of_limit(memory, ratio)
@@ -211,8 +211,8 @@ contains
     end associate
   end subroutine go_on
 
-  !> The load factor at which the largest stretch reaches its limit, by the line through the last two
-  !> equilibria with the same bonds; of the first of them, through the origin.
+  !> The load factor at which the largest stretch reaches its limit, by the line through the last
+  !> two equilibria with the same bonds; of the first of them, through the origin.
   pure real(wp) function load_factor_of_limit(memory, ratio) result(factor)
     type(memory_type), intent(in) :: memory
     real(wp), intent(in) :: ratio
@@ -268,8 +268,8 @@ contains
     accuracy = min(coarsest, max(finest, tolerances*relaxation%tolerance))
   end function accuracy
 
-  !> Why a system cannot grow by events, '' if it can: everything that acts has to be proportional to
-  !> the load factor, and a bond must be the same at the same stretch.
+  !> Why a system cannot grow by events, '' if it can: everything that acts has to be proportional
+  !> to the load factor, and a bond must be the same at the same stretch.
   function why_not_events(system) result(reason)
     type(system_type), intent(in), target :: system  !! ready at t = 0
     character(:), allocatable :: reason
@@ -299,7 +299,8 @@ contains
       type is (springs_type)
         continue
       class default
-        if (reason == '') reason = 'the force term '//term%name//' acts'
+        ! others may depend on the path or on velocities
+        if (reason == '') reason = 'a force term acts beside loads and springs'
       end select
     end do
     if (reason /= '' .or. .not. system%model%thermal) return

@@ -87,7 +87,8 @@ contains
         & 'the load factor decreases where the response snaps back', &
         & plan%relaxation%load_controlled)))
     else if (breaking) then
-      text = text//line('growth', 'all bonds beyond their limit break when a load step has converged')
+      text = text//line('growth', 'all bonds beyond their limit break when a load step '// &
+        & 'has converged')
     end if
     if (scene%relaxation%solver == 'dynamic_relaxation') then
       text = text//line('solver', 'dynamic relaxation, density matrix '// &

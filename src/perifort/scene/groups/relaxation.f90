@@ -56,8 +56,8 @@ contains
     call keys%key('batch', group%batch, '-', 'growth by events: bonds break together whose '// &
       & 'stretch over their limit is within this part of the largest', at_least=0.0_wp, &
       & below=1.0_wp, default='1e-6; 0.02 in 3D')
-    call keys%key('most_events', group%most_events, '', 'growth by events: the run ends after so '// &
-      & 'many', at_least=0, default='no limit')
+    call keys%key('most_events', group%most_events, '', 'growth by events: the run ends after '// &
+      & 'so many', at_least=0, default='no limit')
   end subroutine visit
 
   !> The factor on the fictitious mass, if nothing is said its default: masses that are stable by
@@ -72,7 +72,7 @@ contains
   end function safety_of
 
   !> Which part of the largest ratio of stretch and limit bonds that break together may be below it;
-  !> if nothing is said its default: mirror twins, and in 3D what makes the number of events bearable.
+  !> if nothing is said its default: mirror twins, and in 3D more, since the events would be too many.
   pure real(wp) function batch_of(group, dimension) result(batch)
     type(relaxation_group), intent(in) :: group  !! checked or not
     integer, intent(in) :: dimension             !! of the scene
