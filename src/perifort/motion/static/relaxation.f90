@@ -1,6 +1,6 @@
 !> Static equilibrium over the load steps. Bonds beyond their limit break by events
-!> (`grow_by_events`), or, by the rule of load steps, all at once when a load step has converged; then it relaxes again
-!> until none does.
+!> (`grow_by_events`), or, by the rule of load steps, all at once when a load step has converged;
+!> then it relaxes again until none does.
 module pd_motion_static_relaxation
   use pd_base_kinds, only: wp, i8
   use pd_base_error, only: error_type, status_input, status_no_answer

@@ -72,7 +72,7 @@ contains
   end function safety_of
 
   !> Which part of the largest ratio of stretch and limit bonds that break together may be below it;
-  !> if nothing is said its default: mirror twins, and in 3D more, since the events would be too many.
+  !> if nothing is said its default: mirror twins, and in 3D more, for fewer events.
   pure real(wp) function batch_of(group, dimension) result(batch)
     type(relaxation_group), intent(in) :: group  !! checked or not
     integer, intent(in) :: dimension             !! of the scene
