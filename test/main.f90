@@ -58,6 +58,7 @@ program main
   use test_motion_pins, only: collect_motion_pins
   use test_motion_plastic, only: collect_motion_plastic
   use test_motion_reactions, only: collect_motion_reactions
+  use test_motion_static_events, only: collect_motion_static_events
   use test_motion_static_relaxation, only: collect_motion_static_relaxation
   use test_motion_explicit_spectrum, only: collect_motion_explicit_spectrum
   use test_motion_system, only: collect_motion_system
@@ -168,6 +169,7 @@ program main
   call register('motion_pins', collect_motion_pins)
   call register('motion_plastic', collect_motion_plastic)
   call register('motion_reactions', collect_motion_reactions)
+  call register('motion_static_events', collect_motion_static_events)
   call register('motion_static_relaxation', collect_motion_static_relaxation)
   call register('motion_explicit_spectrum', collect_motion_explicit_spectrum)
   call register('motion_system', collect_motion_system)

@@ -410,6 +410,7 @@ contains
       scene%no_fail(2)%lower(1) = 14*spacing
       scene%materials(1)%critical_stretch = 1.0e-3_wp
       scene%relaxation%load_steps = 3
+      scene%relaxation%growth = 'load_steps'
       scene%relaxation%solver = solvers(s)
       call relax(scene, set_up, listener, error)
       if (allocated(error)) return

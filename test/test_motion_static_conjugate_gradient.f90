@@ -458,6 +458,7 @@ contains
       scene%no_fail(1)%upper(1) = 7*spacing
       scene%no_fail(2)%lower(1) = 13*spacing
       scene%relaxation%load_steps = load_steps
+      scene%relaxation%growth = 'load_steps'
       call relax(scene, set_up, witness, error)
       if (allocated(error)) return
       call expect_true(error, witness%settled == load_steps, 'load steps')

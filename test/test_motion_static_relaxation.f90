@@ -467,6 +467,7 @@ contains
     scene%boundaries(1)%displacement(1) = 0.0_wp
     scene%boundaries(2)%side = 'x_max'
     scene%materials(1)%critical_stretch = 0.01_wp
+    scene%relaxation%growth = 'load_steps'
     scene%no_fail%shape = 'box'
     scene%no_fail(1)%upper(1) = zone*spacing
     scene%no_fail(2)%lower(1) = (20 - zone)*spacing

@@ -41,6 +41,7 @@ contains
       & new_unittest('pins in motion and in equilibrium', test_pins), &
       & new_unittest('contact with friction', test_contact), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
+      & new_unittest('long: growth by events is the same in pieces', test_events), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
       & new_unittest('no row of a load step that has not converged', test_no_row), &
       & new_unittest('more iterations are given to a relaxation', test_more_iterations), &
@@ -669,6 +670,34 @@ contains
     end do
   end subroutine test_relaxation
 
+  !> Growth by events, with the load controlled and down where it snaps back; cut after every
+  !> iteration and every equilibrium.
+  subroutine test_events(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: controls(2) = [character(11) :: 'load', 'dissipation']
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    call slow_plate(scene)
+    scene%relaxation%load_steps = 2
+    scene%relaxation%growth = 'events'
+    scene%relaxation%tolerance = 1.0e-2_wp
+    scene%relaxation%most_events = 3
+    do i = 1, size(controls)
+      if (allocated(error)) return
+      scene%relaxation%control = controls(i)
+      call run(scene, 'whole', fault, threads=2)
+      call accept(error, fault)
+      call expect_broken(error, 'whole')
+      if (allocated(error)) return
+      call run_in_pieces(scene, 'pieces', 1, pieces, error)
+      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
+      call expect_same_results(error, 'whole', 'pieces', 2)
+      call expect_same_file(error, here//'/whole/iterations.csv', here//'/pieces/iterations.csv')
+    end do
+  end subroutine test_events
+
   !> A small plate with a notch, drawn apart in load steps.
   subroutine slow_plate(scene)
     type(scene_type), intent(out) :: scene
@@ -681,6 +710,7 @@ contains
     scene%cracks(1)%to(:2) = [2.0_wp, 3.0_wp]*spacing
     scene%time%method = 'relaxation'
     scene%relaxation%load_steps = 1
+    scene%relaxation%growth = 'load_steps'
     scene%relaxation%tolerance = 0.1_wp
     scene%output%every = 1
     scene%output%history_every = 5

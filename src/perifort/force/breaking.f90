@@ -18,7 +18,7 @@ module pd_force_breaking
   use pd_force_workspace, only: generic_workspace_type
   implicit none (type, external)
   private
-  public :: strained_slots, break_bonds, damage_of, find_weakest
+  public :: strained_slots, break_bonds, damage_of, find_weakest, stretch_ratios
 
 contains
 
@@ -49,7 +49,7 @@ contains
   !> the stretches and dilatations under `u` and under that set in place of the squares
   !> (doc/theory.md, 9).
   subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated, others, &
-    & products, laws)
+    & products, laws, part)
     type(body_type), intent(in) :: body          !! its volumes [m3]
     class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
     type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
@@ -65,14 +65,19 @@ contains
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
     type(generic_workspace_type), intent(inout), optional :: laws
       !! of the generic pass, where the model is generic; knows the broken bonds on return
+    real(wp), intent(in), optional :: part
+      !! of its limit, beyond which a bond breaks; 1 by default [-]
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:)
+    real(wp) :: of_limit
     integer, allocatable :: number(:), first(:), order(:)
     type(running_type) :: running
     real(wp) :: totals(6)
     logical :: breaks
     integer :: g, m, k, i, sets
 
+    of_limit = 1.0_wp
+    if (present(part)) of_limit = part
     sets = 0
     if (present(others)) sets = size(others, 3)
     allocate (lost(size(slots), 0:sets), before(0:sets), source=0.0_wp)
@@ -80,6 +85,7 @@ contains
     call group_slots(slots, first)
     !$omp parallel default(none) &
     !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
+    !$omp shared(of_limit) &
     !$omp firstprivate(before) private(bonds, g, m, k, i, breaks)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 4)
@@ -88,7 +94,7 @@ contains
         k = slots(m)
         call family%bonds_of(k, bonds)
         do i = 1, bonds%n
-          call decide(model, u, k, bonds, i, breaks)
+          call decide(model, u, k, bonds, i, of_limit, breaks)
           if (.not. breaks) cycle
           if (number(m) == 0) call energies(family, model, laws, u, k, bonds, before, others)
           number(m) = number(m) + 1
@@ -193,13 +199,14 @@ contains
     model%least_critical = minval(model%weakest)
   end subroutine find_weakest
 
-  !> Whether the `i`-th bond of slot `k` breaks now.
-  pure subroutine decide(model, u, k, bonds, i, breaks)
+  !> Whether the `i`-th bond of slot `k` is beyond `part` of its limit.
+  pure subroutine decide(model, u, k, bonds, i, part, breaks)
     type(model_type), intent(in) :: model
     real(wp), intent(in) :: u(:, :)
     integer, intent(in) :: k
     type(bonds_type), intent(in) :: bonds
     integer, intent(in) :: i
+    real(wp), intent(in) :: part
     logical, intent(out) :: breaks
     type(bond_state_type) :: state
     real(wp) :: lower, upper
@@ -208,8 +215,39 @@ contains
     if (.not. bonds%intact(i)) return
     call bond_limit(model, k, int(bonds%j(i)), lower, upper)
     state = state_of_bond(model, u, k, bonds, i)
-    breaks = state%stretch > upper .or. state%stretch < lower
+    breaks = state%stretch > part*upper .or. state%stretch < part*lower
   end subroutine decide
+
+  !> The largest mechanical stretch over its limit of the intact bonds of every slot: 0 where none
+  !> is stretched, both ends of a bond with the same bits.
+  subroutine stretch_ratios(family, model, u, ratios)
+    class(family_type), intent(in) :: family     !! with its intact bonds
+    type(model_type), intent(in) :: model        !! with bonds that can break
+    real(wp), intent(in), contiguous :: u(:, :)  !! displacements (n_slots, dim) [m]
+    real(wp), intent(out) :: ratios(:)           !! (n_slots) [-]
+    type(bonds_type) :: bonds
+    type(bond_state_type) :: state
+    real(wp) :: lower, upper
+    integer :: k, i
+
+    !$omp parallel default(none) shared(family, model, u, ratios) &
+    !$omp private(bonds, state, lower, upper, k, i)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 64)
+    do k = 1, family%n_slots
+      ratios(k) = 0.0_wp
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        if (.not. bonds%intact(i)) cycle
+        call bond_limit(model, k, int(bonds%j(i)), lower, upper)
+        if (.not. upper < never) cycle
+        state = state_of_bond(model, u, k, bonds, i)
+        ratios(k) = max(ratios(k), state%stretch/upper)
+        if (lower > -never) ratios(k) = max(ratios(k), state%stretch/lower)
+      end do
+    end do
+    !$omp end parallel
+  end subroutine stretch_ratios
 
   !> Local damage of every slot [-].
   subroutine damage_of(body, family, damage)

@@ -33,6 +33,14 @@ module pd_motion_memory
     real(wp) :: moved = 0.0_wp             !! U.U, both from `base` [m2]
     real(wp) :: displacement = 0.0_wp      !! square of all displacements [m2]
     real(wp) :: change = 0.0_wp            !! dU.dU [m2]
+    ! growth by events
+    real(wp) :: factor = 0.0_wp            !! load factor of the equilibrium, or on the way there
+    integer :: purpose = 0                 !! why that one is sought
+    integer :: reached = 0                 !! load steps whose load factor has been reached
+    integer :: events = 0                  !! batches of bonds broken so far
+    integer :: tries = 0                   !! equilibria sought for the event to come
+    real(wp) :: tried_factor = 0.0_wp      !! an earlier equilibrium with the same bonds: its load
+    real(wp) :: tried_ratio = 0.0_wp       !! factor, and its largest stretch over the limit [-]
   end type memory_type
 
 contains
@@ -61,6 +69,13 @@ contains
     call archive%keep('U.U', memory%moved)
     call archive%keep('displacement', memory%displacement)
     call archive%keep('dU.dU', memory%change)
+    call archive%keep('load factor', memory%factor)
+    call archive%keep('purpose', memory%purpose)
+    call archive%keep('load steps reached', memory%reached)
+    call archive%keep('events', memory%events)
+    call archive%keep('tries', memory%tries)
+    call archive%keep('load factor tried', memory%tried_factor)
+    call archive%keep('stretch ratio tried', memory%tried_ratio)
     conjugate = allocated(memory%newton)
     call archive%keep('conjugate gradients', conjugate)
     if (allocated(memory%newton) .and. .not. conjugate) deallocate (memory%newton)

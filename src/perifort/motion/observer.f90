@@ -22,6 +22,8 @@ module pd_motion_observer
     character(:), allocatable :: note !! a warning for the user about this instant
     logical :: last = .false.         !! the final state
     logical :: settled = .true.       !! relaxation: a load step has converged
+    logical :: between = .false.      !! growth by events: a settled state between load steps
+    integer :: events = 0             !! growth by events: batches of bonds broken so far
     logical :: gave_way = .false.     !! the conjugate gradient left this to dynamic relaxation
     logical :: rescued = .false.      !! the last good state of a motion that has gone wrong since
   end type instant_type

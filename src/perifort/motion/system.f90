@@ -4,9 +4,10 @@ module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
+  use pd_base_reduce, only: largest_over
   use pd_body_body, only: body_type, not_finite_text, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
-  use pd_force_breaking, only: strained_slots, break_bonds
+  use pd_force_breaking, only: strained_slots, break_bonds, stretch_ratios
   use pd_force_generic_pass, only: renew_pulls
   use pd_force_forces, only: internal_force, whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of, p_of
@@ -24,8 +25,8 @@ module pd_motion_system
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & renew_forces, renew_conditions, explain_condition, break_now, add_loads, inverse_density, &
-    & view_of, find_loaded, apply_to_held
+    & renew_forces, renew_conditions, explain_condition, break_now, break_batch, greatest_ratio, &
+    & add_loads, inverse_density, view_of, find_loaded, apply_to_held
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -305,6 +306,40 @@ contains
     if (system%model%breaking) call break_marked(system, 0.0_wp, pairing_type(), slots)
     number = system%broken - number
   end subroutine break_now
+
+  !> The largest mechanical stretch of an intact bond over its limit: 1 where the next one breaks;
+  !> 0 where none is stretched, or none can break [-].
+  real(wp) function greatest_ratio(system) result(ratio)
+    type(system_type), intent(in) :: system  !! at its displacements and temperature
+    real(wp), allocatable :: ratios(:)
+
+    ratio = 0.0_wp
+    if (.not. system%model%breaking) return
+    allocate (ratios(system%body%n_slots))
+    call stretch_ratios(system%family, system%model, system%state%u, ratios)
+    ratio = largest_over(system%body%order, ratios)
+  end function greatest_ratio
+
+  !> Break every bond beyond `part` of its limit at the present displacements; otherwise as
+  !> `break_now`.
+  subroutine break_batch(system, part, number)
+    type(system_type), intent(inout) :: system
+      !! with bonds broken, damage and dissipated energy up to date on return
+    real(wp), intent(in) :: part        !! of the limit [-]
+    integer(i8), intent(out) :: number  !! bonds broken by this call, each counted once
+    real(wp), allocatable :: ratios(:)
+    integer(i4), allocatable :: slots(:)
+    real(wp) :: dissipated
+    integer :: k
+
+    allocate (ratios(system%body%n_slots))
+    call stretch_ratios(system%family, system%model, system%state%u, ratios)
+    slots = pack([(int(k, i4), k=1, size(ratios))], ratios > part)
+    call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
+      & system%state%damage, number, dissipated, laws=system%workspace%generic, part=part)
+    system%broken = system%broken + number
+    system%dissipated = system%dissipated + dissipated
+  end subroutine break_batch
 
   !> Break bonds of the marked slots and count what that dissipates.
   subroutine break_marked(system, t, pairing, slots)

@@ -5,7 +5,8 @@ module pd_set_up_plan
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
-  use pd_scene_groups_relaxation, only: safety_of
+  use pd_scene_groups_relaxation, only: batch_of, safety_of
+  use pd_motion_static_events, only: why_not_events
   use pd_motion_static_relaxation, only: relaxation_type
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
     & stable_step_of, may_be_unstable, lowest_eigenvalue
@@ -66,6 +67,7 @@ contains
     if (plan%relaxes) then
       call plan_relaxation(scene, system, bound, rows, plan%relaxation)
       plan%steps = plan%relaxation%load_steps
+      call plan_growth(scene, system, plan%relaxation, error)
       return
     end if
     plan%equation = stable_step(system%body, system%model, bound) &
@@ -197,6 +199,39 @@ contains
       relaxation%mass(:, c) = relaxation%mass(:, c) + safety*rows/4
     end do
   end subroutine plan_relaxation
+
+  !> By which rule bonds break. An error if the scene asks for events, or for a control that only
+  !> they have, and cannot have them.
+  subroutine plan_growth(scene, system, relaxation, error)
+    type(scene_type), intent(in) :: scene
+    type(system_type), intent(in) :: system
+    type(relaxation_type), intent(inout) :: relaxation
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: reason
+    logical :: asked
+
+    asked = scene%relaxation%growth == 'events' .or. scene%relaxation%control == 'dissipation'
+    reason = ''
+    if (scene%relaxation%growth == 'load_steps') then
+      if (asked) call scene_fault(error, scene, 'relaxation', 1, 'control', "control = '"// &
+        & trim(scene%relaxation%control)//"' needs growth by events", &
+        & "growth = 'load_steps' breaks bonds at the load factor of a load step")
+      return
+    end if
+    if (.not. system%model%breaking) return
+    reason = why_not_events(system)
+    if (reason /= '') then
+      if (asked) call scene_fault(error, scene, 'relaxation', 1, &
+        & trim(merge('growth ', 'control', scene%relaxation%growth == 'events')), &
+        & 'bonds cannot break by events: '//reason, 'by events everything grows in proportion '// &
+        & "to the load factor, with ramp_time = 1 and without t; else growth = 'load_steps'")
+      return
+    end if
+    relaxation%events = .true.
+    relaxation%load_controlled = scene%relaxation%control == 'load'
+    relaxation%batch = batch_of(scene%relaxation, scene%header%dimension)
+    if (scene%relaxation%most_events > 0) relaxation%most_events = scene%relaxation%most_events
+  end subroutine plan_growth
 
   !> What turns dx^dim into a volume: thickness in 2D, area in 1D. It is 1 in 3D [m in 2D, m2 in
   !> 1D].

@@ -13,6 +13,10 @@ module pd_motion_static_residual
   type :: relaxation_type
     logical :: conjugate_gradient = .false.   !! else adaptive dynamic relaxation alone
     integer :: load_steps = 1
+    logical :: events = .false.               !! bonds break by events, else after load steps
+    logical :: load_controlled = .true.       !! by events: the load factor never decreases
+    real(wp) :: batch = 1.0e-6_wp             !! bonds so near to their limit break together [-]
+    integer :: most_events = huge(1)          !! after which the run ends
     integer :: maximum_iterations = 100000    !! of each relaxation
     real(wp) :: tolerance = 1.0e-6_wp         !! of residual force and displacement change [-]
     real(wp), allocatable :: mass(:, :)       !! lambda for a step of 1 (n_slots, dim) [N/m4]

@@ -5,7 +5,7 @@ module pd_output_report_columns
   use pd_base_reduce, only: largest_over
   use pd_force_generic_points, only: has_plasticity
   use pd_law_laws, only: law_table_type
-  use pd_motion_system, only: system_type
+  use pd_motion_system, only: greatest_ratio, system_type
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_measure, only: measure_list_type, row_source_type
   use pd_output_measures_table, only: measures_of
@@ -58,6 +58,8 @@ contains
     if (.not. relaxation) return
     call put(table, 'residual', '1', residual)
     call put(table, 'load_step', '1', load_step)
+    call put(table, 'events', '1', events)
+    call put(table, 'stretch_ratio', '1', stretch_ratio)
   end function history_table
 
   !> Add a column at the end.
@@ -187,5 +189,16 @@ contains
     type(row_source_type), intent(in) :: now
     load_step = now%instant%load_step
   end function load_step
+
+  pure real(wp) function events(now)
+    type(row_source_type), intent(in) :: now
+    events = now%instant%events
+  end function events
+
+  !> 1 where the next bond breaks.
+  real(wp) function stretch_ratio(now)
+    type(row_source_type), intent(in) :: now
+    stretch_ratio = greatest_ratio(now%system)
+  end function stretch_ratio
 
 end module pd_output_report_columns

@@ -20,6 +20,9 @@ contains
 
     if (.not. relaxation) then
       text = 'step '//to_text(instant%step)//', t = '//to_text(instant%time)//' s'
+    else if (instant%settled .and. instant%between) then
+      text = 'the equilibrium at load factor '//to_text(instant%time)//' after '// &
+        & to_text(instant%events)//' events'
     else if (instant%settled) then
       text = 'the end of load step '//to_text(instant%load_step)
     else

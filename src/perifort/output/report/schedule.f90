@@ -133,7 +133,8 @@ contains
 
     if (schedule%relaxation) then
       row = instant%settled
-      output = instant%settled .and. mod(instant%load_step, schedule%every) == 0
+      output = instant%settled .and. .not. instant%between .and. &
+        & mod(instant%load_step, schedule%every) == 0
     else
       row = mod(instant%step, schedule%history_every) == 0
       output = output_due(schedule, instant%step, instant%dt)

@@ -52,7 +52,7 @@ contains
     text = text//forces(scene, system)//terms_of(system)
     text = text//line('threads', to_text(threads))
     if (plan%relaxes) then
-      text = text//statics(scene, plan)
+      text = text//statics(scene, plan, system%model%breaking)
     else
       text = text//steps(scene, system, plan)
     end if
@@ -72,13 +72,24 @@ contains
   end function greatest_spacing
 
   !> How static equilibrium is found.
-  pure function statics(scene, plan) result(text)
+  pure function statics(scene, plan, breaking) result(text)
     type(scene_type), intent(in) :: scene
     type(plan_type), intent(in) :: plan
+    logical, intent(in) :: breaking  !! bonds can break
     character(:), allocatable :: text
 
     text = line('relaxation', 'static equilibrium in '// &
       & counted(plan%relaxation%load_steps, 'load step'))
+    if (plan%relaxation%events) then
+      text = text//line('growth', 'by events; those within '//to_text(plan%relaxation%batch)// &
+        & ' of the bond that is nearest to its limit break with it')
+      text = text//line('', trim(merge('the load factor never decreases                        ', &
+        & 'the load factor decreases where the response snaps back', &
+        & plan%relaxation%load_controlled)))
+    else if (breaking) then
+      text = text//line('growth', 'all bonds beyond their limit break when a load step '// &
+        & 'has converged')
+    end if
     if (scene%relaxation%solver == 'dynamic_relaxation') then
       text = text//line('solver', 'dynamic relaxation, density matrix '// &
         & trim(scene%relaxation%density_matrix))

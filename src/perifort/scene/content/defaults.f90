@@ -12,6 +12,8 @@
 !> | 0.2     | relaxation, temperature changes of `&initial`: by a ramp over the load steps,     |
 !> |         | before at once                                                                    |
 !> | 0.2     | `&material critical`: 'lattice', before 'chapter'                                 |
+!> | 0.2     | `&relaxation growth`: 'events' where bonds can break and all acts in proportion   |
+!> |         | to t, before 'load_steps'                                                         |
 module pd_scene_content_defaults
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
@@ -56,6 +58,7 @@ contains
       end associate
     end do
     if (scene%time%method /= 'relaxation' .or. .not. before_0_2(scene)) return
+    if (scene%relaxation%growth == '') scene%relaxation%growth = 'load_steps'
     if (scene%output%history_every == 0) &
       & scene%output%history_every = max(1, scene%relaxation%maximum_iterations/rows_wanted)
     do i = 1, size(scene%initial)

@@ -47,9 +47,12 @@ contains
       call warn_of_keys('time', [character(20) :: 'integrator', 'step', 'safety', 'steps', &
         & 'duration', 'breaking'], .true., &
         & "with method = 'relaxation'; &relaxation has its settings")
+      call warn_of_keys('relaxation', [character(20) :: 'control', 'batch', 'most_events'], &
+        & scene%relaxation%growth == 'load_steps', "with growth = 'load_steps'")
     else
       call warn_of_keys('relaxation', [character(20) :: 'density_matrix', 'safety', 'tolerance', &
-        & 'maximum_iterations', 'load_steps'], .true., "with &time method = 'explicit'")
+        & 'maximum_iterations', 'load_steps', 'growth', 'control', 'batch', &
+        & 'most_events'], .true., "with &time method = 'explicit'")
     end if
 
   contains
