@@ -6,7 +6,8 @@ module test_motion_static_events
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_static_relaxation, only: run_relaxation
-  use pd_motion_system, only: energies_of, energies_type, greatest_ratio, system_type
+  use pd_motion_account, only: energies_of, energies_type
+  use pd_motion_system, only: greatest_ratio, system_type
   use pd_scene_content_types, only: scene_type, unset
   use pd_set_up_prepare, only: set_up_type
   use elimination, only: eliminate
