@@ -190,25 +190,23 @@ contains
     allocate (rule%place(3, points), source=0.0_wp)
     allocate (rule%weight(points))
     if (points == 3) then
-      call add(1, 1.0_wp/6, 1.0_wp/3)
+      call add_three(rule, 1, 1.0_wp/6, 1.0_wp/3)
     else
       do i = 1, 2
-        call add(3*i - 2, near(i), weight(i))
+        call add_three(rule, 3*i - 2, near(i), weight(i))
       end do
     end if
-
-  contains
-
-    !> Three points at which two coordinates are `a`.
-    pure subroutine add(first, a, w)
-      integer, intent(in) :: first
-      real(wp), intent(in) :: a, w
-
-      rule%place(:2, first:first + 2) = reshape([a, a, 1 - 2*a, a, a, 1 - 2*a], [2, 3])
-      rule%weight(first:first + 2) = w/2
-    end subroutine add
-
   end subroutine triangle_rule
+
+  !> Three points at which two of a triangle's coordinates are `a`.
+  pure subroutine add_three(rule, first, a, w)
+    type(rule_type), intent(inout) :: rule
+    integer, intent(in) :: first
+    real(wp), intent(in) :: a, w
+
+    rule%place(:2, first:first + 2) = reshape([a, a, 1 - 2*a, a, a, 1 - 2*a], [2, 3])
+    rule%weight(first:first + 2) = w/2
+  end subroutine add_three
 
   !> Wedges: a rule of the triangle times Gauss's rule.
   pure recursive subroutine wedge_rule(n, rule)
