@@ -98,7 +98,7 @@ contains
       call shape_functions(straight, shape%reference(:, i), values, gradients)
       x = matmul(corners, values)
       do k = sample%n_nodes, 1, -1
-        if (maxval(abs(sample%x(:, k) - x)) < 1.0e-9_wp) exit
+        if (all(abs(sample%x(:, k) - x) < 1.0e-9_wp)) exit
       end do
       if (k == 0) then
         sample%n_nodes = sample%n_nodes + 1
@@ -134,7 +134,8 @@ contains
     end do
   end subroutine add_ends
 
-  !> The file of Gmsh: version 2 or 4, text or binary, in this machine's order of bytes or the other.
+  !> The file of Gmsh: version 2 or 4, text or binary, in this machine's order of bytes or the
+  !> other.
   function gmsh_text(sample, version, binary, swapped) result(text)
     type(sample_type), intent(in) :: sample
     integer, intent(in) :: version
@@ -402,7 +403,7 @@ contains
     integer function at(x)
       real(wp), intent(in) :: x(3)
       do at = 1, shape%nodes
-        if (maxval(abs(shape%reference(:, at) - x)) < 1.0e-9_wp) return
+        if (all(abs(shape%reference(:, at) - x) < 1.0e-9_wp)) return
       end do
       at = 0
     end function at

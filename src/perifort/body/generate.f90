@@ -1,5 +1,5 @@
-!> Points of a scene: lattices, clouds, meshes (`pd_body_meshes`), removed shapes, and the layers that boundaries add
-!> (`pd_body_layers`).
+!> Points of a scene: lattices, clouds, meshes (`pd_body_meshes`), removed shapes, and the layers
+!> that boundaries add (`pd_body_layers`).
 !>
 !> Order (that of the results): body by body, a lattice's points x fastest, then y, then z; then
 !> the layers in the order of their boundary groups.

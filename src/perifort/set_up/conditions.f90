@@ -27,8 +27,8 @@ module pd_set_up_conditions
 
 contains
 
-  !> Imposed motion of every `&boundary`: of its layer, of the body points in its region, or of those
-  !> near facets of a mesh. An error is set if one holds no point.
+  !> Imposed motion of every `&boundary`: of its layer, of the body points in its region, or of
+  !> those near facets of a mesh. An error is set if one holds no point.
   subroutine motions_of_scene(scene, body, motions, error)
     type(scene_type), intent(in) :: scene                      !! a checked scene
     type(body_type), intent(in) :: body                        !! its points, arranged in slots
@@ -188,8 +188,8 @@ contains
 
   end subroutine loads_of_scene
 
-  !> A load on facets of a mesh: pressure along their normals, a total force by their areas; both act
-  !> on the points that share the areas. An error is set if these cannot be found.
+  !> A load on facets of a mesh: pressure along their normals, a total force by their areas; both
+  !> act on the points that share the areas. An error is set if these cannot be found.
   subroutine facet_load(scene, body, number, load, error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body

@@ -250,6 +250,7 @@ contains
   subroutine bytes(cursor, what, taken, error)
     class(cursor_type), intent(inout) :: cursor
     character(*), intent(in) :: what
+    ! allow(C072): its length says how many bytes are taken.
     character(*), intent(inout) :: taken
     type(error_type), allocatable, intent(out) :: error
     integer :: i, n

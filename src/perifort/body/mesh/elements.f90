@@ -9,9 +9,9 @@ module pd_body_mesh_elements
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: shape_type, shape_of, shape_numbered, shape_functions, face_nodes, face_shape, n_shapes, &
-    & most_nodes, kind_point, kind_line, kind_triangle, kind_quadrilateral, kind_tetrahedron, &
-    & kind_hexahedron, kind_wedge, kind_pyramid
+  public :: shape_type, shape_of, shape_numbered, shape_functions, face_nodes, face_shape
+  public :: n_shapes, most_nodes, kind_point, kind_line, kind_triangle, kind_quadrilateral, &
+    & kind_tetrahedron, kind_hexahedron, kind_wedge, kind_pyramid
 
   integer, parameter :: kind_point = 1, kind_line = 2, kind_triangle = 3, kind_quadrilateral = 4, &
     & kind_tetrahedron = 5, kind_hexahedron = 6, kind_wedge = 7, kind_pyramid = 8

@@ -133,7 +133,7 @@ contains
       state%version = 4
     case ('2.2', '2', '2.0', '2.1')
       state%version = 2
-    case default
+    case default  ! an error with the place
       call cursor%fault("version '"//printable(cursor%text(first:min(last, first + 20)))// &
         & "' of the format of Gmsh", error, &
         & 'versions 2.2 and 4.1 are read: write it anew, or convert it by ./pf convert FILE')

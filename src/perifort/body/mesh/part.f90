@@ -465,7 +465,7 @@ contains
         number = table%look(mix(mix(mix(0_i8, cell(1)), cell(2)), cell(3)))
         if (number == 0) cycle
         other = last(number)
-        do while (other > 0)
+        do while (other > 0 .and. .not. found)
           if (norm2(part%mesh%x(:, other) - part%mesh%x(:, n)) <= same*spacing) found = .true.
           other = before(other)
         end do

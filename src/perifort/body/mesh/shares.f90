@@ -173,9 +173,9 @@ contains
     real(wp), intent(in) :: at(:)                    !! (dim)
     real(wp), allocatable, intent(out) :: weights(:) !! (points)
     logical, intent(out) :: found
-    real(wp), parameter :: singular = 1.0e-8_wp
+    real(wp), parameter :: singular = 1.0e-8_wp  !! square of an extent over that of all points
     real(wp) :: p(size(at) + 1, size(x, 1)), near(size(x, 1))
-    real(wp) :: m(size(at) + 1, size(at) + 1), c(size(at) + 1), reach
+    real(wp) :: m(size(at) + 1, size(at) + 1), c(size(at) + 1), reach, scale
     integer :: i, k, n
 
     n = size(at) + 1
@@ -195,12 +195,13 @@ contains
     ! Cholesky's factor, then both triangular systems for the right side (1, 0, ..)
     allocate (weights(size(x, 1)))
     found = .false.
+    scale = m(1, 1)
     do k = 1, n
       do i = 1, k - 1
         m(k, i) = (m(k, i) - dot_product(m(k, :i - 1), m(i, :i - 1)))/m(i, i)
       end do
       c(k) = m(k, k) - sum(m(k, :k - 1)**2)
-      if (c(k) <= singular*m(k, k)) return
+      if (c(k) <= singular*scale) return
       m(k, k) = sqrt(c(k))
     end do
     c = 0.0_wp

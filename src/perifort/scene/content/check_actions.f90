@@ -6,11 +6,12 @@ module pd_scene_content_check_actions
   use pd_scene_content_check_bodies, only: check_file
   use pd_scene_content_expressions, only: at_the_start, check_expression, &
     & check_vector_expressions, in_no_force
-  use pd_scene_content_rules, only: rule_fault, check_known, check_region, &
-    & check_mesh_name, check_components, check_vector
+  use pd_scene_content_rules, only: rule_fault, check_known, check_region, check_mesh_name, &
+    & check_components, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_course, only: ramp_of, sides
-  use pd_scene_content_types, only: adds_layer, load_group, scene_type, is_given, is_set, name_length
+  use pd_scene_content_types, only: adds_layer, load_group, scene_type, is_given, is_set, &
+    & name_length
   implicit none (type, external)
   private
   public :: check_initial, check_boundary, check_load

@@ -107,8 +107,8 @@ contains
             & sets > 0)), 'sets of a body that is no mesh', "they belong to the key 'mesh'", source)
         else if (body%points_per_element /= 1 .or. abs(body%scale - 1.0_wp) > 0.0_wp) then
           call rule_fault(error, 'body', number, trim(merge('points_per_element', &
-            & 'scale             ', body%points_per_element /= 1)), "a body without a mesh has no "// &
-            & "elements and no 'scale'", "they belong to the key 'mesh'", source)
+            & 'scale             ', body%points_per_element /= 1)), 'a body without a mesh has '// &
+            & "no elements and no 'scale'", "they belong to the key 'mesh'", source)
         end if
         return
       end if

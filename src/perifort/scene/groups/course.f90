@@ -16,6 +16,7 @@ contains
 
   !> Sides may be written in any case of letters; names of a mesh keep theirs.
   pure subroutine settle_side(side)
+    ! allow(C072): lower case is as long as before.
     character(*), intent(inout) :: side  !! in lower case on return, if it is one of `sides`
     if (any(sides == lower_case(side))) side = lower_case(side)
   end subroutine settle_side
