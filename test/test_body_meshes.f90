@@ -362,8 +362,8 @@ contains
   end subroutine test_patch
 
   !> A plate of triangles pulled at both ends by 1 MPa: the strain of its middle against sigma/E.
-  !> The centres of triangles stand in pairs, and each has neighbours of its own: 4 % are allowed, 2.7 %
-  !> were measured; 1.4 % on a mesh of Gmsh with as large triangles.
+  !> The centres of triangles stand in pairs, and each has neighbours of its own: 4 % are allowed,
+  !> 2.7 % were measured; 1.4 % on a mesh of Gmsh with as large triangles.
   subroutine test_tension(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
