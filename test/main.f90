@@ -25,6 +25,10 @@ program main
   use test_law_softening, only: collect_law_softening
   use test_law_strength, only: collect_law_strength
   use test_law_plastic, only: collect_law_plastic
+  use test_body_mesh_elements, only: collect_body_mesh_elements
+  use test_body_mesh_part, only: collect_body_mesh_part
+  use test_body_mesh_read, only: collect_body_mesh_read
+  use test_body_meshes, only: collect_body_meshes
   use test_body_overlap, only: collect_body_overlap
   use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
@@ -115,10 +119,10 @@ program main
   use test_warnings, only: collect_warnings
   implicit none (type, external)
 
-  type(testsuite_type) :: suites(100)
+  type(testsuite_type) :: suites(120)
   integer :: known = 0, passed = 0, failed = 0, skipped = 0
   integer :: i
-  logical :: short, left_out(100) = .false.
+  logical :: short, left_out(120) = .false.
   character(:), allocatable :: suite_name, test_name, except
 
   call register('base_clock', collect_base_clock)
@@ -136,6 +140,10 @@ program main
   call register('law_softening', collect_law_softening)
   call register('law_strength', collect_law_strength)
   call register('law_plastic', collect_law_plastic)
+  call register('body_mesh_elements', collect_body_mesh_elements)
+  call register('body_mesh_part', collect_body_mesh_part)
+  call register('body_mesh_read', collect_body_mesh_read)
+  call register('body_meshes', collect_body_meshes)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)

@@ -6,7 +6,7 @@ module test_motion_expressions
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_scene_content_types, only: scene_type, unset
-  use pd_set_up_conditions, only: region_mask
+  use pd_body_regions, only: region_mask
   use pd_set_up_prepare, only: set_up_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type

@@ -14,6 +14,7 @@ module pd_base_lookup
     integer(i4), allocatable :: numbers(:)  !! 0: the place is empty
   contains
     procedure :: number_of
+    procedure :: look
     procedure :: own_number
   end type lookup_type
 
@@ -56,6 +57,15 @@ contains
     end if
     number = table%numbers(at)
   end subroutine number_of
+
+  !> The number of `key`, 0 if it is not in the table.
+  pure integer function look(table, key) result(number)
+    class(lookup_type), intent(in) :: table  !! left as it is
+    integer(i8), intent(in) :: key           !! to be looked up
+
+    number = 0
+    if (allocated(table%keys)) number = table%numbers(place(table, key))
+  end function look
 
   !> The next number, for values whose key belongs to others: no key leads to it.
   subroutine own_number(table, number)

@@ -11,6 +11,7 @@ module pd_body_body
   use pd_base_text, only: to_text
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_order, only: number_points, order_type, owns
+  use pd_body_mesh_part, only: part_type
   implicit none (type, external)
   private
   public :: body_type, not_finite_text, grid_type, allocate_points, append_points, keep_points, &
@@ -39,6 +40,8 @@ module pd_body_body
     integer :: last_owned = 0
     type(order_type) :: order               !! where the owned points are, for sums over them
     type(grid_type), allocatable :: grids(:)
+    real(wp) :: delta = 0.0_wp              !! the horizon [m]
+    type(part_type), allocatable :: parts(:)  !! bodies that are meshes
   end type body_type
 
   interface take
@@ -76,7 +79,7 @@ contains
     allocate (body%body(n), body%material(n), body%layer(n), body%grid(n), source=0_i2)
     body%point = [(int(k, i4), k=1, n)]
     body%slot = body%point
-    allocate (body%grids(0))
+    allocate (body%grids(0), body%parts(0))
     call own_all(body)
   end subroutine allocate_points
 

@@ -1,5 +1,5 @@
-!> Points of a scene: lattices, clouds, removed shapes, and the layers that boundaries add
-!> (`pd_body_layers`).
+!> Points of a scene: lattices, clouds, meshes (`pd_body_meshes`), removed shapes, and the layers
+!> that boundaries add (`pd_body_layers`).
 !>
 !> Order (that of the results): body by body, a lattice's points x fastest, then y, then z; then
 !> the layers in the order of their boundary groups.
@@ -7,11 +7,14 @@ module pd_body_generate
   use pd_base_kinds, only: wp, i2, i4
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_base_warnings, only: warnings_type
+  use pd_scene_content_types, only: is_lattice, scene_type, is_set
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
+  use pd_body_meshes, only: keep_part, material_number, mesh_body
+  use pd_body_mesh_part, only: part_type
   use pd_body_lattices, only: lattice_points, lattice_grid
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
@@ -30,25 +33,35 @@ contains
   !> All points of the scene, in point order. An error if a cloud cannot be read or has a point
   !> without volume, if no point is left, if the horizon holds too many points, if a layer joins
   !> none, or if bodies or layers overlap.
-  subroutine generate_body(scene, body, delta, error, counts)
+  subroutine generate_body(scene, body, delta, error, counts, warnings)
     type(scene_type), intent(in) :: scene  !! checked, with its files' names
     type(body_type), intent(out) :: body   !! all points, layers last, in point order
     real(wp), intent(out) :: delta                          !! the horizon [m]
     type(error_type), allocatable, intent(out) :: error
     type(layer_count_type), allocatable, intent(out), optional :: counts(:)  !! what the columns
                                                             !! of each layer came to
+    type(warnings_type), intent(inout), optional :: warnings  !! get what may surprise of meshes
+    type(part_type) :: part
+    logical, allocatable :: taken(:)
+    real(wp) :: spacing, largest
     type(layer_count_type), allocatable :: counted(:)
     type(body_type) :: one
     real(wp) :: depth
     integer :: i
 
     delta = 0.0_wp
+    spacing = 0.0_wp
     depth = 1.0_wp
     if (scene%header%dimension == 2) depth = scene%header%thickness
     if (scene%header%dimension == 1) depth = scene%header%area
     call allocate_points(body, scene%header%dimension, 0)
     do i = 1, size(scene%bodies)
-      if (scene%bodies(i)%file /= '') then
+      largest = -1.0_wp
+      if (scene%bodies(i)%mesh /= '') then
+        call mesh_body(scene, i, depth, one, part, largest, error, warnings)
+        if (allocated(error)) return
+        call keep_part(body, part)
+      else if (scene%bodies(i)%file /= '') then
         call cloud_points(scene, i, depth, one, error)
         if (allocated(error)) return
       else
@@ -56,19 +69,34 @@ contains
         one%grid = number_of_grid(body, lattice_grid(scene%bodies(i), body%dim))
       end if
       one%body = int(i, i2)
-      one%material = material_number(scene, scene%bodies(i)%material)
+      if (scene%bodies(i)%mesh == '') one%material = material_number(scene, &
+        & scene%bodies(i)%material)
+      spacing = max(spacing, largest)
       call append_points(body, one)
     end do
     do i = 1, size(scene%removed)
-      call keep_points(body, .not. inside(scene%removed(i), body%x, touch*minval(body%spacing)))
+      taken = inside(scene%removed(i), body%x, touch*minval(body%spacing))
+      if (any(taken .and. of_mesh(scene, body))) then
+        call scene_fault(error, scene, 'remove', i, 'shape', '&remove takes points of a mesh', &
+          & 'cut the shape out of the geometry before it is meshed')
+        return
+      end if
+      call keep_points(body, .not. taken)
+    end do
+    do i = 1, size(body%parts)
+      body%parts(i)%first = findloc(int(body%body), body%parts(i)%body, dim=1)
     end do
     if (body%n_points == 0) then
       call scene_fault(error, scene, 'remove', size(scene%removed), 'shape', &
         & 'the scene has no points: every point of its bodies was removed', '')
       return
     end if
-    delta = horizon_of(scene, maxval(body%spacing))
-    call check_family_size(scene, body%dim, delta, minval(body%spacing), error)
+    ! of a mesh counts the median; the scene has one horizon
+    if (.not. all(of_mesh(scene, body))) spacing = max(spacing, maxval(body%spacing, &
+      & mask=.not. of_mesh(scene, body)))
+    delta = horizon_of(scene, spacing)
+    body%delta = delta
+    call check_family_size(scene, body, delta, minval(body%spacing), error)
     if (allocated(error)) return
     call add_layers(scene, delta, depth, body, counted, error)
     if (allocated(error)) return
@@ -78,20 +106,25 @@ contains
 
   !> An error if the horizon holds more points than any computation is meant to have in a family;
   !> counts in families and offsets below then fit their integers.
-  subroutine check_family_size(scene, dim, delta, spacing, error)
+  subroutine check_family_size(scene, body, delta, spacing, error)
     type(scene_type), intent(in) :: scene
-    integer, intent(in) :: dim
+    type(body_type), intent(in) :: body
     real(wp), intent(in) :: delta, spacing
     type(error_type), allocatable, intent(out) :: error
     real(wp) :: members, points
-    integer :: i
+    integer :: i, dim
 
+    dim = body%dim
     members = (2*min(delta/spacing, most_members))**dim
     if (members <= most_members) return
     if (all(scene%bodies%file == '')) then
       points = 0.0_wp
       do i = 1, size(scene%bodies)
-        points = points + product(real(scene%bodies(i)%points(:dim), wp))
+        if (is_lattice(scene%bodies(i))) points = points + product(real( &
+          & scene%bodies(i)%points(:dim), wp))
+      end do
+      do i = 1, size(body%parts)
+        points = points + body%parts(i)%n_points
       end do
       ! a small body may lie in its horizon as a whole
       if (points <= most_members .and. delta/spacing <= largest_ratio) return
@@ -101,6 +134,14 @@ contains
       &for a smallest spacing of '//with_unit(spacing, 'm'), 'a family of the points around one &
       &may have about '//to_text(most_members)//' members')
   end subroutine check_family_size
+
+  !> Which points belong to meshes.
+  pure function of_mesh(scene, body) result(mask)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    logical, allocatable :: mask(:)
+    mask = scene%bodies(body%body)%mesh /= ''
+  end function of_mesh
 
   !> delta [m]: the length given, or the ratio times the largest spacing.
   pure real(wp) function horizon_of(scene, largest_spacing) result(delta)
@@ -166,17 +207,5 @@ contains
     body%grids = [body%grids, grid]
     number = int(size(body%grids), i2)
   end function number_of_grid
-
-  !> Number of a material by name; '' is the only one.
-  pure integer(i2) function material_number(scene, name) result(number)
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: name
-    integer :: i
-
-    number = 1_i2
-    do i = 1, size(scene%materials)
-      if (name /= '' .and. scene%materials(i)%name == name) number = int(i, i2)
-    end do
-  end function material_number
 
 end module pd_body_generate

@@ -9,7 +9,7 @@ module pd_body_initial
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, scatter
-  use pd_body_regions, only: in_region, values_on
+  use pd_body_regions, only: region_mask, values_on
   implicit none (type, external)
   private
   public :: initial_state
@@ -34,7 +34,7 @@ contains
     logical, allocatable :: chosen(:)
     integer(i4), allocatable :: slots(:)
     real(wp), allocatable :: values(:)
-    integer :: i, r, k
+    integer :: i, k
 
     allocate (u(body%n_slots, body%dim), v(body%n_slots, body%dim), source=0.0_wp)
     allocate (temperature_change(body%n_slots), source=0.0_wp)
@@ -47,10 +47,7 @@ contains
           cycle
         end if
         chosen = body%point > 0
-        do r = 1, size(scene%regions)
-          if (group%region == '' .or. scene%regions(r)%name /= group%region) cycle
-          chosen = chosen .and. in_region(scene, body, r)
-        end do
+        if (group%region /= '') chosen = chosen .and. region_mask(scene, body, group%region)
         slots = pack([(int(k, i4), k=1, body%n_slots)], chosen)
         call set_field(scene, i, 'displacement', body, slots, group%displacement, &
           & group%displacement_text, group%displacement_gradient, u, error)

@@ -9,7 +9,7 @@ module pd_body_layers
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: adds_layer, scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_lattices, only: lattice_grid, box_of_cells, cell_of
   implicit none (type, external)
@@ -69,9 +69,9 @@ contains
     type(body_type) :: layer
     integer :: i, n_body
 
-    allocate (counts(count(scene%boundaries%side /= '')), owner(0))
+    allocate (counts(count(adds_layer(scene%boundaries))), owner(0))
     n_body = body%n_points
-    counts%boundary = pack([(i, i=1, size(scene%boundaries))], scene%boundaries%side /= '')
+    counts%boundary = pack([(i, i=1, size(scene%boundaries))], adds_layer(scene%boundaries))
     do i = 1, size(counts)
       call make_layer(scene, delta, depth, body, n_body, claimed, owner, counts(i), layer, error)
       if (allocated(error)) return

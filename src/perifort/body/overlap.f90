@@ -5,7 +5,7 @@ module pd_body_overlap
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: adds_layer, is_lattice, scene_type
   use pd_body_body, only: body_type, grid_type
   use pd_body_lattices, only: lattice_grid, cell_of
   implicit none (type, external)
@@ -39,11 +39,11 @@ contains
     logical, allocatable :: layered(:)
     integer :: a, b, k
 
-    if (size(scene%bodies) == 1 .and. count(scene%boundaries%side /= '') < 2) return
+    if (size(scene%bodies) == 1 .and. count(adds_layer(scene%boundaries)) < 2) return
     allocate (bodies(size(scene%bodies)), layered(size(scene%bodies)))
     layered = .false.
     do b = 1, size(bodies)
-      if (scene%bodies(b)%file == '') bodies(b)%grid = lattice_grid(scene%bodies(b), body%dim)
+      if (is_lattice(scene%bodies(b))) bodies(b)%grid = lattice_grid(scene%bodies(b), body%dim)
     end do
     do k = 1, body%n_points
       associate (one => bodies(body%body(k)))
@@ -79,7 +79,7 @@ contains
 
       meet = .true.
       ! clouds matter to layers only
-      if (scene%bodies(a)%file /= '') then
+      if (.not. is_lattice(scene%bodies(a))) then
         meet = layered(b)
         return
       end if

@@ -6,17 +6,19 @@ module pd_body_regions
   use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type, not_finite_text
   use pd_body_generate, only: touch
+  use pd_body_meshes, only: check_set, names_set, set_mask
   use pd_body_shapes, only: inside
   use pd_scene_content_expressions, only: expression_of
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
-  public :: check_regions, in_region, field_on, values_on
+  public :: check_regions, in_region, region_mask, field_on, values_on
 
 contains
 
-  !> An error is set if the expression of a region has no finite value at a point of the bodies.
+  !> An error is set if the expression of a region has no finite value at a point of the bodies, or
+  !> if a name of a mesh means no points or facets.
   subroutine check_regions(scene, body, error)
     type(scene_type), intent(in) :: scene  !! a checked scene
     type(body_type), intent(in) :: body    !! its points, layers included
@@ -25,6 +27,8 @@ contains
     integer(i4), allocatable :: slots(:)
     integer :: r, k
 
+    call check_sets(scene, body, error)
+    if (allocated(error)) return
     slots = pack([(int(k, i4), k=1, body%n_slots)], body%point > 0)
     do r = 1, size(scene%regions)
       if (scene%regions(r)%where == '') cycle
@@ -33,6 +37,61 @@ contains
       if (allocated(error)) return
     end do
   end subroutine check_regions
+
+  !> Names of meshes in all groups that may have them.
+  subroutine check_sets(scene, body, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = 1, size(scene%initial)
+      call check_set(scene, body, scene%initial(i)%region, .false., 'initial', i, 'region', error)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%boundaries)
+      call check_set(scene, body, scene%boundaries(i)%region, .false., 'boundary', i, 'region', &
+        & error)
+      if (.not. allocated(error)) call check_set(scene, body, scene%boundaries(i)%side, .true., &
+        & 'boundary', i, 'side', error)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%loads)
+      call check_set(scene, body, scene%loads(i)%region, .false., 'load', i, 'region', error)
+      if (.not. allocated(error)) call check_set(scene, body, scene%loads(i)%side, .true., &
+        & 'load', i, 'side', error)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%no_fail)
+      call check_set(scene, body, scene%no_fail(i)%region, .false., 'no_fail', i, 'region', error)
+      if (allocated(error)) return
+    end do
+    if (.not. allocated(scene%studies)) return
+    do i = 1, size(scene%studies)
+      call check_set(scene, body, scene%studies(i)%region, .false., 'study', i, 'region', error)
+      if (allocated(error)) return
+    end do
+  end subroutine check_sets
+
+  !> The slots with points in a region or in a set of a mesh, by name. No slot is in one that is not
+  !> there.
+  function region_mask(scene, body, name) result(mask)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    type(body_type), intent(in) :: body    !! its points, layers included, arranged in slots
+    character(*), intent(in) :: name       !! of a `&region`, or `BODY:NAME`
+    logical, allocatable :: mask(:)
+    integer :: r
+
+    if (names_set(name)) then
+      mask = set_mask(scene, body, name)
+      return
+    end if
+    allocate (mask(body%n_slots), source=.false.)
+    do r = 1, size(scene%regions)
+      if (scene%regions(r)%name /= name) cycle
+      mask = in_region(scene, body, r)
+    end do
+  end function region_mask
 
   !> The slots with points in a region: inside its shape, and where its expression is not 0.
   function in_region(scene, body, number) result(mask)

@@ -37,7 +37,9 @@ contains
     do i = 1, size(scene%bodies)
       call warn_of_thickness(body, family, i, name_of(scene, i), warnings)
       call warn_of_horizon(body, family, i, name_of(scene, i), warnings)
-      call warn_of_volumes(body, family, i, name_of(scene, i), warnings)
+      ! the volumes of a mesh are those of its elements, however long these are
+      if (scene%bodies(i)%mesh == '') call warn_of_volumes(body, family, i, name_of(scene, i), &
+        & warnings)
     end do
     do i = 1, size(scene%cracks)
       call warn_of_crack(scene, body, i, warnings)

@@ -5,13 +5,14 @@ module pd_set_up_conditions
   use pd_base_expression, only: constant_value, expression_type
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_scene_content_expressions, only: expression_of, varies_in_time
-  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type, load_group, is_set
   use pd_scene_groups_course, only: ramp_of
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
-  use pd_body_regions, only: in_region, values_on
+  use pd_body_meshes, only: facet_areas, facet_mask, names_set
+  use pd_body_regions, only: region_mask, values_on
   use pd_body_shapes, only: inside
   use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
     & vary_in_time
@@ -20,15 +21,15 @@ module pd_set_up_conditions
   use pd_motion_heating, only: heating_type, new_heating, new_timed_heat, timed_heat_type
   implicit none (type, external)
   private
-  public :: volume_of, motions_of_scene, loads_of_scene, heating_of_scene, region_mask, &
-    & no_fail_mask, in_no_fail_zones
+  public :: volume_of, motions_of_scene, loads_of_scene, heating_of_scene, no_fail_mask, &
+    & in_no_fail_zones
 
   character(*), parameter :: xyz = 'xyz'
 
 contains
 
-  !> Imposed motion of every `&boundary`: of its layer, or of the body points in its region. An
-  !> error is set if one holds no point.
+  !> Imposed motion of every `&boundary`: of its layer, of the body points in its region, or of
+  !> those near facets of a mesh. An error is set if one holds no point.
   subroutine motions_of_scene(scene, body, motions, error)
     type(scene_type), intent(in) :: scene                      !! a checked scene
     type(body_type), intent(in) :: body                        !! its points, arranged in slots
@@ -43,7 +44,9 @@ contains
       associate (group => scene%boundaries(m), motion => motions(m))
         motion%name = trim(group%name)
         motion%is_pin = group%motion == 'pin'
-        if (group%side /= '') then
+        if (names_set(group%side)) then
+          chosen = facet_mask(scene, body, group%side)
+        else if (group%side /= '') then
           chosen = body%layer == m .and. body%point > 0
         else
           chosen = region_mask(scene, body, group%region) .and. body%layer == 0
@@ -162,13 +165,19 @@ contains
     type(load_type), allocatable, intent(out) :: loads(:)  !! (loads) in the order of the groups
     type(error_type), allocatable, intent(out) :: error
     logical, allocatable :: chosen(:)
-    real(wp) :: outward
-    integer :: l, c, axis
+    real(wp), allocatable :: pressed(:, :)
+    integer :: l, c
 
     allocate (loads(size(scene%loads)))
     do l = 1, size(loads)
       associate (group => scene%loads(l), load => loads(l))
-        if (group%side /= '') then
+        if (names_set(group%side)) then
+          call facet_load(scene, body, l, load, error)
+          if (allocated(error)) return
+          load%curve = course(scene, group%ramp_time, group%times, group%values, timed_load(scene, &
+            & group))
+          cycle
+        else if (group%side /= '') then
           chosen = outermost_row(scene, body, group)
         else if (group%region /= '') then
           chosen = region_mask(scene, body, group%region) .and. body%layer == 0
@@ -188,19 +197,65 @@ contains
           if (is_set(group%force(c))) load%density(:, c) = load%density(:, c) &
             & + group%force(c)/volume_of(body, load%slots)
         end do
-        if (is_set(group%pressure)) then
-          axis = index('xyz', group%side(1:1))
-          outward = merge(-1.0_wp, 1.0_wp, group%side(3:5) == 'min')
-          load%density(:, axis) = load%density(:, axis) &
-            & - group%pressure*outward/body%spacing(load%slots)
-        end if
-        call load_by_expressions(scene, body, l, load, error)
+        call by_side()
+        call load_by_expressions(scene, body, l, load, pressed, spread(1/volume_of(body, &
+          & load%slots), 1, size(load%slots)), error)
         if (allocated(error)) return
         load%curve = course(scene, group%ramp_time, group%times, group%values, timed_load(scene, &
           & group))
       end associate
     end do
+
+  contains
+
+    !> Pressure on the row at the load's side, and the force density of a unit of it.
+    subroutine by_side()
+      real(wp) :: outward
+      integer :: axis
+
+      if (allocated(pressed)) deallocate (pressed)
+      allocate (pressed(size(loads(l)%slots), body%dim), source=0.0_wp)
+      associate (side => scene%loads(l)%side)
+        if (side == '') return
+        axis = index('xyz', side(1:1))
+        outward = merge(-1.0_wp, 1.0_wp, side(3:5) == 'min')
+        pressed(:, axis) = -outward/body%spacing(loads(l)%slots)
+        if (is_set(scene%loads(l)%pressure)) loads(l)%density(:, axis) = &
+          & loads(l)%density(:, axis) - scene%loads(l)%pressure*outward/body%spacing( &
+          & loads(l)%slots)
+      end associate
+    end subroutine by_side
+
   end subroutine loads_of_scene
+
+  !> A load on facets of a mesh: pressure along their normals, a total force by their areas; both
+  !> act on the points that share the areas. An error is set if these cannot be found.
+  subroutine facet_load(scene, body, number, load, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: number            !! of the `&load`
+    type(load_type), intent(inout) :: load   !! gets slots and densities
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: vector(:, :), area(:), pressed(:, :)
+    integer :: c
+
+    associate (group => scene%loads(number))
+      call facet_areas(scene, body, group%side, load%slots, vector, area, error)
+      call place_fault(error, scene, 'load', number, 'side')
+      if (allocated(error)) return
+      allocate (pressed(size(area), body%dim))
+      do c = 1, body%dim
+        pressed(:, c) = -vector(:, c)/body%volume(load%slots)
+      end do
+      area = area/sum(area)/body%volume(load%slots)
+      allocate (load%density(size(area), body%dim), source=0.0_wp)
+      do c = 1, body%dim
+        if (is_set(group%force(c))) load%density(:, c) = group%force(c)*area
+      end do
+      if (is_set(group%pressure)) load%density = load%density + group%pressure*pressed
+      call load_by_expressions(scene, body, number, load, pressed, area, error)
+    end associate
+  end subroutine facet_load
 
   !> Whether a load depends on t by an expression.
   logical function timed_load(scene, group) result(timed)
@@ -217,25 +272,26 @@ contains
 
   !> The parts of a load that are given by expressions. Those without t add to its densities. An
   !> error is set if a value is not finite.
-  subroutine load_by_expressions(scene, body, number, load, error)
+  subroutine load_by_expressions(scene, body, number, load, pressed, shared, error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
     integer, intent(in) :: number            !! of the `&load`
     type(load_type), intent(inout) :: load   !! with its slots and its densities by numbers
+    real(wp), intent(in) :: pressed(:, :)    !! (points, dim) density of a unit pressure [1/m]
+    real(wp), intent(in) :: shared(:)        !! (points) density of a unit force [1/m3]
     type(error_type), allocatable, intent(out) :: error
-    real(wp) :: outward
-    integer :: c, axis
+    integer :: c
 
     associate (group => scene%loads(number), n => size(load%slots))
       do c = 1, body%dim
         call add(group%body_force_text(c), 'body_force_'//xyz(c:c), c, spread(1.0_wp, 1, n))
-        call add(group%force_text(c), 'force_'//xyz(c:c), c, &
-          & spread(1/volume_of(body, load%slots), 1, n))
+        call add(group%force_text(c), 'force_'//xyz(c:c), c, shared)
       end do
       if (group%pressure_text == '') return
-      axis = index('xyz', group%side(1:1))
-      outward = merge(-1.0_wp, 1.0_wp, group%side(3:5) == 'min')
-      call add(group%pressure_text, 'pressure', axis, -outward/body%spacing(load%slots))
+      do c = 1, body%dim
+        if (any(abs(pressed(:, c)) > 0.0_wp)) call add(group%pressure_text, 'pressure', c, &
+          & pressed(:, c))
+      end do
     end associate
 
   contains
@@ -306,21 +362,6 @@ contains
       call new_heating(expansion, heated_by, curves, heating)
     end if
   end subroutine heating_of_scene
-
-  !> Slots in the region of this name.
-  function region_mask(scene, body, name) result(mask)
-    type(scene_type), intent(in) :: scene  !! a checked scene
-    type(body_type), intent(in) :: body    !! its points, layers included, arranged in slots
-    character(*), intent(in) :: name       !! of a `&region`; no slot is in one that is not there
-    logical, allocatable :: mask(:)
-    integer :: r
-
-    allocate (mask(body%n_slots), source=.false.)
-    do r = 1, size(scene%regions)
-      if (scene%regions(r)%name /= name) cycle
-      mask = in_region(scene, body, r)
-    end do
-  end function region_mask
 
   !> Slots in no-fail zone `number` of a scene.
   function no_fail_mask(scene, body, number) result(mask)

@@ -6,7 +6,7 @@ module pd_set_up_memory
   use pd_base_text, only: to_text, with_unit
   use pd_law_laws, only: law_table_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: is_set, laws_of, scene_type
+  use pd_scene_content_types, only: is_lattice, is_set, laws_of, scene_type
   use pd_body_generate, only: horizon_of
   implicit none (type, external)
   private
@@ -68,7 +68,7 @@ contains
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking
-    if (scene%horizon%family == 'list' .or. any(scene%bodies%file /= '')) then
+    if (scene%horizon%family == 'list' .or. any(.not. is_lattice(scene%bodies))) then
       bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
         & + per_list_bond*members)
       if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members
@@ -125,7 +125,7 @@ contains
 
     numbers = 0.0_wp
     do i = 1, size(numbers)
-      if (scene%bodies(i)%file == '') &
+      if (is_lattice(scene%bodies(i))) &
         & numbers(i) = product(real(scene%bodies(i)%points(:scene%header%dimension), wp))
     end do
   end function numbers_of_points
@@ -145,7 +145,7 @@ contains
     spacing = 0.0_wp
     do i = 1, size(scene%bodies)
       associate (body => scene%bodies(i))
-        if (body%file == '') spacing = max(spacing, (body%upper(1) - body%lower(1))/body%points(1))
+        if (is_lattice(body)) spacing = max(spacing, (body%upper(1) - body%lower(1))/body%points(1))
       end associate
     end do
     ratio = horizon_of(scene, spacing)/spacing

@@ -80,7 +80,7 @@ contains
     if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
-      call generate_body(scene, system%body, delta, error, layers)
+      call generate_body(scene, system%body, delta, error, layers, set_up%warnings)
       if (allocated(error)) return
       do i = 1, size(layers)
         if (layer_count_text(scene, layers(i)) /= '') call set_up%warnings%add('layer '// &

@@ -8,7 +8,7 @@ module pd_output_report_begin
   use pd_scene_content_types, only: scene_type
   use pd_scene_content_write, only: scene_text
   use pd_body_body, only: body_type, gather
-  use pd_set_up_conditions, only: region_mask
+  use pd_body_regions, only: region_mask
   use pd_set_up_plan, only: plan_type
   use pd_force_generic_points, only: has_plasticity
   use pd_motion_system, only: system_type

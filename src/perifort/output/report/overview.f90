@@ -10,7 +10,8 @@ module pd_output_report_overview
   use pd_law_material, only: material_type, never
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
-  use pd_set_up_conditions, only: no_fail_mask, region_mask
+  use pd_body_regions, only: region_mask
+  use pd_set_up_conditions, only: no_fail_mask
   use pd_motion_loads, only: load_of, load_type
   use pd_motion_system, only: system_type
   implicit none (type, external)

@@ -4,13 +4,14 @@ module pd_output_report_warnings
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: adds_layer, scene_type, is_set
   use pd_scene_content_warnings, only: warnings_of_scene
   use pd_body_body, only: body_type
   use pd_family_warnings, only: warn_of_points
   use pd_motion_conditions, only: free_component
   use pd_set_up_course_warnings, only: warn_of_courses
-  use pd_set_up_conditions, only: no_fail_mask, region_mask
+  use pd_body_regions, only: region_mask
+  use pd_set_up_conditions, only: no_fail_mask
   use pd_set_up_plan, only: plan_type
   use pd_motion_system, only: system_type
   use pd_output_measures_measure, only: measure_list_type
@@ -103,17 +104,19 @@ contains
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     type(warnings_type), intent(inout) :: notes   !! added to
+    character(:), allocatable :: held
     integer :: m
 
     if (system%body%dim == 1) return
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
-        if (scene%boundaries(m)%region == '' .or. size(motion%slots) < 2) cycle
+        if (adds_layer(scene%boundaries(m)) .or. size(motion%slots) < 2) cycle
         if (motion%is_pin) cycle
         if (any(motion%kind(:system%body%dim) == free_component)) cycle
+        held = "region '"//trim(scene%boundaries(m)%region)
+        if (scene%boundaries(m)%side /= '') held = "facets '"//trim(scene%boundaries(m)%side)
         call notes%add('clamp '//to_text(m), '&boundary number '//to_text(m)//" holds all "// &
-          & "components of the region '"//trim(scene%boundaries(m)%region)// &
-          & "': it cannot rotate there, as in a clamp", tell=.false.)
+          & "components of the "//held//"': it cannot rotate there, as in a clamp", tell=.false.)
       end associate
     end do
   end subroutine note_before

@@ -10,7 +10,8 @@ module pd_scene_content_check
   use pd_scene_content_defaults, only: fill_defaults
   use pd_scene_content_expressions, only: at_the_start, check_definitions, check_expression
   use pd_scene_content_groups, only: default_fields, default_probe_fields, table_of
-  use pd_scene_content_rules, only: rule_fault, given, check_known, check_unique, check_vector
+  use pd_scene_content_rules, only: check_region, rule_fault, given, check_known, &
+    & check_unique, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_relaxation, only: safety_of
   use pd_scene_content_types, only: group_table, scene_type, is_set, name_length
@@ -208,7 +209,6 @@ contains
     integer, intent(in) :: number
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
-    integer :: i
 
     associate (zone => scene%no_fail(number))
       if (zone%region == '' .and. zone%shape == '') then
@@ -218,8 +218,7 @@ contains
         call rule_fault(error, 'no_fail', number, 'shape', "'region' and 'shape' are both given", &
           & 'give one of them', source)
       else if (zone%region /= '') then
-        call check_known(zone%region, [character(name_length) :: (scene%regions(i)%name, &
-          & i=1, size(scene%regions))], 'region', 'no_fail', number, 'region', error, source)
+        call check_region(scene, zone%region, 'no_fail', number, 'region', error, source)
       else
         call check_shape(zone, scene%header%dimension, 'no_fail', number, error, source)
       end if
@@ -293,7 +292,7 @@ contains
     type(scene_type), intent(in) :: scene
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
-    integer :: i, r
+    integer :: i
 
     do i = 1, size(scene%studies)
       associate (study => scene%studies(i))
@@ -301,8 +300,7 @@ contains
           call rule_fault(error, 'study', i, '', "group &study lacks the key 'vary' or 'values'", &
             & 'expected a key and its values', source)
         else
-          call check_known(study%region, [character(name_length) :: (scene%regions(r)%name, &
-            & r=1, size(scene%regions))], 'region', 'study', i, 'region', error, source)
+          call check_region(scene, study%region, 'study', i, 'region', error, source)
         end if
         if (allocated(error)) return
       end associate

@@ -2,14 +2,16 @@
 module pd_scene_content_check_actions
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type
-  use pd_base_text, only: to_text
+  use pd_base_text, only: join, nearest_name, to_text
   use pd_scene_content_check_bodies, only: check_file
   use pd_scene_content_expressions, only: at_the_start, check_expression, &
     & check_vector_expressions, in_no_force
-  use pd_scene_content_rules, only: rule_fault, check_known, check_components, check_vector
+  use pd_scene_content_rules, only: rule_fault, check_known, check_region, check_mesh_name, &
+    & check_components, check_vector
   use pd_scene_format_source, only: source_type
-  use pd_scene_groups_course, only: ramp_of
-  use pd_scene_content_types, only: load_group, scene_type, is_given, is_set, name_length
+  use pd_scene_groups_course, only: ramp_of, sides
+  use pd_scene_content_types, only: adds_layer, load_group, scene_type, is_given, is_set, &
+    & name_length
   implicit none (type, external)
   private
   public :: check_initial, check_boundary, check_load, check_contact
@@ -47,8 +49,7 @@ contains
       call check_gradient(initial%displacement_gradient, 'displacement_gradient')
       call check_gradient(initial%velocity_gradient, 'velocity_gradient')
       if (allocated(error)) return
-      call check_known(initial%region, region_names(scene), 'region', 'initial', number, &
-        & 'region', error, source)
+      call check_region(scene, initial%region, 'initial', number, 'region', error, source)
       if (allocated(error)) return
       if (initial%file /= '' .and. initial%region /= '') then
         call rule_fault(error, 'initial', number, 'region', "'file' and 'region' are both given", &
@@ -153,7 +154,7 @@ contains
         return
       end do
       do i = 1, number - 1
-        if (boundary%side == '' .or. scene%boundaries(i)%side /= boundary%side .or. &
+        if (.not. adds_layer(boundary) .or. scene%boundaries(i)%side /= boundary%side .or. &
           & scene%boundaries(i)%body /= boundary%body) cycle
         call rule_fault(error, 'boundary', number, 'side', "side '"//trim(boundary%side)// &
           & "' has a layer already", 'from &boundary number '//to_text(i), source)
@@ -178,6 +179,9 @@ contains
       if (boundary%side == '') then
         key = 'region'
         note = 'its layer takes in waves that meet a side: give a side instead'
+      else if (.not. adds_layer(boundary)) then
+        key = 'side'
+        note = 'facets of a mesh get no layer'
       else if (any(is_given(boundary%displacement, boundary%displacement_text))) then
         key = 'displacement_'//first_of(is_given(boundary%displacement, &
           & boundary%displacement_text))
@@ -276,7 +280,7 @@ contains
     d = scene%header%dimension
     timed = .false.
     associate (load => scene%loads(number))
-      if (load%side /= '' .and. load%body == '') then
+      if (load%side /= '' .and. load%body == '' .and. index(load%side, ':') == 0) then
         if (size(scene%bodies) > 1) then
           call rule_fault(error, 'load', number, '', "group &load lacks the key 'body'", &
             & 'there are '//to_text(size(scene%bodies))//' bodies to choose from', source)
@@ -305,6 +309,13 @@ contains
           & 'expected pressure, force_x.., body_force_x.. or stiffness', source)
         return
       end if
+      if (index(load%side, ':') > 0 .and. (any(is_set(load%stiffness)) .or. &
+        & any(is_given(load%body_force, load%body_force_text)))) then
+        call rule_fault(error, 'load', number, trim(merge('stiffness   ', 'body_force_x', &
+          & any(is_set(load%stiffness)))), 'springs or a body force on facets of a mesh', &
+          & "facets take pressure and force_x..; a region, as 'BODY:NAME', takes these", source)
+        return
+      end if
       if (is_given(load%pressure, load%pressure_text) .and. load%region /= '') then
         call rule_fault(error, 'load', number, 'pressure', "'pressure' with a region", &
           & "a pressure needs a 'side'; a region takes force_x.. or body_force_x..", source)
@@ -323,7 +334,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
     integer :: i
-    logical :: cloud
+    logical :: cloud, mesh
 
     if (side == '' .and. region == '') then
       call rule_fault(error, group, number, '', 'group &'//group//" lacks the key 'side' or "// &
@@ -338,8 +349,15 @@ contains
         & "'body' goes with 'side'", source)
       return
     else if (region /= '') then
-      call check_known(region, region_names(scene), 'region', group, number, 'region', error, &
-        & source)
+      call check_region(scene, region, group, number, 'region', error, source)
+      return
+    else if (index(side, ':') > 0) then
+      call check_mesh_name(scene, side, group, number, 'side', error, source)
+      if (.not. allocated(error) .and. body /= '') call rule_fault(error, group, number, 'body', &
+        & "'body' beside a side that names its body", "leave 'body' out", source)
+      return
+    else if (all(sides /= side)) then
+      call unknown_side(side, group, number, error, source)
       return
     end if
     if (index('xyz', side(1:1)) > scene%header%dimension) then
@@ -352,13 +370,35 @@ contains
       & i=1, size(scene%bodies))], 'body', group, number, 'body', error, source)
     if (allocated(error)) return
     cloud = .false.
+    mesh = .false.
     do i = 1, size(scene%bodies)
       if (body /= '' .and. scene%bodies(i)%name /= body) cycle
       cloud = cloud .or. scene%bodies(i)%file /= ''
+      mesh = mesh .or. scene%bodies(i)%mesh /= ''
     end do
-    if (cloud) call rule_fault(error, group, number, 'side', &
-      & "a 'side' of a body that is a cloud", "a cloud has no sides; use a 'region'", source)
+    if (cloud) then
+      call rule_fault(error, group, number, 'side', &
+        & "a 'side' of a body that is a cloud", "a cloud has no sides; use a 'region'", source)
+    else if (mesh) then
+      call rule_fault(error, group, number, 'side', "side '"//trim(side)//"' of a body that is "// &
+        & 'a mesh, which has no rows and gets no layers', "name its facets: 'BODY:NAME'", source)
+    end if
   end subroutine check_place
+
+  !> A side that is none.
+  subroutine unknown_side(side, group, number, error, source)
+    character(*), intent(in) :: side, group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    character(:), allocatable :: note, nearest
+
+    note = 'allowed: '//join(sides, ', ')//", or BODY:NAME for facets of a mesh"
+    nearest = nearest_name(trim(side), sides)
+    if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note
+    call rule_fault(error, group, number, 'side', "unknown value '"//trim(side)// &
+      & "' of key 'side' in group &"//group, note, source)
+  end subroutine unknown_side
 
   !> At once, by a ramp, or by times and values. In relaxation, where time runs from 0 to 1 over the
   !> load steps, the default course is a ramp over all of them, and times must not exceed 1, since
@@ -435,17 +475,6 @@ contains
     end subroutine refuse
 
   end subroutine check_course
-
-  !> The names of all regions.
-  function region_names(scene) result(names)
-    type(scene_type), intent(in) :: scene
-    character(name_length) :: names(size(scene%regions))
-    integer :: i
-
-    do i = 1, size(names)
-      names(i) = scene%regions(i)%name
-    end do
-  end function region_names
 
   !> One `&contact`: who meets whom, by known names, and at most one way to lose energy.
   subroutine check_contact(scene, number, error, source)

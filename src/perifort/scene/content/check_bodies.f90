@@ -46,6 +46,8 @@ contains
         & i=1, size(scene%materials))], 'material', 'body', number, 'material', error, source)
       if (allocated(error)) return
       lattice = any(is_set(body%lower)) .or. any(is_set(body%upper)) .or. any(body%points /= 0)
+      call check_mesh(scene, number, lattice, error, source)
+      if (allocated(error) .or. body%mesh /= '') return
       if (body%file /= '') then
         if (lattice) then
           call rule_fault(error, 'body', number, 'file', &
@@ -58,7 +60,8 @@ contains
       end if
       if (.not. lattice) then
         call rule_fault(error, 'body', number, '', 'a body without points', &
-          & "expected 'lower', 'upper' and 'points' for a lattice, or 'file' for a cloud", source)
+          & "expected 'lower', 'upper' and 'points' for a lattice, 'file' for a cloud, or "// &
+          & "'mesh'", source)
         return
       end if
       call check_vector(body%lower, d, 'lower', 'body', number, error, source)
@@ -83,6 +86,51 @@ contains
       call check_spacing(body, d, number, error, source)
     end associate
   end subroutine check_body
+
+  !> The keys of a mesh: none beside those of a lattice or cloud, sets in pairs with materials.
+  subroutine check_mesh(scene, number, lattice, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    logical, intent(in) :: lattice            !! the body has keys of a lattice
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i, sets, names
+
+    associate (body => scene%bodies(number))
+      sets = 0
+      names = 0
+      if (allocated(body%material_set)) sets = size(body%material_set)
+      if (allocated(body%material_name)) names = size(body%material_name)
+      if (body%mesh == '') then
+        if (sets + names > 0) then
+          call rule_fault(error, 'body', number, trim(merge('material_set ', 'material_name', &
+            & sets > 0)), 'sets of a body that is no mesh', "they belong to the key 'mesh'", source)
+        else if (body%points_per_element /= 1 .or. abs(body%scale - 1.0_wp) > 0.0_wp) then
+          call rule_fault(error, 'body', number, trim(merge('points_per_element', &
+            & 'scale             ', body%points_per_element /= 1)), 'a body without a mesh has '// &
+            & "no elements and no 'scale'", "they belong to the key 'mesh'", source)
+        end if
+        return
+      end if
+      if (lattice .or. body%file /= '') then
+        call rule_fault(error, 'body', number, 'mesh', &
+          & 'a body is a lattice, a cloud or a mesh, not several of them', &
+          & "give 'mesh', or 'file', or 'lower', 'upper' and 'points'", source)
+      else if (sets /= names) then
+        call rule_fault(error, 'body', number, trim(merge('material_set ', 'material_name', &
+          & sets > names)), "'material_set' and 'material_name' differ in length", &
+          & to_text(sets)//' sets, '//to_text(names)//' materials', source)
+      else
+        call check_file(body%mesh, scene%file, 'body', number, error, source, 'mesh')
+      end if
+      if (allocated(error)) return
+      do i = 1, names
+        call check_known(body%material_name(i), [character(name_length) :: &
+          & scene%materials%name], 'material', 'body', number, 'material_name', error, source)
+        if (allocated(error)) return
+      end do
+    end associate
+  end subroutine check_mesh
 
   !> The spacing must be the same along all directions.
   subroutine check_spacing(body, d, number, error, source)
@@ -162,7 +210,7 @@ contains
   end function listed
 
   !> A file that a group names must be there. An error is set if it is not.
-  subroutine check_file(name, scene_file, group, number, error, source)
+  subroutine check_file(name, scene_file, group, number, error, source, key)
     character(*), intent(in) :: name                     !! of the file, as the scene says it
     character(:), allocatable, intent(in) :: scene_file
       !! path of the scene file, whose folder is looked in first; may be unallocated
@@ -170,13 +218,16 @@ contains
     integer, intent(in) :: number                        !! which group of this name
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source    !! the scanned file, for places
-    character(:), allocatable :: path
+    character(*), intent(in), optional :: key            !! that names it; absent: `file`
+    character(:), allocatable :: path, at
     logical :: exists
 
+    at = 'file'
+    if (present(key)) at = key
     path = trim(name)
     if (allocated(scene_file)) path = resolve_path(trim(name), scene_file)
     inquire (file=path, exist=exists)
-    if (.not. exists) call rule_fault(error, group, number, 'file', "cannot find the file '"// &
+    if (.not. exists) call rule_fault(error, group, number, at, "cannot find the file '"// &
       & trim(name)//"'", "looked for '"//path//"', then for that name in the working directory", &
       & source)
   end subroutine check_file

@@ -13,6 +13,7 @@ module pd_scene_content_rules
   implicit none (type, external)
   private
   public :: rule_fault, scene_fault, place_fault, given, check_known, check_unique, &
+    & check_region, check_mesh_name, &
     & check_components, check_vector, check_finite_box, find_section, find_entry
 
 contains
@@ -157,6 +158,58 @@ contains
     call rule_fault(error, group, number, key, 'no '//kind//" is named '"//trim(name)//"'", &
       & note, source)
   end subroutine check_known
+
+  !> The name of a region, or of a set of a mesh as `BODY:NAME`; a blank one is right.
+  subroutine check_region(scene, name, group, number, key, error, source)
+    type(scene_type), intent(in) :: scene              !! with its regions and bodies
+    character(*), intent(in) :: name                   !! to be found
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
+    character(*), intent(in) :: key                    !! that has the name as its value
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
+    character(name_length), allocatable :: names(:)
+    integer :: i
+
+    if (index(name, ':') > 0) then
+      call check_mesh_name(scene, name, group, number, key, error, source)
+      return
+    end if
+    allocate (names(size(scene%regions)))
+    do i = 1, size(names)
+      names(i) = scene%regions(i)%name
+    end do
+    call check_known(name, names, 'region', group, number, key, error, source)
+  end subroutine check_region
+
+  !> A name `BODY:NAME`: the body must be a mesh. What its sets are is seen when it is read.
+  subroutine check_mesh_name(scene, name, group, number, key, error, source)
+    type(scene_type), intent(in) :: scene              !! with its bodies
+    character(*), intent(in) :: name                   !! with a colon
+    character(*), intent(in) :: group                  !! name of the group, without `&`
+    integer, intent(in) :: number                      !! which group of this name, from 1
+    character(*), intent(in) :: key                    !! that has the name as its value
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
+    character(name_length), allocatable :: names(:)
+    integer :: i
+
+    allocate (names(size(scene%bodies)))
+    do i = 1, size(names)
+      names(i) = scene%bodies(i)%name
+    end do
+    if (index(name, ':') == 1) then
+      call rule_fault(error, group, number, key, "'"//trim(name)//"' names no body", &
+        & "expected 'BODY:NAME'", source)
+      return
+    end if
+    call check_known(name(:index(name, ':') - 1), names, 'body', group, number, key, error, source)
+    if (allocated(error)) return
+    i = findloc(names == name(:index(name, ':') - 1), .true., dim=1)
+    if (scene%bodies(i)%mesh == '') call rule_fault(error, group, number, key, "the body '"// &
+      & trim(names(i))//"' is no mesh: it has no named sets", &
+      & "sets belong to a body with the key 'mesh'", source)
+  end subroutine check_mesh_name
 
   !> Names must differ; blank ones do not count.
   subroutine check_unique(names, group, error, source)

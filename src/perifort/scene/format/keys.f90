@@ -445,9 +445,9 @@ contains
     end do
   end subroutine real_list
 
-  !> Names, as many as are given, kept in lower case. `known` is what descriptions list; whether a
-  !> name is known is checked where the whole list is.
-  subroutine text_list(keys, name, value, meaning, known, default)
+  !> Names, as many as are given, kept in lower case, each once. `known` is what descriptions list;
+  !> whether a name is known is checked where the whole list is.
+  subroutine text_list(keys, name, value, meaning, known, default, as_written)
     class(keys_type), intent(inout) :: keys  !! the visitor
     character(*), intent(in) :: name         !! of the key
     ! allow(C072): a text is assigned only after its length has been checked.
@@ -457,10 +457,15 @@ contains
     character(*), intent(in) :: known(:)     !! (any number) names that descriptions list
     character(*), intent(in), optional :: default
       !! what descriptions show for it; the value if absent
+    logical, intent(in), optional :: as_written
+      !! any texts, in the case of letters of the file, and repeated ones; absent: no
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, listed, message, note
     integer :: i
+    logical :: plain
 
+    plain = .false.
+    if (present(as_written)) plain = as_written
     shown = ''
     if (allocated(value)) shown = list_text(value)
     listed = ''
@@ -473,9 +478,11 @@ contains
     allocate (value(size(slots)))
     do i = 1, size(slots)
       value(i) = ''
-      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, word=.true.)
+      call to_string(keys%source%tokens(slots(i)), name, value(i), message, note, &
+        & word=.not. plain)
       call keys%complain(slots(i), message, note)
       if (allocated(keys%fault)) return
+      if (plain) cycle
       value(i) = lower_case(value(i))
       if (any(value(:i - 1) == value(i))) then
         call keys%complain(slots(i), "'"//trim(value(i))//"' is given twice in '"//name//"'", &

@@ -6,7 +6,7 @@ module pd_scene_groups_body
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
   private
-  public :: body_group
+  public :: body_group, is_lattice
 
   !> `&body`
   type, extends(group_type) :: body_group
@@ -16,11 +16,22 @@ module pd_scene_groups_body
     real(wp) :: upper(3) = unset                 !! opposite corner [m]
     integer :: points(3) = 0                     !! points along each direction
     character(path_length) :: file = ''          !! cloud: columns x y z volume
+    character(path_length) :: mesh = ''          !! mesh: .msh or .inp
+    integer :: points_per_element = 1            !! 1: the centre; else Gauss points
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the mesh
+    character(name_length), allocatable :: material_set(:)   !! sets of the mesh ...
+    character(name_length), allocatable :: material_name(:)  !! ... and the material of each
   contains
     procedure :: visit
   end type body_group
 
 contains
+
+  !> Whether a body is a lattice, neither a cloud nor a mesh.
+  elemental logical function is_lattice(body)
+    type(body_group), intent(in) :: body  !! the group
+    is_lattice = body%file == '' .and. body%mesh == ''
+  end function is_lattice
 
   !> The keys of the group.
   subroutine visit(group, keys)
@@ -35,6 +46,17 @@ contains
       & 'centres of cubic cells', at_least=1)
     call keys%key('file', group%file, 'cloud instead of a lattice: a text file with the '// &
       & "columns x y z volume, '#' starts a comment")
+    call keys%key('mesh', group%mesh, 'mesh instead of a lattice: a file of Gmsh (.msh, 2.2 or '// &
+      & '4.1) or of Abaqus and CalculiX (.inp)')
+    call keys%key('points_per_element', group%points_per_element, '', 'mesh: points of an '// &
+      & 'element, 1 (its centre) or a number of Gauss points that its shape has', at_least=1, &
+      & hidden=group%mesh == '')
+    call keys%key('scale', group%scale, 'm', 'mesh: length of its unit, 1e-3 for millimetres', &
+      & above=0.0_wp, hidden=group%mesh == '')
+    call keys%list('material_set', group%material_set, 'mesh: names of sets that have another '// &
+      & 'material than the body', [character(1) ::], as_written=.true.)
+    call keys%list('material_name', group%material_name, 'mesh: the material of each '// &
+      & 'material_set', [character(1) ::], as_written=.true.)
   end subroutine visit
 
 end module pd_scene_groups_body

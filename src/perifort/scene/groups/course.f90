@@ -1,17 +1,25 @@
 !> The keys of a course in time, which temperature changes, boundaries and loads share.
 module pd_scene_groups_course
   use pd_base_kinds, only: wp
+  use pd_base_text, only: lower_case
   use pd_scene_format_given, only: is_set
   use pd_scene_format_keys, only: keys_type
   implicit none (type, external)
   private
-  public :: visit_course, ramp_of, sides
+  public :: visit_course, ramp_of, sides, settle_side
 
   !> Sides of a body.
   character(5), parameter :: sides(6) = [character(5) :: 'x_min', 'x_max', 'y_min', 'y_max', &
     & 'z_min', 'z_max']
 
 contains
+
+  !> Sides may be written in any case of letters; names of a mesh keep theirs.
+  pure subroutine settle_side(side)
+    ! allow(C072): lower case is as long as before.
+    character(*), intent(inout) :: side  !! in lower case on return, if it is one of `sides`
+    if (any(sides == lower_case(side))) side = lower_case(side)
+  end subroutine settle_side
 
   !> The course in time of a temperature change, a boundary or a load.
   subroutine visit_course(keys, ramp_time, times, values, subject)

@@ -3,7 +3,7 @@ module pd_scene_groups_load
   use pd_base_kinds, only: wp
   use pd_scene_format_given, only: name_length, text_length, unset
   use pd_scene_format_keys, only: keys_type
-  use pd_scene_groups_course, only: sides, visit_course
+  use pd_scene_groups_course, only: settle_side, visit_course
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
   private
@@ -36,7 +36,9 @@ contains
     type(keys_type), intent(inout) :: keys     !! the visitor: reads, describes, writes
 
     call keys%key('body', group%body, 'side: name of the body', default='the only body')
-    call keys%key('side', group%side, 'the outermost points at this side', allowed=sides)
+    call keys%key('side', group%side, 'x_min, x_max .. z_max: the outermost points at this '// &
+      & 'side; BODY:NAME: these facets of a mesh')
+    call settle_side(group%side)
     call keys%key('region', group%region, 'name of a region, instead of side')
     call keys%key('pressure', group%pressure, 'Pa', 'side: pressure, positive pushes', &
       & text=group%pressure_text)

@@ -13,7 +13,8 @@ module pd_study_trade_analytic
   use pd_motion_system, only: system_type
   use pd_scene_content_expressions, only: has_expressions
   use pd_scene_content_groups, only: closed_forms
-  use pd_scene_content_types, only: boundary_group, initial_group, is_set, laws_of, scene_type
+  use pd_scene_content_types, only: boundary_group, initial_group, is_lattice, is_set, laws_of, &
+    & scene_type
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, form_chain, form_hole, &
     & form_linear, form_wave
   use pd_study_trade_pull, only: pull
@@ -104,8 +105,8 @@ contains
     reason = ''
     if (size(scene%bodies) /= 1) then
       reason = 'it needs a single body'
-    else if (scene%bodies(1)%file /= '') then
-      reason = 'it needs a lattice; the box of a cloud is not known'
+    else if (.not. is_lattice(scene%bodies(1))) then
+      reason = 'it needs a lattice; the box of a cloud or mesh is not known'
     else if (size(scene%materials) /= 1) then
       reason = 'it needs a single material'
     else if (has_history(scene)) then

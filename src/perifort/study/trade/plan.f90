@@ -17,7 +17,7 @@ module pd_study_trade_plan
   use pd_scene_content_read, only: read_scene_source
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_scene_format_source, only: scan_source, source_fault, source_type, token_type
-  use pd_scene_content_types, only: is_set, name_length, path_length, scene_type
+  use pd_scene_content_types, only: is_lattice, is_set, name_length, path_length, scene_type
   use pd_scene_format_values, only: parse_integer, parse_real
   implicit none (type, external)
   private
@@ -230,9 +230,9 @@ contains
       variable%refines = variable%target%group == 'body' .and. variable%target%key == 'points' &
         & .and. .not. allocated(variable%target%subscript)
       if (.not. variable%refines) return
-      if (plan%scene%bodies(variable%target%number)%file /= '') then
-        call rule_fault(error, 'study', i, 'vary', 'the points of a cloud cannot be varied', &
-          & "vary the 'file' of the body", plan%source)
+      if (.not. is_lattice(plan%scene%bodies(variable%target%number))) then
+        call rule_fault(error, 'study', i, 'vary', 'the points of a cloud or mesh cannot be '// &
+          & 'varied', "vary the 'file' or 'mesh' of the body", plan%source)
         return
       end if
       variable%step = smallest_step(plan%scene, variable%target)
@@ -409,7 +409,7 @@ contains
     type(scene_type), intent(in) :: scene
     type(target_type), intent(in) :: target
     integer, intent(in) :: b
-    follows = scene%bodies(b)%file == '' .and. (b == target%number .or. .not. target%numbered)
+    follows = is_lattice(scene%bodies(b)) .and. (b == target%number .or. .not. target%numbered)
   end function follows
 
   !> The smallest count along x at which all counts are whole in the same proportion.
@@ -459,7 +459,7 @@ contains
     extent = 0.0_wp
     associate (scene => trial%scene)
       dim = scene%header%dimension
-      if (any(scene%bodies%file /= '')) then
+      if (any(.not. is_lattice(scene%bodies))) then
         call generate_body(scene, body, delta, error)
         if (allocated(error)) return
         trial%points = body%n_points

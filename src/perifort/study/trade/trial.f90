@@ -9,7 +9,7 @@ module pd_study_trade_trial
   use pd_set_up_prepare, only: prepare, set_up_type
   use pd_force_generic_points, only: has_plasticity
   use pd_motion_explicit_integrators, only: run_explicit
-  use pd_set_up_conditions, only: region_mask
+  use pd_body_regions, only: region_mask
   use pd_output_fields_check, only: check_available, check_names
   use pd_output_fields_table, only: field_table_type
   use pd_output_report_columns, only: history_columns, history_row, history_table, &

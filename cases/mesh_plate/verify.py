@@ -1,0 +1,67 @@
+"""A meshed plate under tension, and a strip with a hole: its stress concentration on meshes of
+several sizes.
+"""
+import os
+import subprocess
+import sys
+
+import numpy as np
+from common import Case, change
+
+MODULUS, NU, PULL, RADIUS = 200e9, 0.3, 1e6, 5e-3
+CENTRE = np.array([0.05, 0.025])
+# Howland's strip, over the stress of the whole section, at a hole of a fifth of its width
+HOWLAND = 3.14
+
+
+def concentration(results):
+    """The stress at the hole's side over the mean stress of the whole section, by the terms of
+    Kirsch's solution, 1, (a/r)^2 and (a/r)^4, from points on the line across that are a horizon
+    or more away from the hole: nearer ones are softer.
+    """
+    x, stress = results.points[:, :2] - CENTRE, results.field("stress_xx")
+    spacing = np.sort(np.sqrt(results.volume / 1e-3))
+    # The median by volume, as the program takes it
+    horizon = 2.015 * spacing[np.searchsorted(np.cumsum(spacing**2), np.sum(spacing**2) / 2)]
+    r = np.hypot(*x.T)
+    used = (np.abs(x[:, 0]) < 0.6e-3) & (r > RADIUS + horizon) & (r < 3 * RADIUS)
+    return np.polyval(np.polyfit((RADIUS / r[used])**2, stress[used] / PULL, 2), 1.0), \
+        horizon / RADIUS
+
+
+def main():
+    case = Case(__file__, __doc__)
+    results = case.run("plate.nml")
+    u, x, volume = results.field("displacement"), results.points, results.volume
+    inner = np.all(np.abs(x[:, :2] - 0.025) < 0.0125, axis=1)
+    for c, target, tolerance in ((0, PULL / MODULUS, 0.03), (1, -NU * PULL / MODULUS, 0.05)):
+        case.near(f"plate: strain along {'xy'[c]} inside [-]",
+                  np.polyfit(x[inner, c], u[inner, c], 1)[0], target, relative=tolerance)
+    case.near("plate: mean stress of all points over the pull [-]",
+              np.sum(volume * results.field("stress_xx")) / volume.sum() / PULL, 1.0,
+              relative=0.05)
+    case.near("plate: volume [m3]", volume.sum(), 0.05 * 0.05 * 1e-3, relative=1e-12)
+    values = {2.0: concentration(case.run("hole.nml"))}
+    if "CASE_PYTHON" not in os.environ:
+        sys.exit("error: start this as ./pf verify mesh_plate: CASE_PYTHON names no python with "
+                 "gmsh")
+    for size in (1.0,) if case.options.quick else (1.0, 0.7, 0.5):
+        name = f"hole_{size}"
+        case.out.mkdir(parents=True, exist_ok=True)
+        subprocess.run([os.environ["CASE_PYTHON"], str(case.folder / "make_meshes.py"),
+                        str(case.out / f"{name}.msh"), str(size)], check=True)
+        values[size] = concentration(case.run(f"{name}.nml", change(
+            case.scene("hole.nml"), "body", mesh=f"'{name}.msh'")))
+    for size, (value, horizon) in values.items():
+        case.show(f"hole: K_t with elements of {size} mm, horizon/radius {horizon:.3f} [-]",
+                  f"{value:.3f}", HOWLAND)
+    errors = [abs(value / HOWLAND - 1) for value, _ in values.values()]
+    case.above("hole: error of the coarsest mesh over that of the finest [-]",
+               errors[0] / errors[-1], 2.0)
+    if not case.options.quick:
+        case.near("hole: K_t on the finest mesh [-]", values[0.5][0], HOWLAND, relative=0.03)
+    case.finish()
+
+
+if __name__ == "__main__":
+    main()
