@@ -6,7 +6,7 @@ module test_body_meshes
   use pd_body_mesh_part, only: facets_type, outer_facets
   use pd_body_mesh_shares, only: share_areas
   use pd_motion_loads, only: load_of, load_type
-  use pd_motion_system, only: energies_of, energies_type
+  use pd_motion_account, only: energies_of, energies_type
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
