@@ -269,7 +269,8 @@ contains
       & "unknown value 'gausian' of key 'influence'|did you mean 'gaussian'?|"// &
       & 'allowed: inverse, constant, linear, gaussian|a/b.nml:1')
     call expect_fault(error, "&output fields = 'damage', 'Damage' /", "'damage' is given twice")
-    call expect_fault(error, "&boundary side = 'left' /", "unknown value 'left'|x_min, x_max")
+    call expect_fault(error, good_head//"&time steps = 1 /"//line//"&boundary side = 'left' "// &
+      & "displacement_x = 0 /", "unknown value 'left'|x_min, x_max")
   end subroutine test_choices
 
   subroutine test_missing(error)

@@ -34,7 +34,7 @@ def main():
     results = case.run("plate.nml")
     u, x, volume = results.field("displacement"), results.points, results.volume
     inner = np.all(np.abs(x[:, :2] - 0.025) < 0.0125, axis=1)
-    for c, target, tolerance in ((0, PULL / MODULUS, 0.03), (1, -NU * PULL / MODULUS, 0.05)):
+    for c, target, tolerance in ((0, PULL / MODULUS, 0.03), (1, -NU * PULL / MODULUS, 0.08)):
         case.near(f"plate: strain along {'xy'[c]} inside [-]",
                   np.polyfit(x[inner, c], u[inner, c], 1)[0], target, relative=tolerance)
     case.near("plate: mean stress of all points over the pull [-]",

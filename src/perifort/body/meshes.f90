@@ -17,7 +17,7 @@ module pd_body_meshes
   implicit none (type, external)
   private
   public :: mesh_body, keep_part, material_number, names_set, set_mask, facet_mask, facet_areas, &
-    & check_set
+    & check_set, place_set_fault
 
 contains
 
@@ -186,10 +186,11 @@ contains
 
   !> The place of a fault of a set is in the scene; the mesh is named, too.
   subroutine place_set_fault(error, scene, group, number, key)
-    type(error_type), allocatable, intent(inout) :: error
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: group, key
-    integer, intent(in) :: number
+    type(error_type), allocatable, intent(inout) :: error  !! gets its place; none stays none
+    type(scene_type), intent(in) :: scene                  !! whose text gives the place
+    character(*), intent(in) :: group                      !! name of the group, without `&`
+    integer, intent(in) :: number                          !! which group of this name
+    character(*), intent(in) :: key                        !! that names the set
     integer :: at
 
     if (.not. allocated(error)) return

@@ -5,13 +5,13 @@ module pd_set_up_conditions
   use pd_base_expression, only: constant_value, expression_type
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_scene_content_expressions, only: expression_of, varies_in_time
-  use pd_scene_content_rules, only: place_fault, scene_fault
+  use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, load_group, is_set
   use pd_scene_groups_course, only: ramp_of
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_generate, only: touch
-  use pd_body_meshes, only: facet_areas, facet_mask, names_set
+  use pd_body_meshes, only: facet_areas, facet_mask, names_set, place_set_fault
   use pd_body_regions, only: region_mask, values_on
   use pd_body_shapes, only: inside
   use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
@@ -241,7 +241,7 @@ contains
 
     associate (group => scene%loads(number))
       call facet_areas(scene, body, group%side, load%slots, vector, area, error)
-      call place_fault(error, scene, 'load', number, 'side')
+      call place_set_fault(error, scene, 'load', number, 'side')
       if (allocated(error)) return
       allocate (pressed(size(area), body%dim))
       do c = 1, body%dim

@@ -31,8 +31,8 @@ contains
       & 'assumptions that come with it.', once, header_type(), one=header)
     call table%add('define', 'A name for a number, to be used in expressions.', repeated, &
       & define_group(), all=definitions)
-    call table%add('body', 'Material points: a lattice that fills a box, or a cloud read from '// &
-      & 'a file.', repeated, body_group(), all=bodies)
+    call table%add('body', 'Material points: a lattice that fills a box, a mesh, or a cloud '// &
+      & 'read from a file.', repeated, body_group(), all=bodies)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
       & 'it are left out.', repeated, shape_group(), all=removed)
     call table%add('region', 'A named part of space, by a shape or an expression; other '// &
