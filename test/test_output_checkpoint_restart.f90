@@ -628,7 +628,7 @@ contains
         call plate(scene)
       else
         call slow_plate(scene)
-        scene%relaxation%solver = solvers(i)
+        scene%relaxation%solver = solvers(max(1, i))
       end if
       scene%boundaries(1)%motion = 'pin'
       if (i > 0) then
