@@ -42,7 +42,8 @@ def change(scene, group, **keys):
 class Case:
     """One case being verified."""
 
-    def __init__(self, script, about):
+    def __init__(self, script, about, options=()):
+        """`options`: what a case adds to the command line, as (name, keywords of add_argument)."""
         self.folder = Path(script).resolve().parent
         self.name = self.folder.name
         self.out = Path("out") / self.name
@@ -54,6 +55,8 @@ class Case:
         parser.add_argument("--reuse", action="store_true",
                             help="take results that an earlier call completed with the same scene "
                                  "and program")
+        for name, keywords in options:
+            parser.add_argument(name, **keywords)
         self.options = parser.parse_args()
         self.program = os.environ.get("PERIFORT", "")
         if not Path(self.program).is_file():
