@@ -8,8 +8,13 @@ from common import Case
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import dynamics  # noqa: E402
+import waves  # noqa: E402
 
 PARTS = {
+    "stress_intensity": waves.stress_intensity,
+    "dispersion": waves.dispersion,
+    "rayleigh": waves.rayleigh,
+    "torsion": waves.torsion,
     "glass": dynamics.glass,
     "terminal": dynamics.terminal,
     "strip": dynamics.strip,
