@@ -59,6 +59,7 @@ def strip(case):
                       **{r"displacement_gradient\(2,2\)": f"{strain:.6e}"}).replace("\\", "")
         if case.options.quick:
             text = change(text, "body", points="200, 40")
+            text = text.replace("0.0008", "0.0016")
         results = case.run(f"strip_{stored:.0f}.nml", text, threads=case.threads)
         tip = results.tip("tip")
         part = speed_between(tip, 0.016, 0.041) / speed

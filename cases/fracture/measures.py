@@ -65,8 +65,26 @@ def time_at(tip, projection):
 
 def speed_between(tip, first, last):
     """Mean speed of a tip between two projections [m/s], by least squares over the rows."""
-    inside = (tip.projection >= first) & (tip.projection <= last) & (tip.time <= time_at(tip, last))
+    inside = (tip.projection >= first) & (tip.projection <= last)
+    if np.isnan(time_at(tip, last)) or inside.sum() < 3:
+        return np.nan
+    inside &= tip.time <= time_at(tip, last)
     return float(np.polyfit(tip.time[inside], tip.projection[inside], 1)[0])
+
+
+def fastest(tip, way, last):
+    """The largest mean speed over a way of growth [m/s], up to a projection: of all pairs of rows
+    the first of which has come that much less far.
+    """
+    rows = np.flatnonzero(np.diff(np.asarray(tip.projection), prepend=-np.inf) > 0)
+    place, time = np.asarray(tip.projection)[rows], np.asarray(tip.time)[rows]
+    best = 0.0
+    for i in np.flatnonzero(place <= last):
+        back = np.flatnonzero(place <= place[i] - way)
+        if len(back) > 1:
+            j = int(back[-1])
+            best = max(best, (place[i] - place[j]) / (time[i] - time[j]))
+    return float(best)
 
 
 def asymmetry(results, output=-1):

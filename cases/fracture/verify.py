@@ -7,7 +7,9 @@ from pathlib import Path
 from common import Case
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import bodies  # noqa: E402
 import dynamics  # noqa: E402
+import specimens  # noqa: E402
 import waves  # noqa: E402
 
 PARTS = {
@@ -15,6 +17,11 @@ PARTS = {
     "dispersion": waves.dispersion,
     "rayleigh": waves.rayleigh,
     "torsion": waves.torsion,
+    "compact": specimens.specimen("compact"),
+    "bent": specimens.specimen("bent"),
+    "cantilever": specimens.specimen("cantilever"),
+    "brazilian": bodies.brazilian,
+    "l_panel": bodies.l_panel,
     "glass": dynamics.glass,
     "terminal": dynamics.terminal,
     "strip": dynamics.strip,
@@ -29,6 +36,8 @@ def main():
         ("--only", dict(metavar="NAME", default="", help="some parts: " + ", ".join(PARTS))),
         ("--threads", dict(type=int, default=0, help="threads of the larger runs"))))
     case.threads = case.options.threads
+    # Load over growth of the specimens, for a picture
+    case.curves = {}
     names = case.options.only.split(",") if case.options.only else list(PARTS)
     unknown = [name for name in names if name not in PARTS]
     if unknown:
