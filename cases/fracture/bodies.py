@@ -82,9 +82,10 @@ def l_panel(case):
     distance = np.hypot(x[:, 0] - 0.25, x[:, 1] - 0.25)
     case.below("L panel: nearest cracked point to the inner corner, in spacings",
                distance.min() / dx, 2.0)
-    near, far = x[distance < 0.1], x[x[:, 0] < 0.20]
-    case.near("   first 100 mm: angle above the horizontal [degrees]",
-              180 - slope_angle(near, (0.25, 0.25)), 25.0, absolute=25.0)
+    near = x[distance < 0.1]
+    angle = 180 - slope_angle(near, (0.25, 0.25))
+    case.above("   first 100 mm: angle above the horizontal [degrees]", angle, 0.0)
+    case.below("   and no more than", angle, 45.0)
     case.above("   crack: extent to the left of the corner [m]", 0.25 - x[:, 0].min(), 0.1)
     for place in (0.2, 0.15, 0.1):
         at = x[np.abs(x[:, 0] - place) < 0.6 * dx]
