@@ -31,16 +31,15 @@ PARTS = {
 
 
 def pictures(case, shown):
-    """What the parts returned, those of one line in a figure of its own, and two curves."""
-    from matplotlib.figure import Figure
+    """Fields that the parts returned, growth of the specimens, and sizes of the ring's pieces."""
+    from perifort.pictures.layout import new_figure
     from plot import figure_of_fields, save
-    for name, columns in (("glass", 1), ("kalthoff", 1), ("l_panel", 1), ("brazilian", 1),
-                          ("ring", 1), ("compact", 1), ("bent", 1), ("cantilever", 1)):
+    for name in ("glass", "kalthoff", "brazilian", "l_panel"):
         if shown.get(name):
             items = shown[name] + (shown.get("terminal") or [] if name == "glass" else [])
-            figure_of_fields(items, case.folder / f"{name}.png", columns=columns, width=5.0, dpi=80)
+            figure_of_fields(items, case.folder / f"{name}.png", width=5.0, dpi=80)
     if case.curves:
-        figure = Figure(figsize=(6.0, 3.6))
+        figure = new_figure(6.0, 3.6)
         axes = figure.subplots()
         for label, (growth, over) in case.curves.items():
             axes.plot(growth, over, "o-", markersize=2.5, linewidth=0.8, label=label)
@@ -51,7 +50,7 @@ def pictures(case, shown):
         save(figure, case.folder / "growth.png")
     if getattr(case, "ring", None):
         rates, sizes, grady = case.ring
-        figure = Figure(figsize=(5.0, 3.4))
+        figure = new_figure(5.0, 3.4)
         axes = figure.subplots()
         axes.loglog(rates, sizes, "o-", label="perifort")
         axes.loglog(rates, grady, "--", color="0.5", label="Grady")
