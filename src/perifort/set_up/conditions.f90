@@ -12,6 +12,8 @@ module pd_set_up_conditions
   use pd_body_generate, only: touch
   use pd_body_regions, only: in_region, values_on
   use pd_body_shapes, only: inside
+  use pd_family_areas, only: behind_share, next_points, outermost_share
+  use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
     & vary_in_time
   use pd_motion_loads, only: load_type, add_part
@@ -116,13 +118,15 @@ contains
 
   !> Force densities of every `&load`: pressure, total force and body force of a group add up. An
   !> error is set if one holds no point.
-  subroutine loads_of_scene(scene, body, loads, error)
+  subroutine loads_of_scene(scene, body, family, loads, error)
     type(scene_type), intent(in) :: scene                  !! a checked scene
     type(body_type), intent(in) :: body                    !! its points, arranged in slots
+    class(family_type), intent(in) :: family               !! of the body, whole
     type(load_type), allocatable, intent(out) :: loads(:)  !! (loads) in the order of the groups
     type(error_type), allocatable, intent(out) :: error
     logical, allocatable :: chosen(:)
-    real(wp) :: outward
+    real(wp), allocatable :: part(:)
+    real(wp) :: outward, volume
     integer :: l, c, axis
 
     allocate (loads(size(scene%loads)))
@@ -137,30 +141,71 @@ contains
         end if
         if (group%body /= '') chosen = chosen .and. body%body == body_number(scene, group%body)
         load%slots = slots_where(body, chosen)
+        volume = volume_of(body, load%slots)
         if (size(load%slots) == 0) then
           call scene_fault(error, scene, 'load', l, 'region', no_points('&load', group%body, &
             & group%region), 'expected a place that holds points of the bodies')
           return
         end if
+        call share_side(scene, body, family, group, chosen, load%slots, part)
         allocate (load%density(size(load%slots), body%dim), source=0.0_wp)
         do c = 1, body%dim
-          if (is_set(group%body_force(c))) load%density(:, c) = group%body_force(c)
+          if (is_set(group%body_force(c))) load%density(:, c) = &
+            & merge(group%body_force(c), 0.0_wp, chosen(load%slots))
           if (is_set(group%force(c))) load%density(:, c) = load%density(:, c) &
-            & + group%force(c)/volume_of(body, load%slots)
+            & + part*(group%force(c)/volume)
         end do
         if (is_set(group%pressure)) then
           axis = index('xyz', group%side(1:1))
           outward = merge(-1.0_wp, 1.0_wp, group%side(3:5) == 'min')
           load%density(:, axis) = load%density(:, axis) &
-            & - group%pressure*outward/body%spacing(load%slots)
+            & - part*(group%pressure*outward/body%spacing(load%slots))
         end if
-        call load_by_expressions(scene, body, l, load, error)
+        call load_by_expressions(scene, body, l, chosen, volume, part, load, error)
         if (allocated(error)) return
         load%curve = course(scene, group%ramp_time, group%times, group%values, timed_load(scene, &
           & group))
       end associate
     end do
   end subroutine loads_of_scene
+
+  !> Add the points behind those of a side to a load where consistent weights take tractions by
+  !> extrapolation to the faces (doc/theory.md, 4), and say what part of its load each point has:
+  !> 1.5 at the side, -0.5 behind; 1 in all other cases.
+  subroutine share_side(scene, body, family, group, chosen, slots, part)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(load_group), intent(in) :: group
+    logical, intent(in) :: chosen(:)                     !! slots that the group names
+    integer(i4), allocatable, intent(inout) :: slots(:)  !! those in point order; gets more
+    real(wp), allocatable, intent(out) :: part(:)        !! of each of them then [-]
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: share(:)
+    integer :: i, k, axis, inward, next(-1:1, body%dim)
+
+    if (group%side == '' .or. scene%horizon%surface_correction /= 'consistent') then
+      allocate (part(size(slots)), source=1.0_wp)
+      return
+    end if
+    axis = index('xyz', group%side(1:1))
+    inward = merge(1, -1, group%side(3:5) == 'min')
+    allocate (share(body%n_slots), source=0.0_wp)
+    call allocate_bonds(family, bonds)
+    do i = 1, size(slots)
+      k = slots(i)
+      call family%bonds_of(k, bonds)
+      call next_points(body, bonds, k, next)
+      if (next(inward, axis) == 0) then
+        share(k) = share(k) + 1.0_wp
+        cycle
+      end if
+      share(k) = share(k) + outermost_share
+      share(next(inward, axis)) = share(next(inward, axis)) + behind_share
+    end do
+    slots = slots_where(body, abs(share) > 0.0_wp .or. chosen)
+    part = share(slots)
+  end subroutine share_side
 
   !> Whether a load depends on t by an expression.
   logical function timed_load(scene, group) result(timed)
@@ -177,25 +222,30 @@ contains
 
   !> The parts of a load that are given by expressions. Those without t add to its densities. An
   !> error is set if a value is not finite.
-  subroutine load_by_expressions(scene, body, number, load, error)
+  subroutine load_by_expressions(scene, body, number, chosen, volume, part, load, error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
     integer, intent(in) :: number            !! of the `&load`
+    logical, intent(in) :: chosen(:)         !! slots that the group names
+    real(wp), intent(in) :: volume           !! of these [m3]
+    real(wp), intent(in) :: part(:)          !! of the load's slots in what acts on a side [-]
     type(load_type), intent(inout) :: load   !! with its slots and its densities by numbers
     type(error_type), allocatable, intent(out) :: error
     real(wp) :: outward
     integer :: c, axis
 
-    associate (group => scene%loads(number), n => size(load%slots))
+    associate (group => scene%loads(number))
       do c = 1, body%dim
-        call add(group%body_force_text(c), 'body_force_'//xyz(c:c), c, spread(1.0_wp, 1, n))
+        call add(group%body_force_text(c), 'body_force_'//xyz(c:c), c, &
+          & merge(1.0_wp, 0.0_wp, chosen(load%slots)))
         call add(group%force_text(c), 'force_'//xyz(c:c), c, &
-          & spread(1/volume_of(body, load%slots), 1, n))
+          & part*(1/volume))
       end do
       if (group%pressure_text == '') return
       axis = index('xyz', group%side(1:1))
       outward = merge(-1.0_wp, 1.0_wp, group%side(3:5) == 'min')
-      call add(group%pressure_text, 'pressure', axis, -outward/body%spacing(load%slots))
+      call add(group%pressure_text, 'pressure', axis, &
+        & -part*(outward/body%spacing(load%slots)))
     end associate
 
   contains

@@ -3,7 +3,7 @@
 !> group. So a long face has few unknown weights, and its points share tables.
 module pd_set_up_consistent_groups
   use pd_base_error, only: error_type, fail, internal_fault
-  use pd_base_kinds, only: wp, sp, i4, i8
+  use pd_base_kinds, only: wp, i4, i8
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
@@ -24,6 +24,10 @@ module pd_set_up_consistent_groups
     integer(i4), allocatable :: group(:)    !! of its bonds
   end type groups_type
 
+  !> Points are alike if what is within so many horizons, from bond to bond, looks alike. With one
+  !> the conditions of wide bodies have no solution.
+  integer, parameter :: rounds = 2
+
   integer, parameter :: bits = 18           !! of a component of xi in a key
   real(wp), parameter :: parts = 65536.0_wp !! of the horizon that a component is rounded to
   real(wp), parameter :: off = 0.37_wp      !! so that simple parts of it do not round both ways
@@ -41,7 +45,15 @@ contains
     type(groups_type), intent(out) :: groups
     type(error_type), allocatable, intent(out) :: error
 
-    call find_classes(body, family, area, alone, groups)
+    integer(i4), allocatable :: label(:)
+    integer :: round
+
+    label = int(body%material, i4)
+    do round = 1, merge(1, rounds, alone)
+      call find_classes(body, family, area, label, alone, groups)
+      if (round < rounds) label = groups%class
+    end do
+    call list_keys(family, groups)
     call sort_keys(body, groups, error)
     if (allocated(error)) return
     call join_bonds(body, family, groups)
@@ -99,25 +111,26 @@ contains
   end subroutine spread_weights
 
   !> Classes of slots, by keys of what is rounded of their families; then the families are compared.
-  subroutine find_classes(body, family, area, alone, groups)
+  subroutine find_classes(body, family, area, label, alone, groups)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     real(wp), intent(in) :: area(:, :)
+    integer(i4), intent(in) :: label(:)  ! what is known of each slot: the material, or a class
     logical, intent(in) :: alone
-    type(groups_type), intent(inout) :: groups
+    type(groups_type), intent(inout) :: groups  ! gets classes
     type(lookup_type) :: classes
     type(bonds_type) :: bonds, others
     integer(i8), allocatable :: key(:), of_bonds(:), of_others(:)
+    integer(i4), allocatable :: first(:)
+    logical, allocatable :: differs(:)
     real(wp) :: scale
-    integer(i8) :: n
     integer :: k, number, c
     logical :: is_new
-    logical, allocatable :: differs(:)
 
     allocate (key(body%n_slots), source=0_i8)
     scale = maxval(abs(area))
     if (.not. scale > 0.0_wp) scale = 1.0_wp
-    !$omp parallel default(none) shared(body, family, area, alone, key, scale) &
+    !$omp parallel default(none) shared(body, family, area, label, key, scale) &
     !$omp private(bonds, of_bonds, k)
     call allocate_bonds(family, bonds)
     allocate (of_bonds(family%most_bonds))
@@ -127,54 +140,61 @@ contains
       call family%bonds_of(k, bonds)
       if (bonds%n == 0) cycle
       call keys_of(family, bonds, of_bonds)
-      key(k) = class_key(body, area(k, :)/scale, k, bonds, of_bonds)
+      key(k) = class_key(label, area(k, :)/scale, k, bonds, of_bonds)
     end do
     !$omp end parallel
+    if (allocated(groups%class)) deallocate (groups%class)
     allocate (groups%class(body%n_slots), source=0_i4)
-    allocate (groups%first(0))
-    block
-      integer(i4), allocatable :: first(:)
-      allocate (first(body%n_points))
-      do k = 1, body%n_slots
-        if (key(k) == 0_i8) cycle
-        if (alone) then
-          call classes%own_number(number)
-          is_new = .true.
-        else
-          call classes%number_of(key(k), number, is_new)
-        end if
-        groups%class(k) = int(number, i4)
-        if (is_new) first(number) = int(k, i4)
-      end do
-      ! a slot that differs from its class after all is one of its own
-      allocate (differs(body%n_slots), source=.false.)
-      !$omp parallel default(none) shared(body, family, area, scale, groups, first, differs) &
-      !$omp private(bonds, others, of_bonds, of_others, k, c)
-      call allocate_bonds(family, bonds)
-      call allocate_bonds(family, others)
-      allocate (of_bonds(family%most_bonds), of_others(family%most_bonds))
-      !$omp do schedule(dynamic, 256)
-      do k = 1, body%n_slots
-        c = int(groups%class(k))
-        if (c == 0) cycle
-        if (first(c) == k) cycle
-        call family%bonds_of(k, bonds)
-        call keys_of(family, bonds, of_bonds)
-        call family%bonds_of(int(first(c)), others)
-        call keys_of(family, others, of_others)
-        differs(k) = any(abs(area(k, :) - area(first(c), :)) > 1.0e-9_wp*scale) .or. &
-          & .not. same_family(body, k, bonds, of_bonds, int(first(c)), others, of_others)
-      end do
-      !$omp end parallel
-      do k = 1, body%n_slots
-        if (.not. differs(k)) cycle
+    allocate (first(body%n_points))
+    do k = 1, body%n_slots
+      if (key(k) == 0_i8) cycle
+      if (alone) then
         call classes%own_number(number)
-        groups%class(k) = int(number, i4)
-        first(number) = int(k, i4)
-      end do
-      groups%n_classes = classes%count
-      groups%first = first(:classes%count)
-    end block
+        is_new = .true.
+      else
+        call classes%number_of(key(k), number, is_new)
+      end if
+      groups%class(k) = int(number, i4)
+      if (is_new) first(number) = int(k, i4)
+    end do
+    ! a slot that differs from its class after all is one of its own
+    allocate (differs(body%n_slots), source=.false.)
+    !$omp parallel default(none) shared(body, family, area, label, scale, groups, first, differs) &
+    !$omp private(bonds, others, of_bonds, of_others, k, c)
+    call allocate_bonds(family, bonds)
+    call allocate_bonds(family, others)
+    allocate (of_bonds(family%most_bonds), of_others(family%most_bonds))
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      c = int(groups%class(k))
+      if (c == 0) cycle
+      if (first(c) == k) cycle
+      call family%bonds_of(k, bonds)
+      call keys_of(family, bonds, of_bonds)
+      call family%bonds_of(int(first(c)), others)
+      call keys_of(family, others, of_others)
+      differs(k) = any(abs(area(k, :) - area(first(c), :)) > 1.0e-9_wp*scale) .or. &
+        & .not. same_family(body, label, k, bonds, of_bonds, int(first(c)), others, of_others)
+    end do
+    !$omp end parallel
+    do k = 1, body%n_slots
+      if (.not. differs(k)) cycle
+      call classes%own_number(number)
+      groups%class(k) = int(number, i4)
+      first(number) = int(k, i4)
+    end do
+    groups%n_classes = classes%count
+    groups%first = first(:classes%count)
+  end subroutine find_classes
+
+  !> The keys of the bonds of each class's slot.
+  subroutine list_keys(family, groups)
+    class(family_type), intent(in) :: family
+    type(groups_type), intent(inout) :: groups
+    type(bonds_type) :: bonds
+    integer(i8) :: n
+    integer :: c
+
     allocate (groups%start(groups%n_classes + 1))
     call allocate_bonds(family, bonds)
     n = 1_i8
@@ -189,7 +209,7 @@ contains
       call family%bonds_of(int(groups%first(c)), bonds)
       call keys_of(family, bonds, groups%key(groups%start(c):groups%start(c + 1) - 1))
     end do
-  end subroutine find_classes
+  end subroutine list_keys
 
   !> A key for each bond: its xi, rounded.
   pure subroutine keys_of(family, bonds, key)
@@ -215,8 +235,8 @@ contains
   end function bond_key
 
   !> A key of what the weights of a slot depend on, in any order of its bonds.
-  pure integer(i8) function class_key(body, area, k, bonds, of_bonds) result(key)
-    type(body_type), intent(in) :: body
+  pure integer(i8) function class_key(label, area, k, bonds, of_bonds) result(key)
+    integer(i4), intent(in) :: label(:)
     real(wp), intent(in) :: area(:)  ! scaled
     integer, intent(in) :: k
     type(bonds_type), intent(in) :: bonds
@@ -225,9 +245,9 @@ contains
 
     key = bonds%n
     do i = 1, bonds%n
-      key = ieor(key, mix(mix(1_i8, of_bonds(i)), int(body%material(bonds%j(i)), i8)))
+      key = ieor(key, mix(mix(1_i8, of_bonds(i)), int(label(bonds%j(i)), i8)))
     end do
-    key = mix(key, int(body%material(k), i8))
+    key = mix(key, int(label(k), i8))
     do i = 1, size(area)
       key = mix(key, nint(area(i)*1048576.0_wp + off, i8))
     end do
@@ -235,16 +255,17 @@ contains
   end function class_key
 
   !> Whether two slots have the same material and volume and the same bonds, in any order.
-  pure logical function same_family(body, k, bonds, of_bonds, other, others, of_others) &
+  pure logical function same_family(body, label, k, bonds, of_bonds, other, others, of_others) &
     & result(same)
     type(body_type), intent(in) :: body
+    integer(i4), intent(in) :: label(:)
     integer, intent(in) :: k, other
     type(bonds_type), intent(in) :: bonds, others
     integer(i8), intent(in) :: of_bonds(:), of_others(:)
     real(wp), parameter :: near = 1.0e-9_wp
     integer :: i, o
 
-    same = bonds%n == others%n .and. body%material(k) == body%material(other) .and. &
+    same = bonds%n == others%n .and. label(k) == label(other) .and. &
       & abs(body%volume(k) - body%volume(other)) <= near*body%volume(k)
     if (.not. same) return
     do i = 1, bonds%n
@@ -252,7 +273,7 @@ contains
       if (of_others(o) /= of_bonds(i)) o = findloc(of_others(:others%n), of_bonds(i), dim=1)
       same = o > 0
       if (.not. same) return
-      same = body%material(bonds%j(i)) == body%material(others%j(o)) .and. &
+      same = label(bonds%j(i)) == label(others%j(o)) .and. &
         & abs(bonds%weight(i) - others%weight(o)) <= near*body%volume(k)
       if (.not. same) return
     end do

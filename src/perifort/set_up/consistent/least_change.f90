@@ -14,6 +14,7 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: unbounded = -1.0e30_wp  !! the bound that is none
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
   integer, parameter :: most_newton = 60
+  integer, parameter :: patience = 8  !! steps in which the error must fall to half
   integer, parameter :: most_iterations = 5000
 
 contains
@@ -29,7 +30,7 @@ contains
     logical, intent(out) :: found
     real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :)
     logical, allocatable :: free(:)
-    real(wp) :: value, before, slope, length
+    real(wp) :: value, before, slope, length, history(most_newton)
     integer :: newton, halving
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
@@ -44,6 +45,11 @@ contains
       residual = maxval(abs(r))
       found = residual <= tolerance
       if (found) return
+      ! without a solution the multipliers grow and the error stays
+      history(newton) = residual
+      if (newton > patience) then
+        if (residual > 0.5_wp*history(newton - patience)) return
+      end if
       free = t + 1 > low
       call solve(conditions, free, r, step, iterations)
       slope = sum(r*step)
@@ -120,31 +126,33 @@ contains
     end do
   end subroutine solve
 
-  !> Cholesky factors of the classes' blocks, made definite by a small part of their diagonal.
+  !> Cholesky factors of the classes' blocks. Rows that follow from others of the class, as those
+  !> of a family with a centre of symmetry, are left out by a large pivot.
   subroutine factorize(conditions, free, factor)
     type(conditions_type), intent(in) :: conditions
     logical, intent(in) :: free(:)
     real(wp), allocatable, intent(out) :: factor(:, :, :)
-    real(wp), parameter :: part = 1.0e-8_wp
-    real(wp) :: added
+    real(wp), parameter :: part = 1.0e-9_wp
+    real(wp) :: pivot, largest
     integer :: c, i, j
 
     allocate (factor(conditions%rows, conditions%rows, conditions%classes))
-    !$omp parallel do schedule(dynamic, 16) default(none) shared(conditions, free, factor) &
-    !$omp private(added, c, i, j)
+    !$omp parallel do schedule(dynamic, 16) default(none) shared(conditions, free, factor) private(c)
+    do c = 1, conditions%classes
+      call block_of(conditions, c, free, factor(:, :, c))
+    end do
+    largest = 0.0_wp
+    do i = 1, conditions%rows
+      largest = max(largest, maxval(factor(i, i, :)))
+    end do
+    !$omp parallel do schedule(static) default(none) shared(conditions, factor, largest) &
+    !$omp private(c, i, j, pivot)
     do c = 1, conditions%classes
       associate (f => factor(:, :, c))
-        call block_of(conditions, c, free, f)
-        added = 0.0_wp
-        do i = 1, conditions%rows
-          added = max(added, f(i, i))
-        end do
-        added = max(part*added, 1.0e-12_wp)
-        do i = 1, conditions%rows
-          f(i, i) = f(i, i) + added
-        end do
         do j = 1, conditions%rows
-          f(j, j) = sqrt(max(f(j, j) - sum(f(j, :j - 1)**2), added/2))
+          pivot = f(j, j) - sum(f(j, :j - 1)**2)
+          if (pivot <= part*largest) pivot = largest/part
+          f(j, j) = sqrt(pivot)
           do i = j + 1, conditions%rows
             f(i, j) = (f(i, j) - dot_product(f(i, :j - 1), f(j, :j - 1)))/f(j, j)
           end do

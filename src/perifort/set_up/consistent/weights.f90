@@ -27,8 +27,11 @@ module pd_set_up_consistent_weights
     integer :: iterations = 0         !! of conjugate gradients, in all
   end type solution_type
 
-  !> Bounds that are tried, one after another. The last is none.
-  real(wp), parameter :: bounds(*) = [0.05_wp, 0.0_wp, -0.1_wp, -0.5_wp, -2.0_wp, unbounded]
+  !> Bounds that are tried, one after another; the last is none. Around flat faces there are weights
+  !> Gb of 0.05 at least, around edges and corners of blocks none above 0. Of Gd there are none above
+  !> 0, and those that are not negative are far from 1.
+  real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, unbounded], &
+    & bounds_of_dilatation(*) = [-0.1_wp, unbounded]
 
 contains
 
@@ -85,18 +88,19 @@ contains
       & of_dilatation/scale], [body%n_slots, 2*body%dim]), alone, groups, error)
     if (allocated(error)) return
     call stretch_conditions(body, family, materials, groups, of_stretch, conditions)
-    call solve(conditions, bounded, 'stretch', Gb, stretch, error)
+    call solve(conditions, bounds_of_stretch, bounded, 'stretch', Gb, stretch, error)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions)
-    call solve(conditions, bounded, 'dilatation', Gd, dilatation, error)
+    call solve(conditions, bounds_of_dilatation, bounded, 'dilatation', Gd, dilatation, error)
     if (allocated(error)) return
     call spread_weights(body, family, groups, Gb, Gd, weights)
   end subroutine weights_of_areas
 
   !> The least change within the first bounds that allow one.
-  subroutine solve(conditions, bounded, what, G, solution, error)
+  subroutine solve(conditions, bounds, bounded, what, G, solution, error)
     type(conditions_type), intent(in) :: conditions
+    real(wp), intent(in) :: bounds(:)
     logical, intent(in) :: bounded
     character(*), intent(in) :: what
     real(wp), allocatable, intent(out) :: G(:)
