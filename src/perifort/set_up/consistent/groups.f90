@@ -24,10 +24,6 @@ module pd_set_up_consistent_groups
     integer(i4), allocatable :: group(:)    !! of its bonds
   end type groups_type
 
-  !> Points are alike if what is within so many horizons, from bond to bond, looks alike. With one
-  !> the conditions of wide bodies have no solution.
-  integer, parameter :: rounds = 2
-
   integer, parameter :: bits = 18           !! of a component of xi in a key
   real(wp), parameter :: parts = 65536.0_wp !! of the horizon that a component is rounded to
   real(wp), parameter :: off = 0.37_wp      !! so that simple parts of it do not round both ways
@@ -35,13 +31,14 @@ module pd_set_up_consistent_groups
 contains
 
   !> Classes and groups of a body's bonds. `area` tells points apart that look alike and have other
-  !> surface areas. With `alone` every point is a class and every bond a group of its own. An error
-  !> is set if two points of a family are at one place.
-  subroutine find_groups(body, family, area, alone, groups, error)
+  !> surface areas. Points are alike if what is within `reach` horizons, from bond to bond, looks
+  !> alike. An error is set if two points of a family are at one place.
+  subroutine find_groups(body, family, area, reach, groups, error)
     type(body_type), intent(in) :: body       !! arranged in the slots of the family
     class(family_type), intent(in) :: family  !! whole
     real(wp), intent(in) :: area(:, :)        !! (n_slots, any) surface areas, or what they do [any]
-    logical, intent(in) :: alone              !! no bonds are grouped
+    integer, intent(in) :: reach
+      !! horizons; 0: every point is a class and every bond a group of its own
     type(groups_type), intent(out) :: groups
     type(error_type), allocatable, intent(out) :: error
 
@@ -49,9 +46,9 @@ contains
     integer :: round
 
     label = int(body%material, i4)
-    do round = 1, merge(1, rounds, alone)
-      call find_classes(body, family, area, label, alone, groups)
-      if (round < rounds) label = groups%class
+    do round = 1, max(1, reach)
+      call find_classes(body, family, area, label, reach == 0, groups)
+      if (round < reach) label = groups%class
     end do
     call list_keys(family, groups)
     call sort_keys(body, groups, error)

@@ -27,9 +27,9 @@ module pd_set_up_consistent_weights
     integer :: iterations = 0         !! of conjugate gradients, in all
   end type solution_type
 
-  !> Bounds that are tried, one after another; the last is none. Around flat faces there are weights
-  !> Gb of 0.05 at least, around edges and corners of blocks none above 0. Of Gd there are none above
-  !> 0, and those that are not negative are far from 1.
+  !> Bounds that are tried, one after another; the last is none. Bars and plates have weights Gb of
+  !> 0.05 at least, blocks none above 0. Of Gd there are none above 0 in the plane either, and those
+  !> that are not negative are far from 1.
   real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, unbounded], &
     & bounds_of_dilatation(*) = [-0.1_wp, unbounded]
 
@@ -61,7 +61,9 @@ contains
       & weights, stretch, dilatation, error)
   end subroutine consistent_weights
 
-  !> Weights for given surface areas. An error is set if no weights fulfil the conditions.
+  !> Weights for given surface areas. An error is set if no weights fulfil the conditions. Bonds in
+  !> like surroundings have one weight; where that leaves no solution, surroundings are looked at
+  !> farther, and in the end each bond has a weight of its own.
   subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, alone, bounded, &
     & weights, stretch, dilatation, error)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
@@ -77,6 +79,33 @@ contains
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: farthest = 3
+    integer :: reach
+
+    ! in space a second horizon would give ten times the unknowns for weights hardly nearer to 1
+    reach = merge(1, 2, body%dim == 3)
+    if (alone) reach = 0
+    do
+      call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
+        & weights, stretch, dilatation, error)
+      if (reach == 0 .or. .not. allocated(error)) return
+      reach = merge(0, reach + 1, reach == farthest)
+    end do
+  end subroutine weights_of_areas
+
+  !> Weights where bonds have one weight if all looks alike within `reach` horizons. An error is set
+  !> if none fulfil the conditions.
+  subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
+    & weights, stretch, dilatation, error)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)
+    real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
+    integer, intent(in) :: reach
+    logical, intent(in) :: bounded
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch, dilatation
+    type(error_type), allocatable, intent(out) :: error
     type(groups_type) :: groups
     type(conditions_type) :: conditions
     real(wp), allocatable :: Gb(:), Gd(:)
@@ -85,17 +114,18 @@ contains
     scale = maxval(abs(of_dilatation))
     if (.not. scale > 0.0_wp) scale = 1.0_wp
     call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
-      & of_dilatation/scale], [body%n_slots, 2*body%dim]), alone, groups, error)
+      & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
     if (allocated(error)) return
     call stretch_conditions(body, family, materials, groups, of_stretch, conditions)
-    call solve(conditions, bounds_of_stretch, bounded, 'stretch', Gb, stretch, error)
+    call solve(conditions, bounds_of_stretch(merge(2, 1, body%dim == 3):), bounded, 'stretch', &
+      & Gb, stretch, error)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions)
     call solve(conditions, bounds_of_dilatation, bounded, 'dilatation', Gd, dilatation, error)
     if (allocated(error)) return
     call spread_weights(body, family, groups, Gb, Gd, weights)
-  end subroutine weights_of_areas
+  end subroutine weights_at_reach
 
   !> The least change within the first bounds that allow one.
   subroutine solve(conditions, bounds, bounded, what, G, solution, error)
