@@ -26,6 +26,7 @@ module test_set_up_consistent_weights
 
   real(wp), parameter :: spacing = 1.0e-2_wp
   real(wp), parameter :: zeta = 1.0e-11_wp  !! strain: its square is below what is compared
+  real(wp), parameter :: tension = zeta*youngs_modulus  !! of loads [Pa]
 
 contains
 
@@ -446,14 +447,10 @@ contains
     associate (body => set_up%system%body, u => set_up%system%state%u)
       extension = u(at_point(body, [16.5_wp, 5.5_wp]*spacing), 1) &
         & - u(at_point(body, [3.5_wp, 5.5_wp]*spacing), 1)
-      expected = pressure/youngs_modulus*(6.5_wp + 4*6.5_wp)*spacing
+      expected = tension/youngs_modulus*(6.5_wp + 4*6.5_wp)*spacing
     end associate
     call expect(error, extension, expected, 0.01_wp*expected, 'extension of two materials in series')
   end subroutine test_two_materials
-
-  real(wp) function pressure()
-    pressure = 1.0e-11_wp*youngs_modulus
-  end function pressure
 
   !> Two plates of one Poisson's ratio behind each other, the second with a quarter of the stiffness.
   subroutine two_materials(scene)
@@ -480,7 +477,7 @@ contains
     allocate (scene%loads(2))
     scene%loads(1)%side = 'x_min'
     scene%loads(2)%side = 'x_max'
-    scene%loads%pressure = -pressure()
+    scene%loads%pressure = -tension
     if (size(scene%bodies) > 1) then
       scene%loads(1)%body = scene%bodies(1)%name
       scene%loads(2)%body = scene%bodies(2)%name
@@ -512,8 +509,8 @@ contains
         allocate (scene%loads(2))
         scene%loads(1)%side = 'x_min'
         scene%loads(2)%side = 'x_max'
-        scene%loads(1)%force(1) = -pressure()*16*spacing*scene%header%thickness
-        scene%loads(2)%force(1) = pressure()*16*spacing*scene%header%thickness
+        scene%loads(1)%force(1) = -tension*16*spacing*scene%header%thickness
+        scene%loads(2)%force(1) = tension*16*spacing*scene%header%thickness
       end if
       call uniform_at_rest(scene, [zeta, -scene%materials(1)%poissons_ratio*zeta, &
         & -scene%materials(1)%poissons_ratio*zeta], 'load '//text_of(real(i, wp)), error)

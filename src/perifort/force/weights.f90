@@ -274,16 +274,15 @@ contains
     type(weights_type), intent(inout) :: weights
       !! with room for any block; those of this one on return
     real(wp) :: weight, n(family%dim), gb, gd
-    integer(i8) :: k, j, place(family%block_length)
+    integer(i8) :: k, j
+    integer(i8), allocatable :: place(:, :)
     integer :: i, o, l, m, length
 
     length = family%block_length
     if (model%consistent) then
-      do l = 1, length
-        place(l) = 0_i8
-        if (model%weights%row(first + l - 1) > 0_i4) &
-          & place(l) = model%weights%before(int(first) + l - 1)
-      end do
+      call find_places(family, model, first, place)
+    else
+      allocate (place(0, 0))
     end if
     m = 0
     weights%n_forward = 0
@@ -320,10 +319,8 @@ contains
             if (model%dilatation) weights%dilatation(l, m) = weight*gd
           end if
           if (model%consistent) then
-            ! weights stand in the order of each slot's bonds
-            place(l) = place(l) + 1
-            weights%stretch(l, m) = weights%stretch(l, m)*model%weights%Gb(place(l))
-            if (model%dilatation) weights%dilatation(l, m) = weight*model%weights%Gd(place(l))
+            weights%stretch(l, m) = weights%stretch(l, m)*model%weights%Gb(place(l, o))
+            if (model%dilatation) weights%dilatation(l, m) = weight*model%weights%Gd(place(l, o))
           end if
           if (.not. model%surface) cycle
           weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
@@ -340,6 +337,31 @@ contains
     if (model%dilatation) weights%single_dilatation(:, :m) = &
       & real(weights%dilatation(:, :m)/volume_unit(family), sp)
   end subroutine block_weights
+
+  !> Where the weights of a block's bonds stand (lane, offset): in the order of `bonds_of`.
+  pure subroutine find_places(family, model, first, place)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer(i8), intent(in) :: first
+    integer(i8), allocatable, intent(out) :: place(:, :)
+    integer(i8) :: k, next
+    integer :: l, o
+
+    associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
+      allocate (place(family%block_length, grid%n))
+      do l = 1, family%block_length
+        k = first + l - 1
+        place(l, :) = 0_i8
+        if (model%weights%row(k) == 0_i4) cycle
+        next = model%weights%before(int(k))
+        do o = 1, grid%n
+          if (alive(k + grid%shift(o)) == 0_i1) cycle
+          next = next + 1
+          place(l, o) = next
+        end do
+      end do
+    end associate
+  end subroutine find_places
 
   !> Give back the room of offsets that were left out, and of the precision that is not needed.
   pure subroutine trim_weights(weights)
