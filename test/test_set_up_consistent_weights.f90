@@ -377,7 +377,7 @@ contains
       call weights_of_areas(body, family, [material], material%shear_modulus*a, &
         & sign(1.0_wp, material%a)*a, .false., .true., model%weights, b, d, fault)
       if (allocated(fault)) then
-        call test_failed(error, fault%message)
+        call test_failed(error, 'pass '//text_of(real(pass, wp))//': '//fault%message)
         return
       end if
       model%consistent = .true.

@@ -15,7 +15,9 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
-  integer, parameter :: most_iterations = 5000
+  integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
+  integer, parameter :: most_bounded = 400          !! of a step with such weights
+  integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
 
 contains
 
@@ -50,6 +52,7 @@ contains
       if (newton > patience) then
         if (residual > 0.5_wp*history(newton - patience)) return
       end if
+      if (low > unbounded .and. iterations > most_of_bound) return
       free = t + 1 > low
       call solve(conditions, free, r, step, iterations)
       slope = sum(r*step)
@@ -108,7 +111,7 @@ contains
     ! of a bounded solve the free unknowns change from step to step
     target = 0.02_wp*tolerance
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
-    do i = 1, most_iterations
+    do i = 1, merge(most_iterations, most_bounded, all(free))
       call precondition(factor, rest, w)
       rho = sum(rest*w)
       if (.not. rho > 0.0_wp) exit

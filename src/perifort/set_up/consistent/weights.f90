@@ -31,7 +31,7 @@ module pd_set_up_consistent_weights
   !> 0.05 at least, blocks none above 0. Of Gd there are none above 0 in the plane either, and those
   !> that are not negative are far from 1.
   real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, unbounded], &
-    & bounds_of_dilatation(*) = [-0.1_wp, unbounded]
+    & bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
 
 contains
 
@@ -139,6 +139,7 @@ contains
     integer :: b, iterations
     logical :: found
 
+    found = .false.
     solution%unknowns = conditions%unknowns
     do b = merge(1, size(bounds), bounded), size(bounds)
       solution%bound = bounds(b)
