@@ -12,6 +12,8 @@ module pd_set_up_consistent_rules
   private
   public :: check_consistent, weigh_bonds
 
+  real(wp), parameter :: same = 1.0e-12_wp  !! part of a modulus that may differ
+
 contains
 
   !> An error is set if a scene with consistent weights has what they do not serve.
@@ -33,6 +35,15 @@ contains
       end associate
       call refuse('material', i, 'model', 'this bond law', &
         & "its weights are known for the chapter's laws with influence = 'inverse'")
+      return
+    end do
+    do i = 2, size(scene%materials)
+      associate (one => system%model%materials(1), other => system%model%materials(i))
+        if (abs(one%shear_modulus - other%shear_modulus) <= same*one%shear_modulus &
+          & .and. abs(one%bulk_modulus - other%bulk_modulus) <= same*one%bulk_modulus) cycle
+      end associate
+      call refuse('material', i, '', 'materials of different stiffness', &
+        & 'weights at their interface may leave a body that gives way')
       return
     end do
     if (scene%header%precision == 'mixed') then
