@@ -172,8 +172,8 @@ contains
 
   end subroutine test_independent
 
-  !> A wide plate and a wider one need the same weights, on lattices and on lists. Inside, bonds of one
-  !> length class have one weight: what is there is symmetric.
+  !> A wide plate and a wider one need the same weights, on lattices and on lists. Inside, bonds of
+  !> one length class have one weight: what is there is symmetric.
   subroutine test_alike(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -275,10 +275,10 @@ contains
         end do
         call internal_force(body, system%family, model, options_of(model), system%workspace, u, &
           & p, force, strained)
-        call expect_close(error, force, expected, 1.0e-9_wp*maxval(abs(expected)), &
+        call expect_close(error, force, expected, 1.0e-9_wp*max_abs(expected), &
           & 'forces of the loops: '//what)
         call reference_force(system%family, model, u, force)
-        call expect_close(error, force, expected, 1.0e-9_wp*maxval(abs(expected)), &
+        call expect_close(error, force, expected, 1.0e-9_wp*max_abs(expected), &
           & 'forces of the reference: '//what)
         call reference_dilatation(system%family, model, u, theta)
         call expect_close(error, theta, [(merge(trace, 0.0_wp, body%point(k) > 0), &
@@ -315,7 +315,8 @@ contains
     if (dim == 1) mu = m%youngs_modulus/2
   end function shear_of
 
-  !> A strip at 30 degrees to the axes, as a cloud, with the areas of the straight strip turned with it.
+  !> A strip at 30 degrees to the axes, as a cloud, with the areas of the straight strip turned with
+  !> it.
   subroutine test_clouds(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: nx = 16, ny = 12
@@ -377,7 +378,7 @@ contains
       end do
     end associate
     call reference_force(family, model, u, force)
-    call expect_close(error, force, expected, 1.0e-9_wp*maxval(abs(expected)), 'forces')
+    call expect_close(error, force, expected, 1.0e-9_wp*max_abs(expected), 'forces')
     call reference_dilatation(family, model, u, theta)
     call expect_close(error, theta(body%slot), 0.7_wp*zeta, 1.0e-9_wp*zeta, 'dilatations')
     if (allocated(error)) return
@@ -396,7 +397,8 @@ contains
 
   end subroutine test_clouds
 
-  !> Two plates of one Poisson's ratio behind each other, the second with a quarter of the stiffness.
+  !> Two plates of one Poisson's ratio behind each other, the second with a quarter of the
+  !> stiffness.
   subroutine two_materials(scene)
     type(scene_type), intent(out) :: scene
 
@@ -436,8 +438,8 @@ contains
     scene%relaxation%tolerance = 1.0e-12_wp
   end subroutine at_rest
 
-  !> Pressure on two sides, and a force in its place: every point has the classical displacement, but
-  !> for what the tolerance of 1e-12 leaves.
+  !> Pressure on two sides, and a force in its place: every point has the classical displacement,
+  !> but for what the tolerance of 1e-12 leaves.
   subroutine test_loads(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -509,14 +511,14 @@ contains
         found = found - sum(found)/size(found)
         expected = strain(c)*body%x(body%slot, c)
         expected = expected - sum(expected)/size(expected)
-        call expect_close(error, found, expected, 1.0e-9_wp*maxval(abs(expected)), what)
+        call expect_close(error, found, expected, 1.0e-9_wp*max_abs(expected), what)
       end do
     end associate
   end subroutine uniform_at_rest
 
   !> A strip under end moments by a pressure that is linear across: its curvature, from the rotation
-  !> of sections a depth from the ends, beside M/EI of plane stress. Halving the spacing quarters the
-  !> error.
+  !> of sections a depth from the ends, beside M/EI of plane stress. Halving the spacing quarters
+  !> the error.
   subroutine test_bending(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: across(*) = [5, 10, 20]
@@ -576,9 +578,9 @@ contains
     slope = sum(y*v)/sum(y**2)
   end function rotation
 
-  !> Random displacements of finite size, both families: no resultant force or moment, and the force is
-  !> minus the gradient of the energy, by central differences of 1e-6 spacings (their error is the
-  !> square of that, over the strain).
+  !> Random displacements of finite size, both families: no resultant force or moment, and the force
+  !> is minus the gradient of the energy, by central differences of 1e-6 spacings (their error is
+  !> the square of that, over the strain).
   subroutine test_conservation(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -621,7 +623,7 @@ contains
         call internal_force(body, system%family, model, options_of(model), system%workspace, u, &
           & p, force, strained)
         call reference_force(system%family, model, u, reference)
-        call expect_close(error, force, reference, 1.0e-11_wp*maxval(abs(reference)), &
+        call expect_close(error, force, reference, 1.0e-11_wp*max_abs(reference), &
           & 'loops beside the reference')
         size_of_forces = sum(abs(force(:, 1))*body%volume)
         do c = 1, body%dim
@@ -644,8 +646,9 @@ contains
 
   end subroutine test_conservation
 
-  !> A plate that swings freely: kinetic and strain energy together change by the square of the step,
-  !> and stay. The stable step is at most 1.3 times smaller than with the correction by energy.
+  !> A plate that swings freely: kinetic and strain energy together change by the square of the
+  !> step, and stay. The stable step is at most 1.3 times smaller than with the correction by
+  !> energy.
   subroutine test_explicit(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene, other

@@ -1,5 +1,5 @@
-!> Outward surface areas of the points of lattices (doc/theory.md, 4): how a traction on the faces of
-!> cells acts on their centres.
+!> Outward surface areas of the points of lattices (doc/theory.md, 4): how a traction on the faces
+!> of cells acts on their centres.
 module pd_family_areas
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type

@@ -160,7 +160,8 @@ contains
     type(lattice_workspace_type), intent(inout) :: workspace
     integer :: b
 
-    !$omp parallel do schedule(static) default(none) shared(family, own, first, workspace) private(b)
+    !$omp parallel do schedule(static) default(none) private(b) &
+    !$omp shared(family, own, first, workspace)
     do b = 1, size(family%block)
       if (workspace%weights(b) == 0_i4) cycle
       if (.not. alike_blocks(family, own, family%block(b), first(workspace%weights(b)))) &

@@ -1,6 +1,6 @@
-!> The linear conditions on the weights of bonds, and sums of them (doc/theory.md, 4): for each class
-!> of points a few rows, for each group of bonds an unknown. The coefficients of a bond are powers of
-!> its direction, so they are computed where they are needed.
+!> The linear conditions on the weights of bonds, and sums of them (doc/theory.md, 4): for each
+!> class of points a few rows, for each group of bonds an unknown. The coefficients of a bond are
+!> powers of its direction, so they are computed where they are needed.
 module pd_set_up_consistent_conditions
   use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
@@ -80,10 +80,10 @@ contains
     call turn(conditions)
   end subroutine stretch_conditions
 
-  !> Conditions on Gd: theta is the strain's trace, and the force of equal p is that of the classical
-  !> traction: t sum_j Gd vc V_j n_a n_b = d_ab, and
-  !> t sum_j (a_k + a_j) Gd vc V_j n_a/|xi| = -A_a/V_k, with A the sum over regions of a x area. The
-  !> second rows are multiplied with the spacing over the largest a.
+  !> Conditions on Gd: theta is the strain's trace, and the force of equal p is that of the
+  !> classical traction: t sum_j Gd vc V_j n_a n_b = d_ab, and t sum_j (a_k + a_j) Gd vc V_j
+  !> n_a/|xi| = -A_a/V_k, with A the sum over regions of a x area. The second rows are multiplied
+  !> with the spacing over the largest a.
   subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions)
     type(body_type), intent(in) :: body              !! that the groups were found for
     class(family_type), intent(in) :: family         !! whole

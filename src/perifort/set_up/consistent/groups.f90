@@ -301,8 +301,8 @@ contains
         end do
         do i = 2, size(key)
           if (key(order(i)) > key(order(i - 1))) cycle
-          call fail(error, "surface_correction = 'consistent' has no weights for points that lie "// &
-            & 'at one place: point '//to_text(int(body%point(groups%first(c))))// &
+          call fail(error, "surface_correction = 'consistent' has no weights for points that "// &
+            & 'lie at one place: point '//to_text(int(body%point(groups%first(c))))// &
             & ' has two such neighbours', group='horizon', number=1)
           return
         end do

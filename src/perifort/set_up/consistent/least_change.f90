@@ -1,9 +1,10 @@
 !> The least change of weights from 1 that fulfils linear conditions, with bounds on the weights.
 !>
 !> Minimise sum (G - 1)^2 under B G = r and low <= G: G - 1 = max(low - 1, B^T z), and the
-!> multipliers z are the zero of r - B G(z), which is the gradient of a concave function of z. Newton's
-!> method finds it: each step solves a system with the weights that are not at the bound, by conjugate
-!> gradients with the blocks of the classes as preconditioner. Without a bound one step is enough.
+!> multipliers z are the zero of r - B G(z), which is the gradient of a concave function of z.
+!> Newton's method finds it: each step solves a system with the weights that are not at the bound,
+!> by conjugate gradients with the blocks of the classes as preconditioner. Without a bound one step
+!> is enough.
 module pd_set_up_consistent_least_change
   use pd_base_kinds, only: wp, i8
   use pd_set_up_consistent_conditions, only: block_of, conditions_type, spread_over, sums_of
@@ -89,8 +90,8 @@ contains
       & - sum((conditions%right - of_one)*z)
   end subroutine weigh
 
-  !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular, and
-  !> r in its range but for what the bound cuts off.
+  !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
+  !> and r in its range but for what the bound cuts off.
   subroutine solve(conditions, free, r, step, iterations)
     type(conditions_type), intent(in) :: conditions
     logical, intent(in) :: free(:)
@@ -140,7 +141,8 @@ contains
     integer :: c, i, j
 
     allocate (factor(conditions%rows, conditions%rows, conditions%classes))
-    !$omp parallel do schedule(dynamic, 16) default(none) shared(conditions, free, factor) private(c)
+    !$omp parallel do schedule(dynamic, 16) default(none) private(c) &
+    !$omp shared(conditions, free, factor)
     do c = 1, conditions%classes
       call block_of(conditions, c, free, factor(:, :, c))
     end do

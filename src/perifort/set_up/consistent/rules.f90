@@ -76,8 +76,8 @@ contains
 
   end subroutine check_consistent
 
-  !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that can
-  !> break have negative ones.
+  !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
+  !> can break have negative ones.
   subroutine weigh_bonds(scene, system, materials, error)
     type(scene_type), intent(in) :: scene               !! with consistent weights
     type(system_type), intent(inout) :: system          !! with body, whole family and model
@@ -95,8 +95,8 @@ contains
     least = stretch%least
     if (system%model%dilatation) least = min(least, dilatation%least)
     if (least < 0.0_wp) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
-      & "surface_correction = 'consistent' does not serve fracture here: the smallest weight of a "// &
-      & 'bond is '//to_text(least, 3)//', and a body would gain energy when such a bond breaks', &
+      & "surface_correction = 'consistent' does not serve fracture here: the smallest weight of "// &
+      & 'a bond is '//to_text(least, 3)//', and a body would gain energy when such a bond breaks', &
       & "give surface_correction = 'energy' or 'none'")
   end subroutine weigh_bonds
 
