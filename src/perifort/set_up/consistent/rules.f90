@@ -95,8 +95,9 @@ contains
     least = stretch%least
     if (system%model%dilatation) least = min(least, dilatation%least)
     if (least < 0.0_wp) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
-      & "surface_correction = 'consistent' does not serve fracture here: the smallest weight of "// &
-      & 'a bond is '//to_text(least, 3)//', and a body would gain energy when such a bond breaks', &
+      & "surface_correction = 'consistent' does not serve fracture here: the smallest weight "// &
+      & 'of a bond is '//to_text(least, 3)//', and a body would gain energy when such a bond '// &
+      & 'breaks', &
       & "give surface_correction = 'energy' or 'none'")
   end subroutine weigh_bonds
 

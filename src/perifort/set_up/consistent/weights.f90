@@ -52,7 +52,8 @@ contains
     if (alone > 0) then
       call fail(error, "surface_correction = 'consistent' needs a second point behind each "// &
         & 'surface: point '//to_text(int(body%point(alone)))//' has no neighbour on either '// &
-        & 'side along an axis; lower the dimension, use more points across, or another correction', &
+        & 'side along an axis; lower the dimension, use more points across, or another '// &
+        & 'correction', &
         & group='horizon', number=1)
       return
     end if
