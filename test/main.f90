@@ -109,6 +109,7 @@ program main
   use test_scene_content_write, only: collect_scene_content_write
   use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
+  use test_set_up_consistent_weights, only: collect_set_up_consistent_weights
   use test_set_up_toughness, only: collect_set_up_toughness
   use test_set_up_terms, only: collect_set_up_terms
   use test_study_limits_limits, only: collect_study_limits_limits
@@ -224,6 +225,7 @@ program main
   call register('scene_content_write', collect_scene_content_write)
   call register('softening_cracks', collect_softening_cracks)
   call register('study_bench_bench', collect_study_bench_bench)
+  call register('set_up_consistent_weights', collect_set_up_consistent_weights)
   call register('set_up_terms', collect_set_up_terms)
   call register('set_up_toughness', collect_set_up_toughness)
   call register('study_limits_limits', collect_study_limits_limits)

@@ -181,7 +181,7 @@ contains
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
       call take_given(workspace, work)
-      if (options%thermal .or. model%weighted) then
+      if (options%thermal .or. model%weighted .or. model%consistent) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
             & .true., work)

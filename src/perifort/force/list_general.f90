@@ -88,11 +88,18 @@ contains
       !! of the cluster it has taken up; gets the tables of its bonds
     real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c, gb, gd
     logical :: there(lanes), from(lanes)
-    integer(i8) :: e
+    integer(i8) :: e, place(lanes)
     integer :: i, j, m, f, l
 
     call allocate_tables(family, work)
     call take_given(workspace, work)
+    if (model%consistent) then
+      do l = 1, lanes
+        place(l) = 0_i8
+        if (model%weights%row(work%first + l - 1) > 0_i4) &
+          & place(l) = model%weights%before(work%first + l - 1)
+      end do
+    end if
     do i = 1, work%n
       e = family%start(work%cluster) + i - 1
       j = family%member(1, e)
@@ -133,6 +140,15 @@ contains
         end do
         work%stretch(:, i) = work%stretch(:, i)*gb
         work%dilatation(:, i) = weight*gd
+      end if
+      if (model%consistent) then
+        ! weights stand in the order of each slot's bonds, broken ones included
+        do l = 1, lanes
+          if (iand(family%bits(e), lane_bit(l)) == 0_i1) cycle
+          place(l) = place(l) + 1
+          work%stretch(l, i) = work%stretch(l, i)*model%weights%Gb(place(l))
+          work%dilatation(l, i) = work%dilatation(l, i)*model%weights%Gd(place(l))
+        end do
       end if
       if (.not. model%surface) cycle
       x = x/length

@@ -49,8 +49,8 @@ contains
     end do
     !$omp do schedule(dynamic, 32)
     do c = 1, size(workspace%plain)
-      ! loops of plain clusters know no factors of a law
-      if (model%weighted) cycle
+      ! loops of plain clusters know no factors of a law, and no weights of bonds
+      if (model%weighted .or. model%consistent) cycle
       if (is_plain(family, workspace%given, model%surface, c)) workspace%plain(c) = 1_i1
     end do
     !$omp end parallel

@@ -213,7 +213,7 @@ contains
     integer :: i
 
     most_S = max(tiny(1.0_wp), maxval(abs(work%stretch(:, :work%n))))
-    most_D = max(tiny(1.0_wp), maxval(work%dilatation(:, :work%n)))
+    most_D = max(tiny(1.0_wp), maxval(abs(work%dilatation(:, :work%n))))
     key = mix(shape, int(bits_of(fraction(most_S) + fraction(most_D)/3), i8))
     do i = 1, work%n
       value = sum(factors(:, 1)*bits_of(work%stretch(:, i)/most_S))
@@ -399,7 +399,7 @@ contains
         & <= off*maxval(abs(work%stretch(:, :n)))
       if (.not. (model%dilatation .and. same_weights)) return
       same_weights = maxval(abs(work%dilatation(:, :n) - workspace%weight_D(:, place:last))) &
-        & <= off*maxval(work%dilatation(:, :n))
+        & <= off*maxval(abs(work%dilatation(:, :n)))
     end associate
   end function same_weights
 

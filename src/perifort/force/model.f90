@@ -4,6 +4,7 @@ module pd_force_model
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_body_body, only: body_type
+  use pd_family_bond_weights, only: bond_weights_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never
   use pd_law_strength, only: strength_factor
@@ -37,6 +38,7 @@ module pd_force_model
     logical :: dilatation = .false.   !! some a /= 0: the force needs the dilatation of both ends
     logical :: projected = .true.     !! Lambda = yhat . xi/|xi| as printed, else Lambda = 1
     logical :: surface = .false.      !! factors Gd and Gb differ from 1
+    logical :: consistent = .false.   !! each bond has Gd and Gb of its own, in `weights`
     logical :: thermal = .false.      !! some temperature change
     logical :: breaking = .false.     !! some bond can fail
     logical :: compression = .false.  !! some bonds break in compression too
@@ -48,6 +50,7 @@ module pd_force_model
     real(wp), allocatable :: scale(:)        !! of q, t and p of each slot, if some law has scales
     real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
+    type(bond_weights_type) :: weights       !! of the bonds, if consistent
     real(wp), allocatable :: expansion(:)    !! alpha dT of each slot [-], allocated if thermal
     real(wp), allocatable :: critical(:)     !! s_c of each slot, `never` or `no_fail`
     real(wp) :: least_critical = never       !! smallest s_c of all

@@ -47,6 +47,12 @@ contains
       state%Gd = bond_factor(xi/length, model%D(k, :), model%D(j, :))
       state%Gb = bond_factor(xi/length, model%S(k, :), model%S(j, :))
     end if
+    if (model%consistent) then
+      associate (place => model%weights%before(k) + i)
+        state%Gd = model%weights%Gd(place)
+        state%Gb = model%weights%Gb(place)
+      end associate
+    end if
     if (model%weighted) then
       call bond_factors_of(model, k, length, gb, gd)
       state%Gd = state%Gd*gd

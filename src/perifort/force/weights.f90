@@ -38,9 +38,12 @@ contains
       & call use_double(family)
     call prepare_blocks(family, model, workspace)
     ! without surface factors, members farther away than a block's own do not count
-    if (.not. (model%surface .or. allocated(model%scale))) family%class_of = &
-      & merge(int(model%material, i4), 0_i4, family%alive == 1_i1)
-    call find_kinds(family, workspace, first, uses)
+    if (model%consistent) then
+      family%class_of = model%weights%row
+    else if (.not. (model%surface .or. allocated(model%scale))) then
+      family%class_of = merge(int(model%material, i4), 0_i4, family%alive == 1_i1)
+    end if
+    call find_kinds(family, model%consistent, workspace, first, uses)
     order = most_used_first(uses)
     allocate (table(size(uses)), first_of_table(size(uses)), table_of(0:size(uses)))
     table_of = 0_i4
@@ -63,7 +66,7 @@ contains
       workspace%weights(b) = table_of(workspace%weights(b))
     end do
     workspace%table = table(:made)
-    call compare_surroundings(family, first_of_table, workspace)
+    call compare_surroundings(family, model%consistent, first_of_table, workspace)
     deallocate (family%class_of)  ! no longer needed
   end subroutine build_weights
 
@@ -85,25 +88,30 @@ contains
   end subroutine prepare_blocks
 
   !> Number the kinds of blocks by their surroundings, into `weights` of the workspace.
-  subroutine find_kinds(family, workspace, first, uses)
+  subroutine find_kinds(family, own, workspace, first, uses)
     type(lattice_family_type), intent(in) :: family
+    logical, intent(in) :: own  !! the classes of a block's own slots say all
     type(lattice_workspace_type), intent(inout) :: workspace
     integer(i8), allocatable, intent(out) :: first(:)  !! first slot of the first block of each kind
     integer, allocatable, intent(out) :: uses(:)       !! blocks of each kind
     type(lookup_type) :: kinds
     integer(i8), allocatable :: column(:)
     integer(i8) :: key
-    integer :: b, g, i, number
+    integer :: b, g, i, reach, number
     logical :: is_new
 
-    call column_keys(family, column)
+    if (own) then
+      column = int(family%class_of, i8)
+    else
+      call column_keys(family, column)
+    end if
     allocate (first(size(family%block)))
     allocate (uses(size(family%block)), source=0)
     do b = 1, size(family%block)
       g = grid_at(family, family%block(b))
       key = int(g, i8)
-      do i = -family%grids(g)%reach_cells, family%block_length - 1 &
-        & + family%grids(g)%reach_cells
+      reach = merge(0, family%grids(g)%reach_cells, own)
+      do i = -reach, family%block_length - 1 + reach
         key = mix(key, column(family%block(b) + i))
       end do
       call kinds%number_of(iand(key, family%key_bits), number, is_new)
@@ -145,24 +153,27 @@ contains
   !> A key of 64 bits hardly ever belongs to two kinds of blocks. Where it does, blocks that look
   !> another way than the one that their table was made for, by its `first` slot, make their weights
   !> in every pass.
-  subroutine compare_surroundings(family, first, workspace)
+  subroutine compare_surroundings(family, own, first, workspace)
     type(lattice_family_type), intent(in) :: family
+    logical, intent(in) :: own  !! the classes of a block's own slots say all
     integer(i8), intent(in) :: first(:)
     type(lattice_workspace_type), intent(inout) :: workspace
     integer :: b
 
-    !$omp parallel do schedule(static) default(none) shared(family, first, workspace) private(b)
+    !$omp parallel do schedule(static) default(none) private(b) &
+    !$omp shared(family, own, first, workspace)
     do b = 1, size(family%block)
       if (workspace%weights(b) == 0_i4) cycle
-      if (.not. alike_blocks(family, family%block(b), first(workspace%weights(b)))) &
+      if (.not. alike_blocks(family, own, family%block(b), first(workspace%weights(b)))) &
         & workspace%weights(b) = 0_i4
     end do
   end subroutine compare_surroundings
 
   !> Whether two blocks, by their first slots, and all slots within reach of them are of the same
   !> classes, and so have the same weights.
-  pure logical function alike_blocks(family, one, other)
+  pure logical function alike_blocks(family, own, one, other)
     type(lattice_family_type), intent(in) :: family
+    logical, intent(in) :: own  !! the slots of the blocks alone say all
     integer(i8), intent(in) :: one, other
     integer(i8) :: from, to
     integer :: g, m, my, mz, j, k
@@ -172,7 +183,7 @@ contains
     g = grid_at(family, one)
     if (grid_at(family, other) /= g) return
     associate (grid => family%grids(g))
-      m = grid%reach_cells
+      m = merge(0, grid%reach_cells, own)
       my = merge(m, 0, family%dim > 1)
       mz = merge(m, 0, family%dim > 2)
       do k = -mz, mz
@@ -265,9 +276,15 @@ contains
       !! with room for any block; those of this one on return
     real(wp) :: weight, n(family%dim), gb, gd
     integer(i8) :: k, j
+    integer(i8), allocatable :: place(:, :)
     integer :: i, o, l, m, length
 
     length = family%block_length
+    if (model%consistent) then
+      call find_places(family, model, first, place)
+    else
+      allocate (place(0, 0))
+    end if
     m = 0
     weights%n_forward = 0
     associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
@@ -302,6 +319,10 @@ contains
             weights%stretch(l, m) = weights%stretch(l, m)*gb
             if (model%dilatation) weights%dilatation(l, m) = weight*gd
           end if
+          if (model%consistent) then
+            weights%stretch(l, m) = weights%stretch(l, m)*model%weights%Gb(place(l, o))
+            if (model%dilatation) weights%dilatation(l, m) = weight*model%weights%Gd(place(l, o))
+          end if
           if (.not. model%surface) cycle
           weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
           if (.not. model%dilatation) cycle
@@ -317,6 +338,31 @@ contains
     if (model%dilatation) weights%single_dilatation(:, :m) = &
       & real(weights%dilatation(:, :m)/volume_unit(family), sp)
   end subroutine block_weights
+
+  !> Where the weights of a block's bonds stand (lane, offset): in the order of `bonds_of`.
+  pure subroutine find_places(family, model, first, place)
+    type(lattice_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    integer(i8), intent(in) :: first
+    integer(i8), allocatable, intent(out) :: place(:, :)
+    integer(i8) :: k, next
+    integer :: l, o
+
+    associate (grid => family%grids(grid_at(family, first)), alive => family%alive)
+      allocate (place(family%block_length, grid%n))
+      do l = 1, family%block_length
+        k = first + l - 1
+        place(l, :) = 0_i8
+        if (model%weights%row(k) == 0_i4) cycle
+        next = model%weights%before(int(k))
+        do o = 1, grid%n
+          if (alive(k + grid%shift(o)) == 0_i1) cycle
+          next = next + 1
+          place(l, o) = next
+        end do
+      end do
+    end associate
+  end subroutine find_places
 
   !> Give back the room of offsets that were left out, and of the precision that is not needed.
   pure subroutine trim_weights(weights)

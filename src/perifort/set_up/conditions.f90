@@ -14,6 +14,8 @@ module pd_set_up_conditions
   use pd_body_meshes, only: facet_areas, facet_mask, names_set, place_set_fault
   use pd_body_regions, only: region_mask, values_on
   use pd_body_shapes, only: inside
+  use pd_family_areas, only: behind_share, next_points, outermost_share
+  use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
     & vary_in_time
   use pd_motion_loads, only: load_type, add_part
@@ -159,13 +161,15 @@ contains
 
   !> Force densities of every `&load`: pressure, total force and body force of a group add up. An
   !> error is set if one holds no point.
-  subroutine loads_of_scene(scene, body, loads, error)
+  subroutine loads_of_scene(scene, body, family, loads, error)
     type(scene_type), intent(in) :: scene                  !! a checked scene
     type(body_type), intent(in) :: body                    !! its points, arranged in slots
+    class(family_type), intent(in) :: family               !! of the body, whole
     type(load_type), allocatable, intent(out) :: loads(:)  !! (loads) in the order of the groups
     type(error_type), allocatable, intent(out) :: error
     logical, allocatable :: chosen(:)
-    real(wp), allocatable :: pressed(:, :)
+    real(wp), allocatable :: pressed(:, :), part(:), whole(:)
+    real(wp) :: volume
     integer :: l, c
 
     allocate (loads(size(scene%loads)))
@@ -191,15 +195,17 @@ contains
             & group%region), 'expected a place that holds points of the bodies')
           return
         end if
+        volume = volume_of(body, load%slots)
+        call share_side(scene, body, family, group, chosen, load%slots, part)
+        whole = merge(1.0_wp, 0.0_wp, chosen(load%slots))
         allocate (load%density(size(load%slots), body%dim), source=0.0_wp)
         do c = 1, body%dim
-          if (is_set(group%body_force(c))) load%density(:, c) = group%body_force(c)
+          if (is_set(group%body_force(c))) load%density(:, c) = group%body_force(c)*whole
           if (is_set(group%force(c))) load%density(:, c) = load%density(:, c) &
-            & + group%force(c)/volume_of(body, load%slots)
+            & + part*(group%force(c)/volume)
         end do
         call by_side()
-        call load_by_expressions(scene, body, l, load, pressed, spread(1/volume_of(body, &
-          & load%slots), 1, size(load%slots)), error)
+        call load_by_expressions(scene, body, l, load, pressed, part*(1/volume), whole, error)
         if (allocated(error)) return
         load%curve = course(scene, group%ramp_time, group%times, group%values, timed_load(scene, &
           & group))
@@ -219,14 +225,52 @@ contains
         if (side == '') return
         axis = index('xyz', side(1:1))
         outward = merge(-1.0_wp, 1.0_wp, side(3:5) == 'min')
-        pressed(:, axis) = -outward/body%spacing(loads(l)%slots)
+        pressed(:, axis) = -part*(outward/body%spacing(loads(l)%slots))
         if (is_set(scene%loads(l)%pressure)) loads(l)%density(:, axis) = &
-          & loads(l)%density(:, axis) - scene%loads(l)%pressure*outward/body%spacing( &
-          & loads(l)%slots)
+          & loads(l)%density(:, axis) - part*(scene%loads(l)%pressure*outward/body%spacing( &
+          & loads(l)%slots))
       end associate
     end subroutine by_side
 
   end subroutine loads_of_scene
+
+  !> Add the points behind those of a side to a load where consistent weights take tractions by
+  !> extrapolation to the faces (doc/theory.md, 4), and say what part of its load each point has:
+  !> 1.5 at the side, -0.5 behind; 1 in all other cases.
+  subroutine share_side(scene, body, family, group, chosen, slots, part)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(load_group), intent(in) :: group
+    logical, intent(in) :: chosen(:)                     !! slots that the group names
+    integer(i4), allocatable, intent(inout) :: slots(:)  !! those in point order; gets more
+    real(wp), allocatable, intent(out) :: part(:)        !! of each of them then [-]
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: share(:)
+    integer :: i, k, axis, inward, next(-1:1, body%dim)
+
+    if (group%side == '' .or. scene%horizon%surface_correction /= 'consistent') then
+      allocate (part(size(slots)), source=1.0_wp)
+      return
+    end if
+    axis = index('xyz', group%side(1:1))
+    inward = merge(1, -1, group%side(3:5) == 'min')
+    allocate (share(body%n_slots), source=0.0_wp)
+    call allocate_bonds(family, bonds)
+    do i = 1, size(slots)
+      k = slots(i)
+      call family%bonds_of(k, bonds)
+      call next_points(body, bonds, k, next)
+      if (next(inward, axis) == 0) then
+        share(k) = share(k) + 1.0_wp
+        cycle
+      end if
+      share(k) = share(k) + outermost_share
+      share(next(inward, axis)) = share(next(inward, axis)) + behind_share
+    end do
+    slots = slots_where(body, abs(share) > 0.0_wp .or. chosen)
+    part = share(slots)
+  end subroutine share_side
 
   !> A load on facets of a mesh: pressure along their normals, a total force by their areas; both
   !> act on the points that share the areas. An error is set if these cannot be found.
@@ -253,7 +297,7 @@ contains
         if (is_set(group%force(c))) load%density(:, c) = group%force(c)*area
       end do
       if (is_set(group%pressure)) load%density = load%density + group%pressure*pressed
-      call load_by_expressions(scene, body, number, load, pressed, area, error)
+      call load_by_expressions(scene, body, number, load, pressed, area, 0*area + 1, error)
     end associate
   end subroutine facet_load
 
@@ -272,19 +316,21 @@ contains
 
   !> The parts of a load that are given by expressions. Those without t add to its densities. An
   !> error is set if a value is not finite.
-  subroutine load_by_expressions(scene, body, number, load, pressed, shared, error)
+  subroutine load_by_expressions(scene, body, number, load, pressed, shared, whole, &
+    & error)
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
     integer, intent(in) :: number            !! of the `&load`
     type(load_type), intent(inout) :: load   !! with its slots and its densities by numbers
     real(wp), intent(in) :: pressed(:, :)    !! (points, dim) density of a unit pressure [1/m]
     real(wp), intent(in) :: shared(:)        !! (points) density of a unit force [1/m3]
+    real(wp), intent(in) :: whole(:)         !! (points) 1 where a body force acts, else 0 [-]
     type(error_type), allocatable, intent(out) :: error
     integer :: c
 
-    associate (group => scene%loads(number), n => size(load%slots))
+    associate (group => scene%loads(number))
       do c = 1, body%dim
-        call add(group%body_force_text(c), 'body_force_'//xyz(c:c), c, spread(1.0_wp, 1, n))
+        call add(group%body_force_text(c), 'body_force_'//xyz(c:c), c, whole)
         call add(group%force_text(c), 'force_'//xyz(c:c), c, shared)
       end do
       if (group%pressure_text == '') return

@@ -41,6 +41,7 @@ contains
     real(wp), parameter :: per_list_point = 175.0_wp, per_list_bond = 1.6_wp  !! members, tables
     real(wp), parameter :: per_generic_point = 60.0_wp                  !! the same without tables
     real(wp), parameter :: per_exact_bond = 17.5_wp                     !! partial volumes of lists
+    real(wp), parameter :: per_weighted_bond = 35.0_wp                  !! weights of lists, tables
     real(wp), parameter :: per_weight = 16.0_wp                         !! tables of lattices
     real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded
     real(wp), parameter :: per_breaking = 30.0_wp                       !! limits and damage
@@ -72,6 +73,8 @@ contains
       bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
         & + per_list_bond*members)
       if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members
+      if (scene%horizon%surface_correction == 'consistent') &
+        & bytes = bytes + points*per_weighted_bond*members
     else
       ! blocks near the surfaces have weights of their own
       kinds = min(points/block, (2*min(ratio, 1.0e4_wp) + 1)**dim)

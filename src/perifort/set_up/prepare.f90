@@ -25,6 +25,7 @@ module pd_set_up_prepare
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type
   use pd_set_up_bounds, only: check_bounds
+  use pd_set_up_consistent_rules, only: check_consistent, weigh_bonds
   use pd_set_up_conditions, only: motions_of_scene, loads_of_scene, heating_of_scene, &
     & in_no_fail_zones
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
@@ -118,9 +119,11 @@ contains
         & system%model%expansion, system%heating)
       call check_laws(scene, system, error)
       if (allocated(error)) return
+      call check_consistent(scene, system, error)
+      if (allocated(error)) return
       call motions_of_scene(scene, system%body, system%motions, error)
       if (allocated(error)) return
-      call loads_of_scene(scene, system%body, loads, error)
+      call loads_of_scene(scene, system%body, system%family, loads, error)
       if (allocated(error)) return
       call add_loads_to(system%terms, loads)
       call gravity_of_scene(scene, system%body, materials, loads)
@@ -138,6 +141,10 @@ contains
         & system%model%D, system%model%S, laws)
       if (system%model%surface) call leave_uncorrected(scene, system%motions, system%model%D, &
         & system%model%S)
+      if (scene%horizon%surface_correction == 'consistent') then
+        call weigh_bonds(scene, system, materials, error)
+        if (allocated(error)) return
+      end if
       call find_weakest(system%family, system%model)
       call begin_laws(system%body, system%family, system%model, system%workspace%generic)
       call finish_family(system)

@@ -278,6 +278,11 @@ contains
             Gd = bond_factor(n, model%D(k, :), model%D(bonds%j(i), :))
             Gb = bond_factor(n, model%S(k, :), model%S(bonds%j(i), :))
           end if
+          if (model%consistent) then
+            Gd = model%weights%Gd(model%weights%before(k) + i)
+            Gb = model%weights%Gb(model%weights%before(k) + i)
+            if (.not. Gb > 0.0_wp) cycle
+          end if
           if (model%weighted) then
             call bond_factors_of(model, k, bonds%length(i), stretch_factor, dilatation_factor)
             Gd = dilatation_factor*merge(Gd, 1.0_wp, model%surface)

@@ -60,7 +60,9 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          if (model%weighted) then
+          if (model%consistent) then
+            inverse(k) = inverse(k) + bond_size(model, k, i, .true.)*bonds%weight(i)/bonds%length(i)
+          else if (model%weighted) then
             inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
               & *law_factor(model, k, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
           else
@@ -81,6 +83,12 @@ contains
       do i = 1, bonds%n
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
+        if (model%consistent) then
+          bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j))*bond_size(model, k, i, .false.) &
+            & + (inverse(k) + inverse(j))*bond_size(model, k, i, .true.)) &
+            & *bonds%weight(i)/bonds%length(i)
+          cycle
+        end if
         if (.not. model%weighted) then
           bound(k) = bound(k) + ((model%materials(model%material(k))%q &
             & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
@@ -107,6 +115,17 @@ contains
     surface_factor = 1.0_wp
     if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :)))
   end function surface_factor
+
+  !> The size of the consistent weight of the `i`-th bond of slot `k`.
+  pure real(wp) function bond_size(model, k, i, of_dilatation) result(weight)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, i
+    logical, intent(in) :: of_dilatation
+
+    associate (place => model%weights%before(k) + i)
+      weight = abs(merge(model%weights%Gd(place), model%weights%Gb(place), of_dilatation))
+    end associate
+  end function bond_size
 
   !> The size of a law's factor of a bond: that of the dilatation or of the stretch.
   pure real(wp) function law_factor(model, k, length, of_dilatation) result(factor)

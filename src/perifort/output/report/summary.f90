@@ -153,6 +153,12 @@ contains
       end if
       if (scene%horizon%surface_correction == 'energy' .and. .not. model%surface) then
         text = text//line('surfaces', 'not corrected: the bond law needs no correction')
+      else if (model%consistent) then
+        associate (b => model%weights%Gb, d => model%weights%Gd)
+          text = text//line('surfaces', 'consistent weights of the bonds: Gb from '// &
+            & to_text(minval(b), 3)//' to '//to_text(maxval(b), 3)//', Gd from '// &
+            & to_text(minval(d), 3)//' to '//to_text(maxval(d), 3))
+        end associate
       else
         text = text//line('surfaces', trim(merge('corrected by energy', 'not corrected      ', &
           & model%surface)))
@@ -280,7 +286,7 @@ contains
     if (system%model%breaking) reals = reals + 2  ! damage, s_c
     if (system%model%surface) reals = reals + 2*system%body%dim
     bytes = int(system%body%n_slots, i8)*(8*reals + 20 + system%body%dim) &
-      & + system%family%bytes() + system%workspace%bytes()
+      & + system%family%bytes() + system%workspace%bytes() + system%model%weights%bytes()
   end function memory_of
 
 end module pd_output_report_summary

@@ -13,7 +13,7 @@ module pd_scene_groups_horizon
     real(wp) :: ratio = 3.015_wp                           !! delta over the largest spacing [-]
     real(wp) :: length = unset                             !! delta [m], instead of ratio
     character(name_length) :: volume_correction = 'linear' !! 'linear_extended', 'exact', 'none'
-    character(name_length) :: surface_correction = 'energy'!! 'none'
+    character(name_length) :: surface_correction = 'energy'!! 'consistent', 'none'
     character(name_length) :: dilatation = ''              !! 'unprojected': Lambda = 1;
                                                            !! 'projected': as printed;
                                                            !! '' = by &scene defaults
@@ -36,7 +36,8 @@ contains
       & 'horizon cuts (7.2)', allowed=[character(15) :: 'linear', 'linear_extended', 'exact', &
       & 'none'])
     call keys%key('surface_correction', group%surface_correction, 'correction of points with '// &
-      & 'incomplete families (7.7)', allowed=[character(6) :: 'energy', 'none'])
+      & 'incomplete families: energy (7.7); consistent: weights of bonds, exact under uniform '// &
+      & 'strain', allowed=[character(10) :: 'energy', 'consistent', 'none'])
     call keys%key('dilatation', group%dilatation, 'unprojected: Lambda = 1, valid '// &
       & 'for any rotation; projected: Lambda as in the book, for small rotations (default '// &
       & 'of 0.1)', &

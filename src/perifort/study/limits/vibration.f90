@@ -85,6 +85,12 @@ contains
     twin%model%surface = system%model%surface
     if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
       & twin%model%S, laws)
+    if (system%model%consistent) then
+      if (any(twin%body%point /= system%body%point)) &
+        & call internal_fault('a twin in another order')
+      twin%model%consistent = .true.
+      twin%model%weights = system%model%weights
+    end if
     call begin_laws(twin%body, twin%family, twin%model, twin%workspace%generic)
     select type (family => twin%family)
     type is (lattice_family_type)

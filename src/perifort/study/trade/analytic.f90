@@ -372,6 +372,11 @@ contains
       & horizon_of(scene, form%spacing))
     m = int(reach(rule, form%spacing, 1)/form%spacing)
     fraction = [(volume_correction(rule, [j*form%spacing], j*form%spacing, form%spacing), j=1, m)]
+    if (scene%horizon%surface_correction == 'consistent') then
+      reason = "the closed form 'chain_wave' does not fit: it knows no consistent weights; "// &
+        & "give surface_correction = 'energy' or 'none'"
+      return
+    end if
     ! away from the ends the correction by energy makes the sum over a family exact
     factor = 1.0_wp
     if (scene%horizon%surface_correction == 'energy') factor = (rule%delta/form%spacing)**2 &

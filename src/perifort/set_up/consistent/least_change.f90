@@ -1,0 +1,187 @@
+!> The least change of weights from 1 that fulfils linear conditions, with bounds on the weights.
+!>
+!> Minimise sum (G - 1)^2 under B G = r and low <= G: G - 1 = max(low - 1, B^T z), and the
+!> multipliers z are the zero of r - B G(z), which is the gradient of a concave function of z.
+!> Newton's method finds it: each step solves a system with the weights that are not at the bound,
+!> by conjugate gradients with the blocks of the classes as preconditioner. Without a bound one step
+!> is enough.
+module pd_set_up_consistent_least_change
+  use pd_base_kinds, only: wp, i8
+  use pd_set_up_consistent_conditions, only: block_of, conditions_type, spread_over, sums_of
+  implicit none (type, external)
+  private
+  public :: least_change, unbounded
+
+  real(wp), parameter :: unbounded = -1.0e30_wp  !! the bound that is none
+  real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
+  integer, parameter :: most_newton = 60
+  integer, parameter :: patience = 8  !! steps in which the error must fall to half
+  integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
+  integer, parameter :: most_bounded = 400          !! of a step with such weights
+  integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
+
+contains
+
+  !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12; otherwise no weights above
+  !> the bound do, or none were found.
+  subroutine least_change(conditions, low, G, residual, iterations, found)
+    type(conditions_type), intent(in) :: conditions
+    real(wp), intent(in) :: low                  !! smallest allowed weight, or `unbounded` [-]
+    real(wp), allocatable, intent(out) :: G(:)   !! (unknowns) weights [-]
+    real(wp), intent(out) :: residual            !! largest error of a condition [-]
+    integer, intent(out) :: iterations           !! of the conjugate gradients
+    logical, intent(out) :: found
+    real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :)
+    logical, allocatable :: free(:)
+    real(wp) :: value, before, slope, length, history(most_newton)
+    integer :: newton, halving
+
+    associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
+      allocate (z(rows, classes), r(rows, classes), step(rows, classes), source=0.0_wp)
+      allocate (t(n), change(n), source=0.0_wp)
+      allocate (G(n), free(n))
+    end associate
+    iterations = 0
+    found = .false.
+    call weigh(conditions, low, z, t, G, r, before)
+    do newton = 1, most_newton
+      residual = maxval(abs(r))
+      found = residual <= tolerance
+      if (found) return
+      ! without a solution the multipliers grow and the error stays
+      history(newton) = residual
+      if (newton > patience) then
+        if (residual > 0.5_wp*history(newton - patience)) return
+      end if
+      if (low > unbounded .and. iterations > most_of_bound) return
+      free = t + 1 > low
+      call solve(conditions, free, r, step, iterations)
+      slope = sum(r*step)
+      length = 1.0_wp
+      do halving = 1, 30
+        tried = z + length*step
+        call weigh(conditions, low, tried, t, G, r, value)
+        if (value <= before - 1.0e-4_wp*length*slope + 1.0e-13_wp*abs(before)) exit
+        if (maxval(abs(r)) <= 0.5_wp*residual) exit
+        length = length/2
+      end do
+      z = tried
+      before = value
+    end do
+    residual = maxval(abs(r))
+    found = residual <= tolerance
+  end subroutine least_change
+
+  !> Weights of multipliers z, what the conditions miss, and the function that is minimised in z.
+  subroutine weigh(conditions, low, z, t, G, r, value)
+    type(conditions_type), intent(in) :: conditions
+    real(wp), intent(in) :: low, z(:, :)
+    real(wp), intent(inout) :: t(:), G(:), r(:, :)
+    real(wp), intent(out) :: value
+    real(wp), allocatable :: of_one(:, :)
+
+    call spread_over(conditions, z, t)
+    G = max(low, 1 + t)
+    allocate (of_one, mold=r)
+    call sums_of(conditions, spread(1.0_wp, 1, size(G)), of_one)
+    call sums_of(conditions, G, r)
+    r = conditions%right - r
+    value = sum(merge(t**2/2, (low - 1)*t - (low - 1)**2/2, 1 + t > low)) &
+      & - sum((conditions%right - of_one)*z)
+  end subroutine weigh
+
+  !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
+  !> and r in its range but for what the bound cuts off.
+  subroutine solve(conditions, free, r, step, iterations)
+    type(conditions_type), intent(in) :: conditions
+    logical, intent(in) :: free(:)
+    real(wp), intent(in) :: r(:, :)
+    real(wp), intent(inout) :: step(:, :)
+    integer, intent(inout) :: iterations
+    real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
+    real(wp) :: rho, rho_before, curvature, target
+    integer :: i
+
+    call factorize(conditions, free, factor)
+    allocate (rest, source=r)
+    allocate (w, p, product, mold=r)
+    allocate (y(conditions%unknowns))
+    step = 0.0_wp
+    p = 0.0_wp
+    rho_before = 1.0_wp
+    ! of a bounded solve the free unknowns change from step to step
+    target = 0.02_wp*tolerance
+    if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
+    do i = 1, merge(most_iterations, most_bounded, all(free))
+      call precondition(factor, rest, w)
+      rho = sum(rest*w)
+      if (.not. rho > 0.0_wp) exit
+      p = w + merge(rho/rho_before, 0.0_wp, i > 1)*p
+      call spread_over(conditions, p, y)
+      where (.not. free) y = 0.0_wp
+      call sums_of(conditions, y, product)
+      curvature = sum(p*product)
+      if (.not. curvature > 0.0_wp) exit
+      step = step + rho/curvature*p
+      rest = rest - rho/curvature*product
+      rho_before = rho
+      iterations = iterations + 1
+      if (maxval(abs(rest)) <= target) exit
+    end do
+  end subroutine solve
+
+  !> Cholesky factors of the classes' blocks. Rows that follow from others of the class, as those
+  !> of a family with a centre of symmetry, are left out by a large pivot.
+  subroutine factorize(conditions, free, factor)
+    type(conditions_type), intent(in) :: conditions
+    logical, intent(in) :: free(:)
+    real(wp), allocatable, intent(out) :: factor(:, :, :)
+    real(wp), parameter :: part = 1.0e-9_wp
+    real(wp) :: pivot, largest
+    integer :: c, i, j
+
+    allocate (factor(conditions%rows, conditions%rows, conditions%classes))
+    !$omp parallel do schedule(dynamic, 16) default(none) private(c) &
+    !$omp shared(conditions, free, factor)
+    do c = 1, conditions%classes
+      call block_of(conditions, c, free, factor(:, :, c))
+    end do
+    largest = 0.0_wp
+    do i = 1, conditions%rows
+      largest = max(largest, maxval(factor(i, i, :)))
+    end do
+    !$omp parallel do schedule(static) default(none) shared(conditions, factor, largest) &
+    !$omp private(c, i, j, pivot)
+    do c = 1, conditions%classes
+      associate (f => factor(:, :, c))
+        do j = 1, conditions%rows
+          pivot = f(j, j) - sum(f(j, :j - 1)**2)
+          if (pivot <= part*largest) pivot = largest/part
+          f(j, j) = sqrt(pivot)
+          do i = j + 1, conditions%rows
+            f(i, j) = (f(i, j) - dot_product(f(i, :j - 1), f(j, :j - 1)))/f(j, j)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine factorize
+
+  !> The blocks' inverse times r.
+  subroutine precondition(factor, r, w)
+    real(wp), intent(in) :: factor(:, :, :), r(:, :)
+    real(wp), intent(inout) :: w(:, :)
+    integer :: c, i, n
+
+    n = size(r, 1)
+    !$omp parallel do schedule(static) default(none) shared(factor, r, w, n) private(c, i)
+    do c = 1, size(r, 2)
+      do i = 1, n
+        w(i, c) = (r(i, c) - dot_product(factor(i, :i - 1, c), w(:i - 1, c)))/factor(i, i, c)
+      end do
+      do i = n, 1, -1
+        w(i, c) = (w(i, c) - dot_product(factor(i + 1:, i, c), w(i + 1:, c)))/factor(i, i, c)
+      end do
+    end do
+  end subroutine precondition
+
+end module pd_set_up_consistent_least_change

@@ -1,0 +1,104 @@
+!> What a scene with consistent weights can have, and the weights of its bonds.
+module pd_set_up_consistent_rules
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: to_text
+  use pd_law_material, only: material_type
+  use pd_motion_system, only: system_type
+  use pd_scene_content_rules, only: place_fault, scene_fault
+  use pd_scene_content_types, only: is_set, scene_type
+  use pd_set_up_consistent_weights, only: consistent_weights, solution_type
+  implicit none (type, external)
+  private
+  public :: check_consistent, weigh_bonds
+
+  real(wp), parameter :: same = 1.0e-12_wp  !! part of a modulus that may differ
+
+contains
+
+  !> An error is set if a scene with consistent weights has what they do not serve.
+  subroutine check_consistent(scene, system, error)
+    type(scene_type), intent(in) :: scene    !! a checked scene
+    type(system_type), intent(in) :: system  !! with its body, family and model
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    if (scene%horizon%surface_correction /= 'consistent') return
+    do i = 1, size(scene%bodies)
+      if (scene%bodies(i)%file == '') cycle
+      call refuse('body', i, 'file', 'a cloud', 'the surface areas of its points are not known')
+      return
+    end do
+    do i = 1, size(system%model%laws)
+      associate (law => system%model%laws(i)%law)
+        if (law%corrected .and. .not. (system%model%generic .or. system%model%weighted)) cycle
+      end associate
+      call refuse('material', i, 'model', 'this bond law', &
+        & "its weights are known for the chapter's laws with influence = 'inverse'")
+      return
+    end do
+    do i = 2, size(scene%materials)
+      associate (one => system%model%materials(1), other => system%model%materials(i))
+        if (abs(one%shear_modulus - other%shear_modulus) <= same*one%shear_modulus &
+          & .and. abs(one%bulk_modulus - other%bulk_modulus) <= same*one%bulk_modulus) cycle
+      end associate
+      call refuse('material', i, '', 'materials of different stiffness', &
+        & 'weights at their interface may leave a body that gives way')
+      return
+    end do
+    if (scene%header%precision == 'mixed') then
+      call refuse('scene', 1, 'precision', "precision = 'mixed'", &
+        & 'its conditions hold to rounding in double precision')
+      return
+    end if
+    do i = 1, size(scene%boundaries)
+      if (.not. scene%boundaries(i)%absorbing) cycle
+      call refuse('boundary', i, 'absorbing', 'an absorbing boundary', &
+        & 'its dashpots are tuned to uncorrected layers')
+      return
+    end do
+    do i = 1, size(scene%loads)
+      if (scene%loads(i)%side == '' .or. .not. any(is_set(scene%loads(i)%stiffness))) cycle
+      call refuse('load', i, 'stiffness', 'springs at a side', &
+        & 'tractions act on the second row, too, with the other sign')
+      return
+    end do
+
+  contains
+
+    subroutine refuse(group, number, key, what, why)
+      character(*), intent(in) :: group, key, what, why
+      integer, intent(in) :: number
+      call scene_fault(error, scene, group, number, key, &
+        & "surface_correction = 'consistent' does not serve "//what, why// &
+        & "; give surface_correction = 'energy' or 'none'")
+    end subroutine refuse
+
+  end subroutine check_consistent
+
+  !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
+  !> can break have negative ones.
+  subroutine weigh_bonds(scene, system, materials, error)
+    type(scene_type), intent(in) :: scene               !! with consistent weights
+    type(system_type), intent(inout) :: system          !! with body, whole family and model
+    type(material_type), intent(in) :: materials(:)     !! (any number) by the points' numbers
+    type(error_type), allocatable, intent(out) :: error
+    type(solution_type) :: stretch, dilatation
+    real(wp) :: least
+
+    call consistent_weights(system%body, system%family, materials, system%model%weights, stretch, &
+      & dilatation, error)
+    call place_fault(error, scene, 'horizon', 1, 'surface_correction')
+    if (allocated(error)) return
+    system%model%consistent = .true.
+    if (.not. (system%model%breaking .or. size(scene%cracks) > 0)) return
+    least = stretch%least
+    if (system%model%dilatation) least = min(least, dilatation%least)
+    if (least < 0.0_wp) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
+      & "surface_correction = 'consistent' does not serve fracture here: the smallest weight "// &
+      & 'of a bond is '//to_text(least, 3)//', and a body would gain energy when such a bond '// &
+      & 'breaks', &
+      & "give surface_correction = 'energy' or 'none'")
+  end subroutine weigh_bonds
+
+end module pd_set_up_consistent_rules

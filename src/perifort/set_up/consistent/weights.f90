@@ -1,0 +1,178 @@
+!> Consistent weights of bonds (doc/theory.md, 4): under every uniform strain each point is in
+!> equilibrium with classical tractions on its surface area, and its dilatation is exact.
+module pd_set_up_consistent_weights
+  use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
+  use pd_family_areas, only: area_vectors
+  use pd_family_bond_weights, only: bond_weights_type
+  use pd_family_family, only: family_type
+  use pd_law_material, only: material_type
+  use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
+    & stretch_conditions
+  use pd_set_up_consistent_groups, only: find_groups, groups_type, spread_weights
+  use pd_set_up_consistent_least_change, only: least_change, unbounded
+  implicit none (type, external)
+  private
+  public :: consistent_weights, weights_of_areas, solution_type
+
+  !> How one kind of weights was found.
+  type :: solution_type
+    real(wp) :: bound = unbounded     !! smallest weight that was allowed [-]
+    real(wp) :: least = 1.0_wp        !! smallest weight [-]
+    real(wp) :: greatest = 1.0_wp     !! [-]
+    real(wp) :: residual = 0.0_wp     !! largest error of a condition [-]
+    integer :: unknowns = 0           !! different weights
+    integer :: iterations = 0         !! of conjugate gradients, in all
+  end type solution_type
+
+  !> Bounds that are tried, one after another; the last is none. Bars and plates have weights Gb of
+  !> 0.05 at least, blocks none above 0. Of Gd there are none above 0 in the plane either, and those
+  !> that are not negative are far from 1.
+  real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, unbounded], &
+    & bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
+
+contains
+
+  !> Weights of the bonds of lattices. An error is set if a point has no second one behind it, or if
+  !> no weights fulfil the conditions.
+  subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error)
+    type(body_type), intent(in) :: body              !! all on lattices, in the family's slots
+    class(family_type), intent(in) :: family         !! whole: no bond cut
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch      !! how Gb was found
+    type(solution_type), intent(out) :: dilatation   !! how Gd was found
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :)
+    integer :: alone
+
+    call area_vectors(body, family, mu_of(materials, body%dim), of_stretch, alone)
+    if (alone > 0) then
+      call fail(error, "surface_correction = 'consistent' needs a second point behind each "// &
+        & 'surface: point '//to_text(int(body%point(alone)))//' has no neighbour on either '// &
+        & 'side along an axis; lower the dimension, use more points across, or another '// &
+        & 'correction', &
+        & group='horizon', number=1)
+      return
+    end if
+    call area_vectors(body, family, a_of(materials), of_dilatation, alone)
+    call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., .true., &
+      & weights, stretch, dilatation, error)
+  end subroutine consistent_weights
+
+  !> Weights for given surface areas. An error is set if no weights fulfil the conditions. Bonds in
+  !> like surroundings have one weight; where that leaves no solution, surroundings are looked at
+  !> farther, and in the end each bond has a weight of its own.
+  subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, alone, bounded, &
+    & weights, stretch, dilatation, error)
+    type(body_type), intent(in) :: body              !! arranged in the slots of the family
+    class(family_type), intent(in) :: family         !! whole: no bond cut
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
+    real(wp), intent(in) :: of_stretch(:, :)
+      !! (n_slots, dim) mu x outward area, summed over regions; in 1D E/3 x cross section [N]
+    real(wp), intent(in) :: of_dilatation(:, :)
+      !! (n_slots, dim) a over the largest a x area, summed over regions [m2]
+    logical, intent(in) :: alone    !! each bond has a weight of its own, however alike they are
+    logical, intent(in) :: bounded  !! weights shall be positive, if that is possible
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch      !! how Gb was found
+    type(solution_type), intent(out) :: dilatation   !! how Gd was found
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: farthest = 3
+    integer :: reach
+
+    ! in space a second horizon would give ten times the unknowns for weights hardly nearer to 1
+    reach = merge(1, 2, body%dim == 3)
+    if (alone) reach = 0
+    do
+      call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
+        & weights, stretch, dilatation, error)
+      if (reach == 0 .or. .not. allocated(error)) return
+      reach = merge(0, reach + 1, reach == farthest)
+    end do
+  end subroutine weights_of_areas
+
+  !> Weights where bonds have one weight if all looks alike within `reach` horizons. An error is set
+  !> if none fulfil the conditions.
+  subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
+    & weights, stretch, dilatation, error)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)
+    real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
+    integer, intent(in) :: reach
+    logical, intent(in) :: bounded
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch, dilatation
+    type(error_type), allocatable, intent(out) :: error
+    type(groups_type) :: groups
+    type(conditions_type) :: conditions
+    real(wp), allocatable :: Gb(:), Gd(:)
+    real(wp) :: scale
+
+    scale = maxval(abs(of_dilatation))
+    if (.not. scale > 0.0_wp) scale = 1.0_wp
+    call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
+      & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
+    if (allocated(error)) return
+    call stretch_conditions(body, family, materials, groups, of_stretch, conditions)
+    call solve(conditions, bounds_of_stretch(merge(2, 1, body%dim == 3):), bounded, 'stretch', &
+      & Gb, stretch, error)
+    if (allocated(error)) return
+    call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
+      & conditions)
+    call solve(conditions, bounds_of_dilatation, bounded, 'dilatation', Gd, dilatation, error)
+    if (allocated(error)) return
+    call spread_weights(body, family, groups, Gb, Gd, weights)
+  end subroutine weights_at_reach
+
+  !> The least change within the first bounds that allow one.
+  subroutine solve(conditions, bounds, bounded, what, G, solution, error)
+    type(conditions_type), intent(in) :: conditions
+    real(wp), intent(in) :: bounds(:)
+    logical, intent(in) :: bounded
+    character(*), intent(in) :: what
+    real(wp), allocatable, intent(out) :: G(:)
+    type(solution_type), intent(out) :: solution
+    type(error_type), allocatable, intent(out) :: error
+    integer :: b, iterations
+    logical :: found
+
+    found = .false.
+    solution%unknowns = conditions%unknowns
+    do b = merge(1, size(bounds), bounded), size(bounds)
+      solution%bound = bounds(b)
+      call least_change(conditions, bounds(b), G, solution%residual, iterations, found)
+      solution%iterations = solution%iterations + iterations
+      if (found) exit
+    end do
+    solution%least = minval(G)
+    solution%greatest = maxval(G)
+    if (found) return
+    call fail(error, "surface_correction = 'consistent' finds no weights of the "//what// &
+      & ' for these points: uniform strains would leave forces of '// &
+      & to_text(solution%residual, 2)//' of those of the bonds; use another correction', &
+      & group='horizon', number=1)
+  end subroutine solve
+
+  !> The shear modulus that the stretches alone give; in 1D a third of Young's modulus.
+  pure function mu_of(materials, dim) result(mu)
+    type(material_type), intent(in) :: materials(:)
+    integer, intent(in) :: dim
+    real(wp) :: mu(size(materials))
+    mu = materials%shear_modulus
+    if (dim == 1) mu = 2*(materials%uniaxial_energy - materials%a)/3
+  end function mu_of
+
+  !> a of each material over the largest; 1 where all are 0: only the weights' form counts then.
+  pure function a_of(materials) result(a)
+    type(material_type), intent(in) :: materials(:)
+    real(wp) :: a(size(materials))
+    a = materials%a
+    if (all(abs(a) <= 0.0_wp)) a = 1.0_wp
+    a = a/maxval(abs(a))
+  end function a_of
+
+end module pd_set_up_consistent_weights

@@ -1,0 +1,736 @@
+!> Consistent weights of bonds: surface areas, the weights of an independent program, the classical
+!> answer to uniform strains, loads and held layers, and the order of the error in bending.
+module test_set_up_consistent_weights
+  use pd_base_kinds, only: wp, i1
+  use pd_base_error, only: fault_type => error_type
+  use pd_body_body, only: allocate_points, body_type
+  use pd_family_areas, only: area_vectors
+  use pd_family_list, only: list_family_type, new_list_family
+  use pd_family_volume, only: volume_linear, volume_rule_type
+  use pd_force_forces, only: energy_pass, internal_force
+  use pd_force_model, only: model_type, new_model, options_of
+  use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
+  use pd_law_material, only: material_type, new_material
+  use pd_motion_system, only: system_type
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_consistent_weights, only: solution_type, weights_of_areas
+  use pd_set_up_move, only: move
+  use pd_set_up_prepare, only: prepare, set_up_type
+  use comparisons, only: expect_close, max_abs
+  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
+  use bodies, only: at_point, box_scene, diary_type, expect, expect_true, noise, ready, &
+    & ready_alone, rotation_matrix, text_of, youngs_modulus
+  implicit none (type, external)
+  private
+  public :: collect_set_up_consistent_weights
+
+  real(wp), parameter :: spacing = 1.0e-2_wp
+  real(wp), parameter :: zeta = 1.0e-11_wp  !! strain: its square is below what is compared
+  real(wp), parameter :: tension = zeta*youngs_modulus  !! of loads [Pa]
+
+contains
+
+  subroutine collect_set_up_consistent_weights(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('surface areas of bodies with corners and holes', test_areas), &
+      & new_unittest('the weights of an independent program', test_independent), &
+      & new_unittest('points that look alike have the same weights in bodies of any size', &
+      & test_alike), &
+      & new_unittest('uniform strains are in equilibrium with classical tractions', &
+      & test_uniform), &
+      & new_unittest('a rotated strip of points without a lattice', test_clouds), &
+      & new_unittest('loads on sides strain a body uniformly', test_loads), &
+      & new_unittest('held layers strain a body uniformly', test_layers), &
+      & new_unittest('long: the error in bending is of second order', test_bending), &
+      & new_unittest('forces have no resultant and follow from the energy', test_conservation), &
+      & new_unittest('an explicit run keeps its energy; the step beside that by energy', &
+      & test_explicit), &
+      & new_unittest('what consistent weights do not serve is refused', test_refused)]
+  end subroutine collect_set_up_consistent_weights
+
+  !> A scene of a name: bar, plate, block, L, plate with a hole.
+  subroutine scene_of(name, poissons_ratio, scene)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: poissons_ratio
+    type(scene_type), intent(out) :: scene
+
+    select case (name)
+    case ('bar')
+      call box_scene([20], spacing, poissons_ratio, scene)
+    case ('block')
+      call box_scene([10, 6, 6], spacing, poissons_ratio, scene)
+    case default
+      call box_scene([20, 16], spacing, poissons_ratio, scene)
+      if (name /= 'plate') then
+        deallocate (scene%removed)
+        allocate (scene%removed(1))
+      end if
+      if (name == 'L') then
+        scene%removed(1)%shape = 'box'
+        scene%removed(1)%lower(:2) = [12.0_wp, 8.0_wp]*spacing
+      else if (name == 'hole') then
+        scene%removed(1)%shape = 'cylinder'
+        scene%removed(1)%centre(:2) = [10.0_wp, 8.0_wp]*spacing
+        scene%removed(1)%radius = 3.2_wp*spacing
+      end if
+    end select
+    scene%horizon%surface_correction = 'consistent'
+  end subroutine scene_of
+
+  !> Areas sum to nothing, and with the positions to the volume; on a face they are 1.5 and -0.5.
+  subroutine test_areas(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(5), parameter :: names(*) = [character(5) :: 'bar', 'plate', 'block', 'L', 'hole']
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: area(:, :), moment(:, :)
+    integer :: i, c, d, k, alone
+
+    do i = 1, size(names)
+      call scene_of(trim(names(i)), 0.3_wp, scene)
+      scene%horizon%surface_correction = 'none'
+      call ready(scene, set_up, error)
+      if (allocated(error)) return
+      associate (body => set_up%system%body)
+        call area_vectors(body, set_up%system%family, [1.0_wp], area, alone)
+        call expect_true(error, alone == 0, 'a point alone: '//names(i))
+        allocate (moment(body%dim, body%dim))
+        do c = 1, body%dim
+          call expect(error, sum(area(:, c)), 0.0_wp, 1.0e-12_wp*sum(abs(area)), &
+            & 'sum of areas: '//names(i))
+          do d = 1, body%dim
+            moment(c, d) = sum(area(:, c)*body%x(:, d))
+            if (c == d) moment(c, d) = moment(c, d) - sum(body%volume)
+          end do
+        end do
+        call expect_close(error, moment, 0.0_wp, 1.0e-12_wp*sum(body%volume), &
+          & 'areas and positions: '//names(i))
+        deallocate (moment)
+        if (names(i) /= 'plate') cycle
+        ! left edge, in its middle, and the point behind: thickness 2 mm
+        k = at_point(body, [0.5_wp, 8.5_wp]*spacing)
+        call expect_close(error, area(k, :), [-1.5_wp, 0.0_wp]*spacing*2.0e-3_wp, 1.0e-18_wp, &
+          & 'at a face')
+        k = at_point(body, [1.5_wp, 8.5_wp]*spacing)
+        call expect_close(error, area(k, :), [0.5_wp, 0.0_wp]*spacing*2.0e-3_wp, 1.0e-18_wp, &
+          & 'behind a face')
+      end associate
+    end do
+  end subroutine test_areas
+
+  !> Weights of single bonds without bounds, as LSQR of SciPy finds them for these bodies: largest,
+  !> smallest and sum of squares, over ordered bonds. Its tolerance was 1e-12 of the residual, the
+  !> weights agree to 1e-9.
+  subroutine test_independent(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: found(6, 2) = reshape([ &
+      & -0.669462668235874_wp, 7.3110466186414484_wp, 6059.060383612568_wp, &
+      & -3.510026950283696_wp, 6.63937854141627_wp, 8445.548031350554_wp, &
+      & -3.3884146943854807_wp, 14.546227312731396_wp, 108118.69381696152_wp, &
+      & -5.741731445797753_wp, 13.754668189519075_wp, 175464.9697849915_wp], [6, 2])
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    integer :: i, family
+
+    do i = 1, 2
+      do family = 1, 2
+        if (i == 1) call box_scene([20, 8], spacing, 0.3_wp, scene)
+        if (i == 2) call box_scene([10, 6, 6], spacing, 0.3_wp, scene)
+        if (family == 2) scene%horizon%family = 'list'
+        call ready(scene, set_up, error)
+        if (allocated(error)) return
+        call compare(set_up%system, found(:, i))
+        if (allocated(error)) return
+      end do
+    end do
+
+  contains
+
+    subroutine compare(system, expected)
+      type(system_type), intent(inout) :: system
+      real(wp), intent(in) :: expected(:)
+      type(solution_type) :: b, d
+      type(fault_type), allocatable :: fault
+      real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :)
+      integer :: alone
+
+      associate (m => system%model%materials, weights => system%model%weights)
+        call area_vectors(system%body, system%family, m%shear_modulus, of_stretch, alone)
+        call area_vectors(system%body, system%family, [sign(1.0_wp, m(1)%a)], of_dilatation, alone)
+        call weights_of_areas(system%body, system%family, m, of_stretch, of_dilatation, .true., &
+          & .false., weights, b, d, fault)
+        if (allocated(fault)) then
+          call test_failed(error, fault%message)
+          return
+        end if
+        call expect_close(error, [minval(weights%Gb), maxval(weights%Gb), &
+          & sum(weights%Gb**2)/2, minval(weights%Gd), maxval(weights%Gd), &
+          & sum(weights%Gd**2)/2]/expected, 1.0_wp, 1.0e-8_wp, 'weights over those expected')
+      end associate
+    end subroutine compare
+
+  end subroutine test_independent
+
+  !> A wide plate and a wider one need the same weights, on lattices and on lists. Inside, bonds of
+  !> one length class have one weight: what is there is symmetric.
+  subroutine test_alike(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    real(wp) :: extremes(4, 3)
+    integer :: i
+
+    do i = 1, 3
+      call box_scene([merge(40, 24, i == 2), merge(26, 24, i == 2)], spacing, 0.4_wp, scene)
+      scene%horizon%surface_correction = 'consistent'
+      if (i == 3) scene%horizon%family = 'list'
+      call ready(scene, set_up, error)
+      if (allocated(error)) return
+      associate (w => set_up%system%model%weights)
+        extremes(:, i) = [minval(w%Gb), maxval(w%Gb), minval(w%Gd), maxval(w%Gd)]
+      end associate
+    end do
+    call expect_close(error, extremes(:, 2), extremes(:, 1), 1.0e-9_wp, 'a wider plate')
+    call expect_close(error, extremes(:, 3), extremes(:, 1), 1.0e-9_wp, 'a list')
+    call expect_true(error, extremes(1, 1) > 0.049_wp .and. extremes(3, 1) > -0.101_wp, &
+      & 'the bounds of the weights')
+  end subroutine test_alike
+
+  !> All uniform strains of several bodies, ratios and both families, by the fast loops and by the
+  !> reference. Forces are within 1e-9 of the largest traction over a spacing, dilatations and the
+  !> total energy within 1e-9 of the classical.
+  subroutine test_uniform(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(5), parameter :: names(*) = [character(5) :: 'bar', 'plate', 'block', 'L', 'hole']
+    real(wp), parameter :: ratios(*) = [0.2_wp, 0.3_wp, 0.45_wp]
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    integer :: i, r, family
+
+    do i = 1, size(names)
+      do r = 1, size(ratios)
+        do family = 1, 2
+          if (names(i) == 'block' .and. r + family /= 3) cycle
+          if (r /= 2 .and. names(i) /= 'plate' .and. names(i) /= 'block') cycle
+          if (names(i) == 'L' .and. family == 1 .or. names(i) == 'hole' .and. family == 2) cycle
+          call scene_of(trim(names(i)), ratios(r), scene)
+          scene%horizon%family = trim(merge('list   ', 'lattice', family == 2))
+          call ready(scene, set_up, error)
+          if (allocated(error)) return
+          call strain_all(set_up%system, names(i)//' at '//text_of(ratios(r)), error)
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+  end subroutine test_uniform
+
+  !> Put every uniform strain on a system.
+  subroutine strain_all(system, what, error)
+    type(system_type), intent(inout) :: system
+    character(*), intent(in) :: what
+    type(error_type), allocatable, intent(inout) :: error
+    real(wp), allocatable :: of_lambda(:, :), of_mu(:, :), p(:), energy(:)
+    integer(i1), allocatable :: strained(:)
+    integer :: alone, x, y
+
+    allocate (p(merge(system%body%n_slots, 0, system%model%dilatation)), source=0.0_wp)
+    allocate (energy(system%body%n_slots), strained(0))
+    associate (body => system%body, m => system%model%materials)
+      call area_vectors(body, system%family, lame_of(m, body%dim), of_lambda, alone)
+      call area_vectors(body, system%family, shear_of(m, body%dim), of_mu, alone)
+    end associate
+    do x = 1, system%body%dim
+      do y = x, system%body%dim
+        call one_strain(x, y)
+        if (allocated(error)) return
+      end do
+    end do
+
+  contains
+
+    subroutine one_strain(x, y)
+      integer, intent(in) :: x, y
+      real(wp) :: strain(system%body%dim, system%body%dim), trace, classical
+      real(wp), allocatable :: u(:, :), force(:, :), expected(:, :), theta(:)
+      integer :: k, c
+
+      strain = 0.0_wp
+      strain(x, y) = strain(x, y) + zeta/2
+      strain(y, x) = strain(y, x) + zeta/2
+      trace = merge(zeta, 0.0_wp, x == y)
+      associate (body => system%body, model => system%model)
+        allocate (u(body%n_slots, body%dim), force(body%n_slots, body%dim), source=0.0_wp)
+        allocate (expected, mold=u)
+        allocate (theta(body%n_slots), source=0.0_wp)
+        u = matmul(body%x, strain)
+        expected = 0.0_wp
+        do k = 1, body%n_slots
+          if (body%point(k) == 0) then
+            u(k, :) = 0.0_wp
+          else
+            expected(k, :) = -(of_lambda(k, :)*trace + 2*matmul(strain, of_mu(k, :))) &
+              & /body%volume(k)
+          end if
+        end do
+        call internal_force(body, system%family, model, options_of(model), system%workspace, u, &
+          & p, force, strained)
+        call expect_close(error, force, expected, 1.0e-9_wp*max_abs(expected), &
+          & 'forces of the loops: '//what)
+        call reference_force(system%family, model, u, force)
+        call expect_close(error, force, expected, 1.0e-9_wp*max_abs(expected), &
+          & 'forces of the reference: '//what)
+        call reference_dilatation(system%family, model, u, theta)
+        call expect_close(error, theta, [(merge(trace, 0.0_wp, body%point(k) > 0), &
+          & k=1, body%n_slots)], 1.0e-9_wp*zeta, 'dilatations: '//what)
+        classical = 0.0_wp
+        do c = 1, body%dim
+          classical = classical - sum(u(:, c)*expected(:, c)*body%volume)/2
+        end do
+        call energy_pass(system%family, model, system%workspace, u, energy)
+        call expect(error, sum(energy*body%volume), classical, 1.0e-9_wp*classical, &
+          & 'energy of the loops: '//what)
+        call reference_energy(system%family, model, u, energy)
+        call expect(error, sum(energy*body%volume), classical, 1.0e-9_wp*classical, &
+          & 'energy of the reference: '//what)
+      end associate
+    end subroutine one_strain
+
+  end subroutine strain_all
+
+  !> Lame's first constant of the dimension, from kappa; in 1D E takes the part of 2 mu.
+  pure function lame_of(m, dim) result(lame)
+    type(material_type), intent(in) :: m(:)
+    integer, intent(in) :: dim
+    real(wp) :: lame(size(m))
+    lame = m%bulk_modulus - 2*m%shear_modulus/dim
+    if (dim == 1) lame = 0.0_wp
+  end function lame_of
+
+  pure function shear_of(m, dim) result(mu)
+    type(material_type), intent(in) :: m(:)
+    integer, intent(in) :: dim
+    real(wp) :: mu(size(m))
+    mu = m%shear_modulus
+    if (dim == 1) mu = m%youngs_modulus/2
+  end function shear_of
+
+  !> A strip at 30 degrees to the axes, as a cloud, with the areas of the straight strip turned with
+  !> it.
+  subroutine test_clouds(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: nx = 16, ny = 12
+    real(wp), parameter :: height = 2.0e-3_wp
+    type(body_type) :: body
+    type(list_family_type) :: family
+    type(model_type) :: model
+    type(material_type) :: material
+    type(solution_type) :: b, d
+    type(fault_type), allocatable :: fault
+    type(volume_rule_type) :: rule
+    real(wp) :: R(3, 3), x(nx*ny, 2), area(nx*ny, 2), strain(2, 2)
+    real(wp), allocatable :: a(:, :), u(:, :), force(:, :), expected(:, :), theta(:)
+    integer :: i, j, k
+
+    R = rotation_matrix([0.0_wp, 0.0_wp, 1.0_wp], acos(-1.0_wp)/6)
+    rule = volume_rule_type(volume_linear, 3.015_wp*spacing)
+    material = new_material(youngs_modulus, 0.25_wp, 1.0_wp, 2, .false., height, 1.0_wp, &
+      & rule%delta, .false.)
+    area = 0.0_wp
+    do j = 1, ny
+      do i = 1, nx
+        k = i + nx*(j - 1)
+        x(k, :) = [i - 0.5_wp, j - 0.5_wp]*spacing
+        area(k, 1) = side(i, nx)*spacing*height
+        area(k, 2) = side(j, ny)*spacing*height
+      end do
+    end do
+    call allocate_points(body, 2, nx*ny)
+    body%x = matmul(x, transpose(R(:2, :2)))
+    body%volume = spacing**2*height
+    body%spacing = spacing
+    body%material = 1
+    body%body = 1
+    call new_list_family(body, rule, family)
+    call new_model(body, [material], .false., spread(.false., 1, body%n_slots), &
+      & spread(0.0_wp, 1, body%n_slots), model)
+    allocate (a(body%n_slots, 2), u(body%n_slots, 2), source=0.0_wp)
+    allocate (force, expected, mold=u)
+    allocate (theta(body%n_slots))
+    a(body%slot, :) = matmul(area, transpose(R(:2, :2)))
+    call weights_of_areas(body, family, [material], material%shear_modulus*a, &
+      & sign(1.0_wp, material%a)*a, .false., .true., model%weights, b, d, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    model%consistent = .true.
+    strain = zeta*reshape([1.0_wp, 0.4_wp, 0.4_wp, -0.3_wp], [2, 2])
+    do k = 1, body%n_slots
+      u(k, :) = 0.0_wp
+      if (body%point(k) > 0) u(k, :) = matmul(strain, body%x(k, :))
+    end do
+    expected = 0.0_wp
+    associate (mu => material%shear_modulus, lame => lame_of([material], 2))
+      do k = 1, body%n_slots
+        if (body%point(k) > 0) expected(k, :) = -(lame(1)*0.7_wp*zeta*a(k, :) &
+          & + 2*mu*matmul(strain, a(k, :)))/body%volume(k)
+      end do
+    end associate
+    call reference_force(family, model, u, force)
+    call expect_close(error, force, expected, 1.0e-9_wp*max_abs(expected), 'forces')
+    call reference_dilatation(family, model, u, theta)
+    call expect_close(error, theta(body%slot), 0.7_wp*zeta, 1.0e-9_wp*zeta, 'dilatations')
+    if (allocated(error)) return
+
+  contains
+
+    !> Area of a point in a row over a face's.
+    pure real(wp) function side(i, n)
+      integer, intent(in) :: i, n
+      side = 0.0_wp
+      if (i == 1) side = -1.5_wp
+      if (i == 2) side = 0.5_wp
+      if (i == n) side = 1.5_wp
+      if (i == n - 1) side = -0.5_wp
+    end function side
+
+  end subroutine test_clouds
+
+  !> Two plates of one Poisson's ratio behind each other, the second with a quarter of the
+  !> stiffness.
+  subroutine two_materials(scene)
+    type(scene_type), intent(out) :: scene
+
+    call box_scene([10, 11], spacing, 0.4_wp, scene)
+    scene%bodies = [scene%bodies(1), scene%bodies(1)]
+    scene%bodies(2)%name = 'other'
+    scene%bodies(2)%lower(1) = 10*spacing
+    scene%bodies(2)%upper(1) = 20*spacing
+    scene%materials = [scene%materials(1), scene%materials(1)]
+    scene%materials(2)%name = 'soft'
+    scene%materials(2)%youngs_modulus = youngs_modulus/4
+    scene%bodies(1)%material = 'steel'
+    scene%bodies(2)%material = 'soft'
+    scene%horizon%surface_correction = 'consistent'
+  end subroutine two_materials
+
+  !> Pull at both ends, without support.
+  subroutine load_ends(scene)
+    type(scene_type), intent(inout) :: scene
+
+    if (allocated(scene%loads)) deallocate (scene%loads)
+    allocate (scene%loads(2))
+    scene%loads(1)%side = 'x_min'
+    scene%loads(2)%side = 'x_max'
+    scene%loads%pressure = -tension
+    if (size(scene%bodies) > 1) then
+      scene%loads(1)%body = scene%bodies(1)%name
+      scene%loads(2)%body = scene%bodies(2)%name
+    end if
+    call at_rest(scene)
+  end subroutine load_ends
+
+  subroutine at_rest(scene)
+    type(scene_type), intent(inout) :: scene
+    scene%time%method = 'relaxation'
+    scene%relaxation%solver = 'conjugate_gradient'
+    scene%relaxation%tolerance = 1.0e-12_wp
+  end subroutine at_rest
+
+  !> Pressure on two sides, and a force in its place: every point has the classical displacement,
+  !> but for what the tolerance of 1e-12 leaves.
+  subroutine test_loads(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    integer :: i
+
+    do i = 1, 4
+      call scene_of(trim(merge('block', 'plate', i == 3)), merge(0.4_wp, 0.25_wp, i == 2), scene)
+      if (i == 4) scene%horizon%family = 'list'
+      call load_ends(scene)
+      if (i == 2) then
+        ! the same as a force over the side
+        deallocate (scene%loads)
+        allocate (scene%loads(2))
+        scene%loads(1)%side = 'x_min'
+        scene%loads(2)%side = 'x_max'
+        scene%loads(1)%force(1) = -tension*16*spacing*scene%header%thickness
+        scene%loads(2)%force(1) = tension*16*spacing*scene%header%thickness
+      end if
+      call uniform_at_rest(scene, [zeta, -scene%materials(1)%poissons_ratio*zeta, &
+        & -scene%materials(1)%poissons_ratio*zeta], 'load '//text_of(real(i, wp)), error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_loads
+
+  !> Layers at two sides follow a uniform strain; between them the sides are free.
+  subroutine test_layers(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    character(*), parameter :: along = '1e-11*x', across = '-0.3e-11*y'
+    integer :: i
+
+    do i = 1, 2
+      call scene_of('plate', 0.3_wp, scene)
+      deallocate (scene%boundaries)
+      allocate (scene%boundaries(2))
+      scene%boundaries(1)%side = 'x_min'
+      scene%boundaries(2)%side = 'x_max'
+      scene%boundaries%displacement_text(1) = along
+      scene%boundaries%displacement_text(2) = across
+      if (i == 2) scene%horizon%family = 'list'
+      call at_rest(scene)
+      call uniform_at_rest(scene, [zeta, -0.3_wp*zeta], 'layers', error)
+      if (allocated(error)) return
+    end do
+  end subroutine test_layers
+
+  !> Solve a scene and compare differences of displacements with those of a strain along the axes.
+  subroutine uniform_at_rest(scene, strain, what, error)
+    type(scene_type), intent(in) :: scene
+    real(wp), intent(in) :: strain(:)
+    character(*), intent(in) :: what
+    type(error_type), allocatable, intent(inout) :: error
+    type(set_up_type) :: set_up
+    type(diary_type) :: diary
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: found(:), expected(:)
+    integer :: c
+
+    call ready_alone(scene, set_up, error)
+    if (allocated(error)) return
+    call move(set_up%system, set_up%plan, diary, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    associate (body => set_up%system%body, u => set_up%system%state%u)
+      do c = 1, body%dim
+        found = u(body%slot, c)
+        found = found - sum(found)/size(found)
+        expected = strain(c)*body%x(body%slot, c)
+        expected = expected - sum(expected)/size(expected)
+        call expect_close(error, found, expected, 1.0e-9_wp*max_abs(expected), what)
+      end do
+    end associate
+  end subroutine uniform_at_rest
+
+  !> A strip under end moments by a pressure that is linear across: its curvature, from the rotation
+  !> of sections a depth from the ends, beside M/EI of plane stress. Halving the spacing quarters
+  !> the error.
+  subroutine test_bending(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: across(*) = [5, 10, 20]
+    real(wp), parameter :: depth = 0.1_wp
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(diary_type) :: diary
+    type(fault_type), allocatable :: fault
+    real(wp) :: h, miss(size(across)), slope(2)
+    integer :: i, s
+
+    do i = 1, size(across)
+      h = depth/across(i)
+      call box_scene([4*across(i), across(i)], h, 0.3_wp, scene)
+      scene%horizon%surface_correction = 'consistent'
+      deallocate (scene%loads)
+      allocate (scene%loads(2))
+      scene%loads(1)%side = 'x_min'
+      scene%loads(2)%side = 'x_max'
+      ! E kappa (y - 0.05) with kappa = 1e-10/m
+      scene%loads%pressure_text = '20*(y - 0.05)'
+      call at_rest(scene)
+      call ready_alone(scene, set_up, error)
+      if (allocated(error)) return
+      call move(set_up%system, set_up%plan, diary, fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      associate (body => set_up%system%body, u => set_up%system%state%u)
+        do s = 1, 2
+          associate (x => merge(depth, 3*depth, s == 1))
+            slope(s) = rotation(body, u(:, 1), x + h/2) + rotation(body, u(:, 1), x - h/2)
+          end associate
+        end do
+      end associate
+      miss(i) = abs((slope(2) - slope(1))/2/(2*depth)/(-1.0e-10_wp) - 1)
+    end do
+    call expect_true(error, all(miss < [0.2_wp, 0.05_wp, 0.0125_wp]), 'curvature off by '// &
+      & text_of(miss(1))//', '//text_of(miss(2))//', '//text_of(miss(3)))
+    call expect_true(error, miss(1) > 3*miss(2) .and. miss(2) > 3*miss(3), &
+      & 'not of second order: '//text_of(miss(1))//', '//text_of(miss(2))//', '// &
+      & text_of(miss(3)))
+  end subroutine test_bending
+
+  !> du_x/dy of the column of points at `x`, by least squares.
+  real(wp) function rotation(body, u, x) result(slope)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: u(:), x
+    real(wp), allocatable :: y(:), v(:)
+    logical :: there(body%n_slots)
+
+    there = body%point > 0 .and. abs(body%x(:, 1) - x) < 1.0e-6_wp
+    y = pack(body%x(:, 2), there)
+    v = pack(u, there)
+    y = y - sum(y)/size(y)
+    slope = sum(y*v)/sum(y**2)
+  end function rotation
+
+  !> Random displacements of finite size, both families: no resultant force or moment, and the force
+  !> is minus the gradient of the energy, by central differences of 1e-6 spacings (their error is
+  !> the square of that, over the strain).
+  subroutine test_conservation(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    integer :: family, i
+
+    do i = 1, 2
+      do family = 1, 2
+        call scene_of(trim(merge('hole ', 'block', i == 1)), 0.4_wp, scene)
+        scene%horizon%family = trim(merge('list   ', 'lattice', family == 2))
+        call ready(scene, set_up, error)
+        if (allocated(error)) return
+        call one(set_up%system)
+        if (allocated(error)) return
+      end do
+    end do
+
+  contains
+
+    subroutine one(system)
+      type(system_type), intent(inout) :: system
+      real(wp), allocatable :: u(:, :), way(:, :), force(:, :), reference(:, :), p(:), energy(:)
+      integer(i1) :: strained(0)
+      real(wp) :: total(2), slope, size_of_forces
+      integer :: k, c, seed, s
+
+      associate (body => system%body, model => system%model)
+        allocate (u(body%n_slots, body%dim), source=0.0_wp)
+        allocate (way, source=u)
+        allocate (force, reference, mold=u)
+        allocate (p(body%n_slots), energy(body%n_slots), source=0.0_wp)
+        seed = 3
+        do k = 1, body%n_slots
+          if (body%point(k) == 0) cycle
+          do c = 1, body%dim
+            u(k, c) = 0.003_wp*spacing*noise(seed)
+            way(k, c) = spacing*noise(seed)
+          end do
+        end do
+        call internal_force(body, system%family, model, options_of(model), system%workspace, u, &
+          & p, force, strained)
+        call reference_force(system%family, model, u, reference)
+        call expect_close(error, force, reference, 1.0e-11_wp*max_abs(reference), &
+          & 'loops beside the reference')
+        size_of_forces = sum(abs(force(:, 1))*body%volume)
+        do c = 1, body%dim
+          call expect(error, sum(force(:, c)*body%volume), 0.0_wp, 1.0e-12_wp*size_of_forces, &
+            & 'resultant force')
+        end do
+        call expect(error, sum(body%volume*((body%x(:, 1) + u(:, 1))*force(:, 2) &
+          & - (body%x(:, 2) + u(:, 2))*force(:, 1))), 0.0_wp, &
+          & 1.0e-12_wp*size_of_forces*maxval(body%x), 'resultant moment')
+        do s = 1, 2
+          call energy_pass(system%family, model, system%workspace, &
+            & u + (2*s - 3)*1.0e-6_wp*way, energy)
+          total(s) = sum(energy*body%volume)
+        end do
+        slope = (total(2) - total(1))/2.0e-6_wp
+        call expect(error, slope, -sum([(sum(force(:, c)*way(:, c)*body%volume), c=1, body%dim)]), &
+          & 1.0e-6_wp*abs(slope) + 1.0e-9_wp*size_of_forces*spacing, 'gradient of the energy')
+      end associate
+    end subroutine one
+
+  end subroutine test_conservation
+
+  !> A plate that swings freely: kinetic and strain energy together change by the square of the
+  !> step, and stay. The stable step is at most 1.3 times smaller than with the correction by
+  !> energy.
+  subroutine test_explicit(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene, other
+    type(set_up_type) :: set_up, by_energy
+    type(diary_type) :: diary
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: total(:)
+    integer :: k
+
+    call scene_of('plate', 0.4_wp, scene)
+    scene%time%steps = 400
+    call ready_alone(scene, set_up, error)
+    if (allocated(error)) return
+    other = scene
+    other%horizon%surface_correction = 'energy'
+    call ready_alone(other, by_energy, error)
+    if (allocated(error)) return
+    call expect_true(error, set_up%plan%limit > by_energy%plan%limit/1.3_wp, 'step '// &
+      & text_of(set_up%plan%limit)//', by energy '//text_of(by_energy%plan%limit))
+    associate (body => set_up%system%body, v => set_up%system%state%v)
+      do k = 1, body%n_slots
+        if (body%point(k) > 0) v(k, 1) = 1.0e-3_wp*sin(20*body%x(k, 1) + 10*body%x(k, 2))
+      end do
+    end associate
+    call move(set_up%system, set_up%plan, diary, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    total = diary%kinetic + diary%strain
+    call expect_true(error, maxval(diary%strain) > 0.1_wp*total(1), 'nothing swings')
+    call expect_close(error, total, total(1), 0.02_wp*total(1), 'energy')
+  end subroutine test_explicit
+
+  !> Each refusal names its reason.
+  subroutine test_refused(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call scene_of('plate', 0.3_wp, scene)
+    scene%header%precision = 'mixed'
+    call refused(scene, 'mixed', error)
+    call scene_of('plate', 0.3_wp, scene)
+    scene%materials(1)%influence = 'constant'
+    call refused(scene, 'bond law', error)
+    call scene_of('plate', 0.3_wp, scene)
+    deallocate (scene%loads)
+    allocate (scene%loads(1))
+    scene%loads(1)%side = 'x_min'
+    scene%loads(1)%stiffness(1) = 1.0_wp
+    call refused(scene, 'springs at a side', error)
+    call scene_of('plate', 0.3_wp, scene)
+    deallocate (scene%boundaries)
+    allocate (scene%boundaries(1))
+    scene%boundaries(1)%side = 'x_min'
+    scene%boundaries(1)%absorbing = .true.
+    call refused(scene, 'absorbing', error)
+    call scene_of('plate', 0.4_wp, scene)
+    scene%materials(1)%critical_stretch = 0.01_wp
+    call refused(scene, 'fracture', error)
+    call two_materials(scene)
+    call refused(scene, 'different stiffness', error)
+    call box_scene([10, 1], spacing, 0.3_wp, scene)
+    scene%horizon%surface_correction = 'consistent'
+    call refused(scene, 'lower the dimension', error)
+  end subroutine test_refused
+
+  !> Fail unless a scene is refused with a message that has `word`.
+  subroutine refused(scene, word, error)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: word
+    type(error_type), allocatable, intent(inout) :: error
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+
+    if (allocated(error)) return
+    call prepare(scene, set_up, fault)
+    if (.not. allocated(fault)) then
+      call test_failed(error, 'not refused: '//word)
+      return
+    end if
+    call expect_true(error, index(fault%message, word) > 0, fault%message)
+  end subroutine refused
+
+end module test_set_up_consistent_weights
