@@ -77,7 +77,7 @@ contains
   end subroutine check_consistent
 
   !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
-  !> can break have negative ones.
+  !> can break have weights that are not positive.
   subroutine weigh_bonds(scene, system, materials, error)
     type(scene_type), intent(in) :: scene               !! with consistent weights
     type(system_type), intent(inout) :: system          !! with body, whole family and model
