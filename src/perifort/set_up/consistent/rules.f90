@@ -77,7 +77,7 @@ contains
   end subroutine check_consistent
 
   !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
-  !> can break have negative ones.
+  !> can break have weights that are not positive.
   subroutine weigh_bonds(scene, system, materials, error)
     type(scene_type), intent(in) :: scene               !! with consistent weights
     type(system_type), intent(inout) :: system          !! with body, whole family and model
@@ -94,10 +94,10 @@ contains
     if (.not. (system%model%breaking .or. size(scene%cracks) > 0)) return
     least = stretch%least
     if (system%model%dilatation) least = min(least, dilatation%least)
-    if (least < 0.0_wp) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
+    if (.not. least > 0.0_wp) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
       & "surface_correction = 'consistent' does not serve fracture here: the smallest weight "// &
-      & 'of a bond is '//to_text(least, 3)//', and a body would gain energy when such a bond '// &
-      & 'breaks', &
+      & 'of a bond is '//to_text(least, 3)//', and must be positive, since a body would gain '// &
+      & 'energy when a bond with a negative one breaks', &
       & "give surface_correction = 'energy' or 'none'")
   end subroutine weigh_bonds
 
