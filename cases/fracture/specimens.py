@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 # does not have are left out: None
 GROWTH, CONTROL, CRITICAL = None, None, None
 
-YOUNG, TOUGHNESS, THICKNESS = 3.24e9, 300.0, 0.005
+YOUNG, TOUGHNESS, THICKNESS, SPACING = 3.24e9, 300.0, 0.005, 0.5e-3
 
 
 def with_rules(text):
@@ -39,7 +39,9 @@ class Specimen:
 
     def __init__(self, name, scene, end, first, last, shape, opening):
         self.name, self.scene, self.end, self.first = name, scene, end, first
-        self.cuts = np.linspace(first, last, 8)
+        # Whole spacings: a crack that ends between two columns of bonds is as long as one that ends
+        # at either
+        self.cuts = first + SPACING * np.round(np.linspace(0.0, (last - first) / SPACING, 8))
         self.shape, self.opening = shape, opening
 
 
