@@ -133,7 +133,7 @@ class Case:
         self.rows.append((what, text_of(value), text_of(target), "", "shown"))
 
     def not_met(self, what, value, target, met, reason):
-        """A number whose target is known to be missed, with the reason: it is listed and not judged.
+        """A number whose target is known to be missed, with the reason: it is listed, not judged.
         Once it is met, the row says so.
         """
         verdict = "met, judge it" if met else f"NOT MET: {reason}"
