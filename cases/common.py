@@ -91,6 +91,8 @@ class Case:
         if self.options.reuse and stamp.is_file() and stamp.read_text() == mark:
             print(f"  {stem}: results of an earlier call", flush=True)
             return Results(output)
+        # A run that is stopped must not be taken for the complete one before it
+        stamp.unlink(missing_ok=True)
         print(f"  {stem}: running ...", end="\n" if sys.stdout.isatty() else " ", flush=True)
         begin = time.time()
         try:
