@@ -91,6 +91,8 @@ class Case:
         if self.options.reuse and stamp.is_file() and stamp.read_text() == mark:
             print(f"  {stem}: results of an earlier call", flush=True)
             return Results(output)
+        # A run that is stopped must not be taken for the complete one before it
+        stamp.unlink(missing_ok=True)
         print(f"  {stem}: running ...", end="\n" if sys.stdout.isatty() else " ", flush=True)
         begin = time.time()
         try:
@@ -133,7 +135,7 @@ class Case:
         self.rows.append((what, text_of(value), text_of(target), "", "shown"))
 
     def not_met(self, what, value, target, met, reason):
-        """A number whose target is known to be missed, with the reason: it is listed and not judged.
+        """A number whose target is known to be missed, with the reason: it is listed, not judged.
         Once it is met, the row says so.
         """
         verdict = "met, judge it" if met else f"NOT MET: {reason}"

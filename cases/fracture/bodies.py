@@ -45,8 +45,8 @@ def running(text, displacement, duration=180e-6):
 def brazilian(case):
     """Load at the first break against the elastic disc's, and the crack along the diameter.
 
-    In the middle the stress across the load is 2 P/(pi D t), and -6 P/(pi D t) along it (Timoshenko and
-    Goodier, section 41): bonds across are stretched by (1 + 3 nu) 2 P/(pi D t E).
+    In the middle the stress across the load is 2 P/(pi D t), and -6 P/(pi D t) along it
+    (Timoshenko and Goodier, section 41): bonds across are stretched by (1 + 3 nu) 2 P/(pi D t E).
     """
     case.out.mkdir(parents=True, exist_ok=True)
     dx = write_disc(case.out / "disc.txt", 40 if case.options.quick else 80)

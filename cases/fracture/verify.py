@@ -45,7 +45,8 @@ def pictures(case, shown):
             axes.plot(growth, over, "o-", markersize=2.5, linewidth=0.8, label=label)
         axes.axhspan(0.95, 1.05, color="0.9")
         axes.axvspan(3, 10, color="0.5", alpha=0.1)
-        axes.set(xlabel="growth, in horizons", ylabel="load over that of LEFM", xlim=(0, 12), ylim=(0, 2))
+        axes.set(xlabel="growth, in horizons", ylabel="load over that of LEFM", xlim=(0, 12),
+                 ylim=(0, 2))
         axes.legend(fontsize=7)
         save(figure, case.folder / "growth.png")
     if getattr(case, "ring", None):

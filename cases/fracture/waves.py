@@ -140,7 +140,8 @@ def torsion(case):
 def closed_form(k, ratio=3.015, young=1e9, nu=0.2, density=1000.0):
     """Squares of the frequencies [1/s2] and polarisations (columns) of plane waves of wave number k
     on the infinite square lattice of spacing 1 m, plane stress, by sums over one family (theory 1
-    to 4): rho w^2 = sum 4 b delta Gb n n (1 - cos k.xi)/|xi| V + 2 a t t, t = d delta Gd sum n sin k.xi/|xi| V.
+    to 4): rho w^2 = sum 4 b delta Gb n n (1 - cos k.xi)/|xi| V + 2 a t t,
+    t = d delta Gd sum n sin k.xi/|xi| V.
     """
     mu, kappa = young / (2 * (1 + nu)), young / (2 * (1 - nu))
     a, b_delta, d_delta = (kappa - 2 * mu) / 2, 6 * mu / (np.pi * ratio**3), 2 / (np.pi * ratio**2)
