@@ -11,9 +11,8 @@ from scipy.interpolate import CubicSpline
 
 # What the program is asked for. GROWTH: 'load_steps', or 'events', in which one bond after the other
 # breaks; CONTROL (with events): 'load' or 'dissipation', which follows a load that falls; CRITICAL:
-# 'chapter', or 'lattice', the critical stretch from the lattice's own toughness. Keys that the program
-# does not have are left out: None
-GROWTH, CONTROL, CRITICAL = None, None, None
+# 'chapter', or 'lattice', the critical stretch from the lattice's own toughness
+GROWTH, CONTROL, CRITICAL = "events", "load", "lattice"
 
 YOUNG, TOUGHNESS, THICKNESS, SPACING = 3.24e9, 300.0, 0.005, 0.5e-3
 
