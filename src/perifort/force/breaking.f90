@@ -215,7 +215,10 @@ contains
     if (.not. bonds%intact(i)) return
     call bond_limit(model, k, int(bonds%j(i)), lower, upper)
     state = state_of_bond(model, u, k, bonds, i)
-    breaks = state%stretch > part*upper .or. state%stretch < part*lower
+    ! parts of limits that are never reached may be beyond all numbers
+    breaks = .false.
+    if (upper < never) breaks = state%stretch > part*upper
+    if (lower > -never) breaks = breaks .or. state%stretch < part*lower
   end subroutine decide
 
   !> The largest mechanical stretch over its limit of the intact bonds of every slot: 0 where none

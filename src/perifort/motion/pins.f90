@@ -1,5 +1,5 @@
-!> Pins: boundaries whose points move as one rigid body, their rotation and the components of their
-!> centre that nothing imposes being free (doc/theory.md, 10).
+!> Pins are boundaries whose points move as one rigid body: their rotation and the components of
+!> their centre that nothing imposes are free (doc/theory.md, 10).
 module pd_motion_pins
   use pd_base_kinds, only: wp, i1
   use pd_motion_conditions, only: free_component, guide, impose, motion_type
