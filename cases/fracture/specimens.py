@@ -1,4 +1,4 @@
-"""Specimens whose crack grows at rest: load against linear elastic fracture mechanics over growth.
+"""Specimens whose crack grows in static equilibrium: load against linear elastic fracture mechanics over growth.
 
 A crack's length is that of the elastic body with the same compliance, with a crack cut from the
 start; a cut crack is half a spacing longer than given. LEFM's load at that length is P_c = K_c B/...,

@@ -90,7 +90,9 @@ contains
 
     contact%name = 'contact'
     if (part == of_friction) contact%name = 'friction'
-    contact%conservative = .false.
+    ! without losses no account of work is needed, which would look at all points in every step
+    contact%conservative = part == of_normal_force .and. rule%returned >= 1.0_wp .and. &
+      & rule%damping <= 0.0_wp
     contact%tangent = no_tangent
     contact%part = part
     contact%rule = rule
@@ -398,12 +400,14 @@ contains
     type(term_view_type), intent(in) :: view    !! of the body
     real(wp), intent(inout), contiguous :: bound(:)
       !! (n_slots) bound of the stiffness, added to [N/m4]
+    real(wp) :: largest
     integer :: i, k
 
-    if (self%part == of_friction) return
+    if (self%part == of_friction .or. size(self%slots) == 0) return
+    largest = largest_stiffness(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
-      bound(k) = bound(k) + 2*most_contacts(view%body%dim)*largest_stiffness(self, view)
+      bound(k) = bound(k) + 2*most_contacts(view%body%dim)*largest
     end do
   end subroutine add_stiffness_bound
 
@@ -428,7 +432,7 @@ contains
 
     part = self%rule%damping
     if (self%part == of_friction) part = slope
-    if (.not. part > 0.0_wp) return
+    if (.not. part > 0.0_wp .or. size(self%slots) == 0) return
     largest = largest_stiffness(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)

@@ -440,12 +440,15 @@ contains
     end do
   end function describe_list
 
-  !> What the terms of a name that are not conservative store and have taken, as last accounted.
-  subroutine accounts_of(self, name, stored, lost)
+  !> What the terms of a name store and, if they are not conservative, have taken, at the instant
+  !> that was last accounted.
+  subroutine accounts_of(self, view, name, stored, lost)
     class(term_list_type), intent(in) :: self  !! the list
+    type(term_view_type), intent(in) :: view   !! that instant
     character(*), intent(in) :: name           !! of the terms
     real(wp), intent(out) :: stored            !! [J]
     real(wp), intent(out) :: lost              !! since the start [J]
+    real(wp), allocatable :: density(:)
     integer :: i
 
     stored = 0.0_wp
@@ -454,8 +457,15 @@ contains
       associate (item => self%items(i))
         if (.not. allocated(item%term%name)) cycle
         if (item%term%name /= name) cycle
-        stored = stored + item%last_energy
-        lost = lost + item%lost
+        if (item%term%conservative) then
+          allocate (density(view%body%n_slots), source=0.0_wp)
+          call item%term%add_energy(view, density)
+          stored = stored + inner(view%body%order, density, view%body%volume)
+          deallocate (density)
+        else
+          stored = stored + item%last_energy
+          lost = lost + item%lost
+        end if
       end associate
     end do
   end subroutine accounts_of

@@ -1,6 +1,8 @@
 !> What the history has of contact: the energy that it stores, and what friction and impacts took.
 module pd_output_measures_contact
   use pd_base_kinds, only: wp
+  use pd_force_term, only: term_view_type
+  use pd_motion_system, only: view_of
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
   use pd_output_results_types, only: column_type
   use pd_scene_content_types, only: scene_type
@@ -44,12 +46,14 @@ contains
     class(contact_measure_type), intent(inout) :: measure
     type(row_source_type), intent(in) :: now
     real(wp), intent(out) :: values(:)
+    type(term_view_type) :: view
     real(wp) :: stored
 
     associate (unused_measure => measure)
     end associate
-    call now%system%terms%accounts_of('friction', stored, values(2))
-    call now%system%terms%accounts_of('contact', values(1), values(3))
+    call view_of(now%system, now%system%time, view)
+    call now%system%terms%accounts_of(view, 'friction', stored, values(2))
+    call now%system%terms%accounts_of(view, 'contact', values(1), values(3))
   end subroutine row_of_contact
 
 end module pd_output_measures_contact
