@@ -72,7 +72,7 @@ def brazilian(case):
     case.near("   load at the first break [N]", reached if first else np.nan, known, relative=0.05)
     # A crack of 0.15 of the diameter in the middle may grow up to a quarter of the radius from the
     # platens. Without it the strain is nearly the same everywhere along the diameter, and bonds
-    # break in many places at once. It runs: at rest it would do so in one load step
+    # break in many places at once. It runs in time: in static equilibrium it would do so in one load step
     text = scene.replace("x^2 + y^2 > (0.15*0.025)^2", "abs(y) > 0.75*0.025")
     text = running(text, 1.15 * moved) + "&crack\n  from = 0.0, -0.00375\n  to = 0.0, 0.00375\n/\n"
     results = case.run("brazilian_crack.nml", text, threads=case.threads)

@@ -1,4 +1,4 @@
-"""Stress intensity at rest, and waves: what a crack's load and speed are made of."""
+"""Stress intensity in static equilibrium, and waves: what a crack's load and speed are made of."""
 import numpy as np
 from common import change
 from measures import rayleigh_speed
