@@ -4,7 +4,6 @@ import re
 import numpy as np
 from common import change
 from measures import crack, slope_angle
-from specimens import with_rules
 
 YOUNG, NU, STRETCH, THICKNESS, DIAMETER = 20e9, 0.2, 1e-4, 0.02, 0.05
 
@@ -62,7 +61,7 @@ def brazilian(case):
     strain = float(elastic.field("strain_xx")[middle]) * known / load
     case.near("Brazilian disc: strain across in the middle at the expected load", strain, STRETCH,
               relative=0.02)
-    results = case.run("brazilian.nml", with_rules(pressed(scene, moved)), threads=case.threads)
+    results = case.run("brazilian.nml", pressed(scene, moved), threads=case.threads)
     broken = np.asarray(results.history["broken_bonds"])
     first = int(np.flatnonzero(broken > 0)[0]) if broken.any() else 0
     side = results.boundary("top")
@@ -96,7 +95,7 @@ def l_panel(case):
     text = case.scene("l_panel.nml")
     if case.options.quick:
         text = change(text, "body", points="50, 50")
-    results = case.run("l_panel.nml", with_rules(text), threads=case.threads)
+    results = case.run("l_panel.nml", text, threads=case.threads)
     dx = 0.5 / (50 if case.options.quick else 100)
     x = crack(results, threshold=0.3)
     if len(x) == 0:

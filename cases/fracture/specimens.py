@@ -4,8 +4,6 @@ A crack's length is that of the elastic body with the same compliance, with a cr
 start; a cut crack is half a spacing longer than given. LEFM's load at that length is P_c = K_c B/...,
 K_c = sqrt(E' Gc), E' = E in plane stress and E/(1 - nu^2) in plane strain.
 """
-import re
-
 import numpy as np
 from common import change
 from measures import spacing_of
@@ -25,8 +23,7 @@ def with_rules(text):
         text = change(text, "relaxation", growth=f"'{GROWTH}'")
     if CONTROL:
         text = change(text, "relaxation", control=f"'{CONTROL}'")
-    # A critical stretch that is given holds as it is
-    if CRITICAL and not re.search(r"^\s*critical_stretch\s*=", text, re.M):
+    if CRITICAL:
         text = change(text, "material", critical=f"'{CRITICAL}'")
     return text
 
