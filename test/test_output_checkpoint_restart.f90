@@ -652,23 +652,32 @@ contains
     character(*), parameter :: solvers(2) = [character(18) :: 'conjugate_gradient', &
       & 'dynamic_relaxation']
     type(scene_type) :: scene
-    type(fault_type), allocatable :: fault
-    integer :: pieces, i
+    integer :: i
 
     call slow_plate(scene)
     do i = 1, size(solvers)
       if (allocated(error)) return
       scene%relaxation%solver = solvers(i)
-      call run(scene, 'whole', fault, threads=2)
-      call accept(error, fault)
-      call expect_broken(error, 'whole')
-      if (allocated(error)) return
-      call run_in_pieces(scene, 'pieces', 1, pieces, error)
-      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
-      call expect_same_results(error, 'whole', 'pieces', 2)
-      call expect_same_file(error, here//'/whole/iterations.csv', here//'/pieces/iterations.csv')
+      call expect_same_growth(scene, error)
     end do
   end subroutine test_relaxation
+
+  !> Bonds break in equilibrium, in one piece as in pieces that are cut after every iteration.
+  subroutine expect_same_growth(scene, error)
+    type(scene_type), intent(in) :: scene
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable :: fault
+    integer :: pieces
+
+    call run(scene, 'whole', fault, threads=2)
+    call accept(error, fault)
+    call expect_broken(error, 'whole')
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    call expect_true(error, pieces > 10, 'it is cut at load steps alone')
+    call expect_same_results(error, 'whole', 'pieces', 2)
+    call expect_same_file(error, here//'/whole/iterations.csv', here//'/pieces/iterations.csv')
+  end subroutine expect_same_growth
 
   !> Growth by events, with the load controlled and down where it snaps back; cut after every
   !> iteration and every equilibrium.
@@ -676,8 +685,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: controls(2) = [character(11) :: 'load', 'dissipation']
     type(scene_type) :: scene
-    type(fault_type), allocatable :: fault
-    integer :: pieces, i
+    integer :: i
 
     call slow_plate(scene)
     scene%relaxation%load_steps = 2
@@ -687,14 +695,7 @@ contains
     do i = 1, size(controls)
       if (allocated(error)) return
       scene%relaxation%control = controls(i)
-      call run(scene, 'whole', fault, threads=2)
-      call accept(error, fault)
-      call expect_broken(error, 'whole')
-      if (allocated(error)) return
-      call run_in_pieces(scene, 'pieces', 1, pieces, error)
-      call expect_true(error, pieces > 10, 'it is cut at load steps alone')
-      call expect_same_results(error, 'whole', 'pieces', 2)
-      call expect_same_file(error, here//'/whole/iterations.csv', here//'/pieces/iterations.csv')
+      call expect_same_growth(scene, error)
     end do
   end subroutine test_events
 

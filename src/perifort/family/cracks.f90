@@ -5,6 +5,7 @@
 !> different sides and it passes through the crack or its rim (again within a millionth).
 module pd_family_cracks
   use pd_base_kinds, only: wp, i8
+  use pd_base_vectors, only: cross
   use pd_scene_content_types, only: crack_group, is_set
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
@@ -232,11 +233,5 @@ contains
     length = sqrt(L2)
     within = t/length >= -tolerance .and. t/length <= length + tolerance
   end function within
-
-  pure function cross(a, b) result(c)
-    real(wp), intent(in) :: a(3), b(3)
-    real(wp) :: c(3)
-    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-  end function cross
 
 end module pd_family_cracks

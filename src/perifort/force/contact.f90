@@ -60,7 +60,6 @@ module pd_force_contact
     integer(i4), allocatable :: slots(:)     !! points that may touch, in order
     integer, allocatable :: side(:)          !! of each of these
     real(wp), allocatable :: reach(:)        !! half of D of each, and its half of the skin [m]
-    real(wp), allocatable :: half(:)         !! half of D of each [m]
     real(wp), allocatable :: begun(:, :)     !! (n_slots, dim) where points were at the start [m]
     real(wp) :: skin = 0.0_wp                !! [m]
     real(wp) :: delta = 1.0_wp               !! horizon [m]
@@ -99,11 +98,11 @@ contains
     contact%delta = delta
     contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
     contact%side = rule%side(body%body(contact%slots))
-    contact%half = [(usual_distance*body%spacing(contact%slots(i))/2, i=1, size(contact%slots))]
-    if (rule%distance > 0.0_wp) contact%half = rule%distance/2
     least = minval(body%spacing(contact%slots))
     contact%skin = merge(skin_within, skin_between, rule%pieces)*least
-    contact%reach = contact%half + contact%skin/2
+    contact%reach = [((usual_distance*body%spacing(contact%slots(i)) + contact%skin)/2, i=1, &
+      & size(contact%slots))]
+    if (rule%distance > 0.0_wp) contact%reach = (rule%distance + contact%skin)/2
   end subroutine new_contact
 
   !> Where points are at the start: pairs that are nearer then push from that distance on.
@@ -320,7 +319,9 @@ contains
         speed = dot_product(v, n)
         stiffness = self%rule%stiffness*(constant_of(view, k) + constant_of(view, j))/2/self%delta &
           & *view%body%volume(j)
-        critical = critical_damping(view, k, j, stiffness)
+        critical = 0.0_wp
+        if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
+          & critical = critical_damping(view, k, j, stiffness)
         push = normal_force(self%rule, stiffness, begins - distance, speed, critical)
         if (self%part == of_normal_force) then
           total = total - push*n

@@ -6,9 +6,9 @@ module pd_motion_conditions
   use pd_base_field, only: field_type, field_values, new_field
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_text, only: to_text
+  use pd_base_vectors, only: cross
   use pd_motion_curve, only: curve_type
-  use pd_motion_pose, only: pose_type, arm_of, cross, displacement_of, keep_pose, spin_of, &
-    & spin_rate_of
+  use pd_motion_pose, only: pose_type, arm_of, displacement_of, keep_pose, spin_of, spin_rate_of
   implicit none (type, external)
   private
   public :: motion_type, free_component, moved_by_displacement, moved_by_velocity, impose, &
@@ -301,50 +301,32 @@ contains
     end do
   end subroutine impose_by_time
 
-  !> Accelerations of component `c` of a pin's points at time `t`: of its centre, and of turning.
-  subroutine accelerations_of_pin(motion, c, t, acceleration)
-    type(motion_type), intent(in) :: motion        !! a pin
-    integer, intent(in) :: c
-    real(wp), intent(in) :: t
-    real(wp), intent(out) :: acceleration(:)
-    real(wp) :: of_centre(1), spin(3), rate(3), arm(3), turning(3)
-    integer :: i, at
-
-    of_centre = 0.0_wp
-    if (motion%by_time(c)) then
-      if (motion%kind(c) == moved_by_displacement) then
-        call field_values(motion%timed(c)%second, t, of_centre, at)
-      else
-        call field_values(motion%timed(c)%rate, t, of_centre, at)
-      end if
-      if (at > 0) of_centre = 0.0_wp
-    else if (motion%kind(c) == moved_by_velocity) then
-      of_centre = motion%amplitude(c)*motion%curve%slope(t)
-    else if (motion%kind(c) == free_component) then
-      of_centre = motion%pose%force(c)/motion%pose%mass
-    end if
-    spin = spin_of(motion%pose)
-    rate = spin_rate_of(motion%pose)
-    do i = 1, size(acceleration)
-      arm = arm_of(motion%pose, i)
-      turning = cross(rate, arm) + cross(spin, cross(spin, arm))
-      acceleration(i) = of_centre(1) + turning(c)
-    end do
-  end subroutine accelerations_of_pin
-
   !> Accelerations of component `c` at time `t` [m/s2]: for the force that moves the points.
   subroutine accelerations_of(motion, c, t, acceleration)
     type(motion_type), intent(in) :: motion        !! an imposed motion
     integer, intent(in) :: c                       !! component
     real(wp), intent(in) :: t                      !! time [s]
     real(wp), intent(out), contiguous :: acceleration(:)  !! (slot) [m/s2]
+    real(wp) :: of_centre(1)
+
+    if (allocated(motion%pose)) then
+      call imposed_accelerations(motion, c, t, of_centre)
+      if (motion%kind(c) == free_component) of_centre = motion%pose%force(c)/motion%pose%mass
+      call add_turning(motion%pose, c, of_centre(1), acceleration)
+    else
+      call imposed_accelerations(motion, c, t, acceleration)
+    end if
+  end subroutine accelerations_of
+
+  !> What is imposed: on every point, or on the centre of a pin, which counts as one.
+  subroutine imposed_accelerations(motion, c, t, acceleration)
+    type(motion_type), intent(in) :: motion
+    integer, intent(in) :: c
+    real(wp), intent(in) :: t
+    real(wp), intent(out), contiguous :: acceleration(:)
     real(wp) :: slope
     integer :: at, i
 
-    if (allocated(motion%pose)) then
-      call accelerations_of_pin(motion, c, t, acceleration)
-      return
-    end if
     acceleration = 0.0_wp
     if (motion%by_time(c)) then
       if (motion%kind(c) == moved_by_displacement) then
@@ -359,7 +341,25 @@ contains
         acceleration(i) = amplitude_of(motion, i, c)*slope
       end do
     end if
-  end subroutine accelerations_of
+  end subroutine imposed_accelerations
+
+  !> Accelerations of a rigid body's points from that of its centre and its turning.
+  pure subroutine add_turning(pose, c, of_centre, acceleration)
+    type(pose_type), intent(in) :: pose
+    integer, intent(in) :: c
+    real(wp), intent(in) :: of_centre
+    real(wp), intent(out) :: acceleration(:)
+    real(wp) :: spin(3), rate(3), arm(3), turning(3)
+    integer :: i
+
+    spin = spin_of(pose)
+    rate = spin_rate_of(pose)
+    do i = 1, size(acceleration)
+      arm = arm_of(pose, i)
+      turning = cross(rate, arm) + cross(spin, cross(spin, arm))
+      acceleration(i) = of_centre + turning(c)
+    end do
+  end subroutine add_turning
 
   !> The step to time `t` is complete: keep the paths until then.
   subroutine advance_paths(motions, t)

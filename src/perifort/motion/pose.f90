@@ -5,11 +5,12 @@ module pd_motion_pose
   use pd_base_eigen, only: solve_symmetric
   use pd_base_kinds, only: wp, i4
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
+  use pd_base_vectors, only: cross
   use pd_body_body, only: body_type
   implicit none (type, external)
   private
   public :: pose_type, new_pose, arm_of, displacement_of, spin_of, spin_rate_of, rotation_of
-  public :: fit_pose, moments_about, drift, keep_pose, cross
+  public :: fit_pose, moments_about, drift, keep_pose
 
   !> Turns that a fit takes at most; each doubles the digits.
   integer, parameter :: most_turns = 60
@@ -256,12 +257,5 @@ contains
     pose%force = values(14:16)
     pose%torque = values(17:19)
   end subroutine keep_pose
-
-  !> The vector product.
-  pure function cross(a, b) result(c)
-    real(wp), intent(in) :: a(3), b(3)   !! vectors
-    real(wp) :: c(3)
-    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-  end function cross
 
 end module pd_motion_pose

@@ -26,8 +26,8 @@ module pd_set_up_prepare
   use pd_scene_content_types, only: scene_type
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_consistent_rules, only: check_consistent, weigh_bonds
-  use pd_set_up_conditions, only: motions_of_scene, loads_of_scene, heating_of_scene, &
-    & in_no_fail_zones
+  use pd_set_up_conditions, only: motions_of_scene, heating_of_scene, in_no_fail_zones
+  use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
     & gravity_of_scene, leave_uncorrected, sides_of_contact
   use pd_set_up_families, only: make_family, finish_family

@@ -13,7 +13,7 @@ module pd_set_up_terms
   use pd_motion_loads, only: load_of, load_type
   use pd_motion_curve, only: constant_curve, ramp
   use pd_scene_content_types, only: is_set, scene_type
-  use pd_set_up_conditions, only: volume_of
+  use pd_set_up_loads, only: volume_of
   implicit none (type, external)
   private
   public :: gravity_of_scene, add_springs_of_scene, add_dashpots_of_scene, leave_uncorrected

@@ -4,6 +4,7 @@ module pd_body_mesh_geometry
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4
   use pd_base_text, only: to_text
+  use pd_base_vectors, only: cross
   use pd_body_mesh_elements, only: face_nodes, most_nodes, n_shapes, shape_functions, shape_type
   use pd_body_mesh_mesh, only: all_shapes, element_text, fault_of_file, mesh_type
   use pd_body_mesh_quadrature, only: counts_of_kind, fine_rule, gauss_rule, rule_type
@@ -231,13 +232,6 @@ contains
     vector = sign*depth*vector
     area = depth*area
   end subroutine face_geometry
-
-  !> The vector product.
-  pure function cross(a, b) result(c)
-    real(wp), intent(in) :: a(3), b(3)
-    real(wp) :: c(3)
-    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-  end function cross
 
   !> `8 or 27`
   pure function listed(counts) result(text)

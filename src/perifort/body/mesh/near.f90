@@ -2,6 +2,7 @@
 module pd_body_mesh_near
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_lookup, only: lookup_type, mix
+  use pd_base_vectors, only: cross
   use pd_body_mesh_elements, only: face_nodes, n_shapes, shape_numbered, shape_type
   use pd_body_mesh_mesh, only: all_shapes
   use pd_body_mesh_part, only: facets_type, part_type
@@ -137,12 +138,5 @@ contains
     end do
     if (inside) distance = abs(dot_product(place - corners(:, 1), normal))/area
   end function from_triangle
-
-  !> The vector product.
-  pure function cross(a, b) result(c)
-    real(wp), intent(in) :: a(3), b(3)
-    real(wp) :: c(3)
-    c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-  end function cross
 
 end module pd_body_mesh_near

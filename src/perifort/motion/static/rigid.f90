@@ -7,12 +7,12 @@ module pd_motion_static_rigid
     & largest_of_ranks, largest_over
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
+  use pd_base_vectors, only: cross
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
   use pd_force_term, only: term_view_type
   use pd_motion_conditions, only: free_component
   use pd_motion_pins, only: held_but_for_pins
   use pd_motion_loads, only: load_of, load_type, number_of_loads
-  use pd_motion_pose, only: cross
   use pd_motion_system, only: system_type, add_loads, view_of
   implicit none (type, external)
   private

@@ -3,6 +3,7 @@
 module pd_output_measures_fragments
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4, i8
+  use pd_base_vectors, only: cross
   use pd_motion_static_pieces, only: find_pieces, pieces_type
   use pd_motion_system, only: inverse_density, system_type
   use pd_output_fields_field, only: moment_type
@@ -203,12 +204,5 @@ contains
       spin(c) = dot_product(momentum/trace, cross(a(:, d), a(:, e)))/determinant
     end do
   end function spin_of
-
-  !> The vector product.
-  pure function cross(a, b) result(product)
-    real(wp), intent(in) :: a(3), b(3)
-    real(wp) :: product(3)
-    product = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-  end function cross
 
 end module pd_output_measures_fragments

@@ -4,7 +4,8 @@ module pd_scene_content_check
   use pd_base_kinds, only: wp, i2
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
-  use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load, check_contact
+  use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
+  use pd_scene_content_check_contact, only: check_contact
   use pd_scene_content_check_bodies, only: check_body, check_shape, check_material, check_crack
   use pd_scene_content_check_measures, only: check_measures
   use pd_scene_content_defaults, only: fill_defaults
