@@ -27,8 +27,7 @@ def glass(case):
     case.show("   start of growth [s]", begin)
     # Until the crack is nearly through. It is fastest just before it branches
     way = fastest(tip, 5e-3, 0.045)
-    case.not_met("   largest mean speed over 5 mm [m/s], of 0.6 of Rayleigh's", way,
-                 0.6 * speed, way < 0.6 * speed, "1 to 6 % above, whatever the step: README.md")
+    case.below("   largest mean speed over 5 mm [m/s], 0.6 of Rayleigh's", way, 0.6 * speed)
     case.below("   mean speed before branching [m/s]", speed_between(tip, 2e-3, place or 0.02),
                0.6 * speed)
     return [(results, "damage", "glass, 1 MPa: damage after 80 us")]
