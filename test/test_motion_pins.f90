@@ -3,8 +3,9 @@
 module test_motion_pins
   use pd_base_error, only: fault_type => error_type, status_input
   use pd_base_kinds, only: wp
+  use pd_base_vectors, only: cross
   use pd_motion_explicit_integrators, only: run_explicit
-  use pd_motion_pose, only: cross, displacement_of, rotation_of
+  use pd_motion_pose, only: displacement_of, rotation_of
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: prepare, set_up_type
