@@ -4,6 +4,7 @@
 module pd_motion_memory
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp
+  use pd_motion_coarse, only: coarse_type
   use pd_motion_newton, only: newton_type, keep_newton
   implicit none (type, external)
   private
@@ -22,6 +23,7 @@ module pd_motion_memory
     integer :: began = 0                   !! step at which the load step began
     integer :: iteration = 0               !! of the dynamic relaxation under way; 0: none is
     type(newton_type), allocatable :: newton  !! there while conjugate gradients are under way
+    type(coarse_type), allocatable :: coarse  !! of their preconditioner; made anew where missing
     real(wp), allocatable :: rate(:, :)    !! displacement per iteration (n_slots, dim) [m]
     real(wp), allocatable :: base(:, :)    !! displacements where dynamic relaxation began [m]
     real(wp), allocatable :: trend(:, :)   !! of the last load step, of 0 rows if of no use [m]

@@ -54,6 +54,8 @@ module pd_motion_newton
     real(wp), allocatable :: moved(:, :)      !! displacements of a difference [m]
     real(wp), allocatable :: mass(:, :)       !! what `inverse` is of, where there are pins [N/m4]
     type(frame_type), allocatable :: frames(:)  !! (motions) of pins at the origin
+    real(wp), allocatable :: on_slow(:)       !! the residual on the functions of the coarse part,
+    real(wp), allocatable :: slow(:)          !! and how they answer; not allocated without [N, m]
   end type krylov_type
 
   !> Newton's iterations and the solve under way.

@@ -2,6 +2,7 @@
 !> mean: sets of points, and facets with areas and normals.
 module pd_body_mesh_part
   use pd_base_error, only: error_type, internal_fault
+  use pd_base_joining, only: each_alone, unite
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: join, lower_case, nearest_name, to_text
@@ -398,39 +399,21 @@ contains
   !> In how many pieces a part falls that share no node.
   integer function count_pieces(part) result(pieces)
     type(part_type), intent(in) :: part  !! with its faces
-    integer(i4), allocatable :: root(:), nodes(:)
+    integer(i4), allocatable :: lowest(:), nodes(:)
     logical, allocatable :: used(:)
-    integer :: e, i, a, b
+    integer :: e, i
 
-    allocate (root(part%mesh%n_nodes))
     allocate (used(part%mesh%n_nodes), source=.false.)
-    root = [(int(i, i4), i=1, part%mesh%n_nodes)]
+    lowest = each_alone(part%mesh%n_nodes)
     do e = 1, part%mesh%n_elements
       if (part%points(2, e) == 0_i4) cycle
       nodes = part%mesh%nodes_of(e)
       used(nodes) = .true.
-      a = top(int(nodes(1)))
       do i = 2, size(nodes)
-        b = top(int(nodes(i)))
-        root(max(a, b)) = int(min(a, b), i4)
-        a = min(a, b)
+        call unite(lowest, nodes(1), nodes(i))
       end do
     end do
-    pieces = count([(used(i) .and. root(i) == i, i=1, part%mesh%n_nodes)])
-
-  contains
-
-    !> The first node of a node's piece so far.
-    integer function top(node)
-      integer, intent(in) :: node
-
-      top = node
-      do while (root(top) /= top)
-        root(top) = root(root(top))
-        top = root(top)
-      end do
-    end function top
-
+    pieces = count([(used(i) .and. lowest(i) == i, i=1, part%mesh%n_nodes)])
   end function count_pieces
 
   !> How many nodes of elements lie on another one, within 1e-6 of `spacing`.

@@ -9,7 +9,7 @@ module pd_motion_static_balance
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text
   use pd_force_forces, only: energy_pass
-  use pd_motion_newton, only: frame_type
+  use pd_motion_newton, only: frame_type, krylov_type
   use pd_motion_pins, only: has_pins
   use pd_motion_static_pins, only: add_drive, drive_pins, frame_pins, squares_of
   use pd_motion_watch_fault, only: place
@@ -21,7 +21,7 @@ module pd_motion_static_balance
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
-  public :: balance_type, begin_balance, weigh, weigh_energies, balanced_but_for_error
+  public :: balance_type, begin_balance, weigh, weigh_energies, weigh_slow, balanced_but_for_error
   public :: allowed_error, error_is_known, relative_residual, describe_left_over
   public :: fail_unconverged, check_drowned, rounding_note
 
@@ -33,6 +33,7 @@ module pd_motion_static_balance
     real(wp) :: thermal = 0.0_wp        !! of the forces of the undeformed body, heated
     real(wp) :: rounding = 0.0_wp       !! of what rounding of the displacements leaves
     real(wp) :: rho = 0.0_wp            !! residual . (residual/mass), weighted with volume [N m]
+    real(wp) :: slow = 0.0_wp           !! what the preconditioner's coarse part adds to it [N m]
     real(wp) :: rho_rounding = 0.0_wp   !! the same of what rounding leaves [N m]
     real(wp) :: left(3) = 0.0_wp        !! loads and reactions together [N]
     real(wp) :: moment(3) = 0.0_wp      !! their moment about the piece's centre [N m]
@@ -436,8 +437,24 @@ contains
     real(wp), intent(in) :: allowed(:)          !! error energy of each piece [J]
     error_is_known = all(balance%piece%rho &
       & <= balance%piece%rho_rounding*merge(1.0_wp, likely**2, silent(balance%piece)) .or. &
-      & (softness > 0.0_wp .and. balance%piece%rho*softness <= allowed))
+      & (softness > 0.0_wp .and. (balance%piece%rho + balance%piece%slow)*softness <= allowed))
   end function error_is_known
+
+  !> Note what the coarse part of a preconditioner adds to the residual's `rho` of every piece.
+  subroutine weigh_slow(system, rigid, krylov, balance)
+    type(system_type), intent(in) :: system       !! whose memory has the coarse part
+    type(rigid_type), intent(in) :: rigid         !! its pieces
+    type(krylov_type), intent(in) :: krylov       !! with the residual of the state weighed
+    type(balance_type), intent(inout) :: balance  !! as weighed
+    integer :: i, p
+
+    balance%piece%slow = 0.0_wp
+    if (.not. allocated(krylov%slow)) return
+    do i = 1, size(krylov%slow)
+      p = rigid%pieces%of(system%memory%coarse%slot_of(i))
+      balance%piece(p)%slow = balance%piece(p)%slow + krylov%on_slow(i)*krylov%slow(i)
+    end do
+  end subroutine weigh_slow
 
   !> The largest relative residual of all pieces; 0 where nothing but rounding is left.
   pure real(wp) function relative_residual(balance) result(residual)

@@ -9,10 +9,11 @@ module pd_motion_static_conjugate_gradient
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_motion_static_balance, only: balance_type, begin_balance, weigh, weigh_energies, &
+    & weigh_slow, &
     & balanced_but_for_error, allowed_error, error_is_known, relative_residual, fail_unconverged, &
     & check_drowned, rounding_note
   use pd_motion_conditions, only: impose
-  use pd_motion_static_krylov, only: make_room, linearise, take_residual, first_direction, &
+  use pd_motion_static_krylov, only: make_room, make_coarse_part, linearise, take_residual, first_direction, &
     & next_direction, take_direction, apply_stiffness, go_along, volume_inner, note_length, &
     & smallest_curvature
   use pd_motion_newton, only: newton_type, krylov_type, sums_type
@@ -95,9 +96,11 @@ contains
     if (amid) then
       call move_alloc(system%memory%newton, newton)
       call make_room(system, relaxation%mass, newton%krylov)
+      call make_coarse_part(system, newton%krylov)
     else
       allocate (newton)
       call make_room(system, relaxation%mass, newton%krylov)
+      call make_coarse_part(system, newton%krylov)
       call check_loads(balance, error)
       if (allocated(error)) return
       change = trend
@@ -163,6 +166,7 @@ contains
     call weigh(system, loosened, rigid, t, balance)
     if (.not. balanced_but_for_error(loosened, rigid, balance)) return
     call weigh_energies(system, rigid, balance)
+    call weigh_slow(system, rigid, newton%krylov, balance)
     has_stalled = error_is_known(balance, newton%softness, allowed_error(loosened, balance))
   end function has_stalled
 
@@ -357,6 +361,7 @@ contains
     softness = newton%softness
     if (newton%iterations < enough_iterations) softness = max(softness, system%memory%softness)
     call weigh_energies(system, rigid, balance)
+    call weigh_slow(system, rigid, newton%krylov, balance)
     in_equilibrium = error_is_known(balance, softness, allowed_error(relaxation, balance))
   end function in_equilibrium
 

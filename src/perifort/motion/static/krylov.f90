@@ -8,16 +8,18 @@ module pd_motion_static_krylov
     & new_running, new_sums, running_type, total_of, total_of_running, summed_type => sums_type
   use pd_body_body, only: share_halo
   use pd_force_model, only: force_options_type, options_of
+  use pd_motion_coarse, only: add_slow, coarse_type, restrict_to, solve_for
   use pd_motion_loads, only: number_of_loads
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
   use pd_motion_pins, only: has_pins
-  use pd_motion_static_pins, only: aim_pins, drive_pins, frame_pins, go_pins
+  use pd_motion_static_coarsen, only: make_coarse
+  use pd_motion_static_pins, only: add_drive, aim_pins, drive_pins, frame_pins, go_pins
   use pd_force_term, only: term_view_type
   use pd_motion_system, only: system_type, add_loads, view_of
   use pd_motion_tangent, only: about_undeformed, forces_at, one_sided, tangent_product, tangent_type
   implicit none (type, external)
   private
-  public :: make_room, linearise, take_residual, first_direction
+  public :: make_room, make_coarse_part, linearise, take_residual, first_direction
   public :: next_direction, take_direction, apply_stiffness, go_along, volume_inner
   public :: smallest_curvature, note_length
 
@@ -50,6 +52,59 @@ contains
     krylov%mass = mass
     call frame_pins(system, mass, krylov%origin, krylov%frames)
   end subroutine make_room
+
+  !> Give the preconditioner a part for slowly varying displacements, where the body is large enough.
+  subroutine make_coarse_part(system, krylov)
+    type(system_type), intent(inout) :: system  !! whose memory keeps it
+    type(krylov_type), intent(inout) :: krylov  !! gets room for its unknowns
+    type(coarse_type), allocatable :: coarse
+
+    call move_alloc(system%memory%coarse, coarse)
+    if (.not. allocated(coarse)) allocate (coarse)
+    call make_coarse(system, coarse)
+    if (coarse%n > 0) allocate (krylov%on_slow(coarse%n), krylov%slow(coarse%n), source=0.0_wp)
+    call move_alloc(coarse, system%memory%coarse)
+  end subroutine make_coarse_part
+
+  !> How the slowly varying displacements answer to the residual; `rho` gets what they add.
+  subroutine aim_slow(system, krylov, rho)
+    type(system_type), intent(in) :: system
+    type(krylov_type), intent(inout) :: krylov
+    real(wp), intent(inout) :: rho
+    real(wp), allocatable :: field(:, :)
+
+    if (.not. allocated(krylov%slow)) return
+    if (size(krylov%of_pins) > 0) then
+      field = krylov%residual
+      call add_drive(system, krylov%frames, krylov%origin, krylov%of_pins, 1.0_wp, field, &
+        & krylov%mass)
+      call restrict_to(system%memory%coarse, system%body%volume, field, krylov%on_slow)
+    else
+      call restrict_to(system%memory%coarse, system%body%volume, krylov%residual, krylov%on_slow)
+    end if
+    call solve_for(system%memory%coarse, krylov%on_slow, krylov%slow)
+    rho = rho + dot_product(krylov%on_slow, krylov%slow)
+  end subroutine aim_slow
+
+  !> Add that answer to the direction, times `factor`. The points of a pin move as its free motions
+  !> can follow. `largest` is the largest component of the direction then.
+  subroutine add_slow_answer(system, factor, krylov, largest)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: factor
+    type(krylov_type), intent(inout) :: krylov
+    real(wp), intent(inout) :: largest
+    real(wp), allocatable :: field(:, :)
+
+    if (.not. allocated(krylov%slow)) return
+    call add_slow(system%memory%coarse, krylov%slow, factor, krylov%direction, krylov%inverse)
+    if (size(krylov%of_pins) > 0) then
+      allocate (field(size(krylov%mass, 1), size(krylov%mass, 2)), source=0.0_wp)
+      call add_slow(system%memory%coarse, krylov%slow, 1.0_wp, field)
+      call add_drive(system, krylov%frames, krylov%origin, drive_pins(system, krylov%frames, &
+        & krylov%origin, field*krylov%mass), factor, krylov%direction)
+    end if
+    largest = largest_over(system%body%order, krylov%direction)
+  end subroutine add_slow_answer
 
   !> The residual from the system's forces and the loads at `t`, and its sums.
   subroutine take_residual(system, t, krylov, sums)
@@ -94,6 +149,8 @@ contains
       call aim_pins(system, 1.0_wp, krylov, largest)
       krylov%rho = krylov%rho + sum(krylov%of_pins**2)
     end if
+    call aim_slow(system, krylov, krylov%rho)
+    call add_slow_answer(system, 1.0_wp, krylov, largest)
     krylov%norm = krylov%rho
     krylov%largest = largest
     krylov%ritz = ritz_type()
@@ -129,6 +186,7 @@ contains
     if (size(krylov%of_pins) > 0) then
       call aim_pins(system, krylov%scale, krylov, largest)
     end if
+    call add_slow_answer(system, krylov%scale, krylov, largest)
     krylov%largest = largest
     if (largest > largest_size*system%family%rule%delta) &
       & call rescale(krylov, direction_size*system%family%rule%delta/largest)
@@ -318,6 +376,7 @@ contains
     if (size(krylov%of_pins) > 0) then
       call go_pins(system, length, krylov, sums)
     end if
+    call aim_slow(system, krylov, sums%rho)
     call share_halo(system%body, system%state%u)
   end subroutine go_along
 

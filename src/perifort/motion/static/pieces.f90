@@ -1,6 +1,7 @@
 !> Connected pieces of a body: points that chains of intact bonds join. What is in equilibrium is a
 !> piece, not the body.
 module pd_motion_static_pieces
+  use pd_base_joining, only: each_alone, unite, settle_groups
   use pd_base_kinds, only: wp, i4
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
@@ -26,11 +27,11 @@ contains
     type(pieces_type), intent(out) :: pieces    !! what is joined
     type(bonds_type) :: bonds
     integer(i4), allocatable :: parent(:)
-    integer(i4) :: k, first, second
+    integer(i4) :: k, first
     integer :: i, n
 
     n = body%n_slots
-    parent = [(int(i, i4), i=1, n)]
+    parent = each_alone(n)
     call allocate_bonds(family, bonds)
     do k = 1, int(n, i4)
       if (body%point(k) == 0) cycle
@@ -38,15 +39,13 @@ contains
       do i = 1, bonds%n
         ! each bond is seen from both ends
         if (bonds%j(i) > k .or. .not. bonds%intact(i)) cycle
-        first = root(k)
-        second = root(bonds%j(i))
-        if (first == second) cycle
-        parent(max(first, second)) = min(first, second)
+        call unite(parent, k, bonds%j(i))
       end do
     end do
+    call settle_groups(parent)
     allocate (pieces%of(n), source=0_i4)
     do i = 1, body%n_points
-      first = root(body%slot(i))
+      first = parent(body%slot(i))
       if (pieces%of(first) == 0_i4) then
         pieces%number = pieces%number + 1
         pieces%of(first) = int(pieces%number, i4)
@@ -54,18 +53,6 @@ contains
       pieces%of(body%slot(i)) = pieces%of(first)
     end do
     call list_slots(body, pieces)
-
-  contains
-
-    !> The lowest slot that is known to be joined with a slot; paths are halved on the way.
-    integer(i4) function root(slot)
-      integer(i4), intent(in) :: slot
-      root = slot
-      do while (parent(root) /= root)
-        parent(root) = parent(parent(root))
-        root = parent(root)
-      end do
-    end function root
   end subroutine find_pieces
 
   !> Slots piece by piece.
