@@ -59,6 +59,7 @@ program main
   use test_motion_equilibrium, only: collect_motion_equilibrium
   use test_motion_heating, only: collect_motion_heating
   use test_motion_newton, only: collect_motion_newton
+  use test_motion_coarse, only: collect_motion_coarse
   use test_motion_pins, only: collect_motion_pins
   use test_motion_plastic, only: collect_motion_plastic
   use test_motion_reactions, only: collect_motion_reactions
@@ -175,6 +176,7 @@ program main
   call register('motion_equilibrium', collect_motion_equilibrium)
   call register('motion_heating', collect_motion_heating)
   call register('motion_newton', collect_motion_newton)
+  call register('motion_coarse', collect_motion_coarse)
   call register('motion_pins', collect_motion_pins)
   call register('motion_plastic', collect_motion_plastic)
   call register('motion_reactions', collect_motion_reactions)

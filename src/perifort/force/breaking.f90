@@ -13,8 +13,8 @@ module pd_force_breaking
   use pd_force_generic_points, only: generic_energy_product, generic_point_damage, &
     & generic_point_energy
   use pd_force_model, only: model_type, bond_limit
-  use pd_force_reference, only: bond_state_type, state_of_bond, point_energy, &
-    & energy_product, point_damage
+  use pd_force_reference, only: bond_state_type, state_of_bond, stretch_of_bond, &
+    & point_energy, energy_product, point_damage
   use pd_force_workspace, only: generic_workspace_type
   implicit none (type, external)
   private
@@ -229,12 +229,11 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)  !! displacements (n_slots, dim) [m]
     real(wp), intent(out) :: ratios(:)           !! (n_slots) [-]
     type(bonds_type) :: bonds
-    type(bond_state_type) :: state
-    real(wp) :: lower, upper
+    real(wp) :: stretch, lower, upper
     integer :: k, i
 
     !$omp parallel default(none) shared(family, model, u, ratios) &
-    !$omp private(bonds, state, lower, upper, k, i)
+    !$omp private(bonds, stretch, lower, upper, k, i)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 64)
     do k = 1, family%n_slots
@@ -244,9 +243,9 @@ contains
         if (.not. bonds%intact(i)) cycle
         call bond_limit(model, k, int(bonds%j(i)), lower, upper)
         if (.not. upper < never) cycle
-        state = state_of_bond(model, u, k, bonds, i)
-        ratios(k) = max(ratios(k), state%stretch/upper)
-        if (lower > -never) ratios(k) = max(ratios(k), state%stretch/lower)
+        stretch = stretch_of_bond(model, u, k, bonds, i)
+        ratios(k) = max(ratios(k), stretch/upper)
+        if (lower > -never) ratios(k) = max(ratios(k), stretch/lower)
       end do
     end do
     !$omp end parallel

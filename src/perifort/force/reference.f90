@@ -7,7 +7,7 @@ module pd_force_reference
   use pd_force_model, only: bond_factors_of, model_type, p_of, q_of, t_of
   implicit none (type, external)
   private
-  public :: bond_state_type, state_of_bond, point_dilatation, point_force, point_energy
+  public :: bond_state_type, state_of_bond, stretch_of_bond, point_dilatation, point_force, point_energy
   public :: energy_product, point_damage, reference_dilatation, reference_force, reference_energy
 
   !> How a bond is deformed.
@@ -22,7 +22,6 @@ module pd_force_reference
 contains
 
   !> State of the `i`-th bond of slot `k` under displacements `u` (n_slots, dim) [m].
-  !> The stretch is formed without cancellation (doc/theory.md, 2).
   pure function state_of_bond(model, u, k, bonds, i) result(state)
     type(model_type), intent(in) :: model  !! parameters of the slots
     real(wp), intent(in) :: u(:, :)        !! (n_slots, dim) displacements [m]
@@ -30,17 +29,15 @@ contains
     type(bonds_type), intent(in) :: bonds  !! of slot `k`
     integer, intent(in) :: i               !! number of the bond, from 1
     type(bond_state_type) :: state
-    real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length, y, gb, gd
+    real(wp) :: xi(size(u, 2)), deformed(size(u, 2)), length, y, gb, gd
     integer :: j
 
     j = bonds%j(i)
     length = bonds%length(i)
     xi = bonds%xi(i, :)
-    eta = u(j, :) - u(k, :)
-    y = norm2(xi + eta)
-    state%stretch = (2*dot_product(xi, eta) + dot_product(eta, eta))/(length*(y + length))
+    call deform(u, k, bonds, i, deformed, y, state%stretch)
     ! a bond crushed to a point has no direction: no force rather than NaN
-    if (y > 0.0_wp) state%direction(:size(u, 2)) = (xi + eta)/y
+    if (y > 0.0_wp) state%direction(:size(u, 2)) = deformed/y
     if (model%projected) state%lambda = dot_product(state%direction(:size(u, 2)), xi)/length
     if (model%thermal) state%stretch = state%stretch - (model%expansion(k) + model%expansion(j))/2
     if (model%surface) then
@@ -59,6 +56,38 @@ contains
       state%Gb = state%Gb*gb
     end if
   end function state_of_bond
+
+  !> The mechanical stretch alone [-].
+  pure real(wp) function stretch_of_bond(model, u, k, bonds, i) result(stretch)
+    type(model_type), intent(in) :: model  !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)        !! (n_slots, dim) displacements [m]
+    integer, intent(in) :: k               !! slot
+    type(bonds_type), intent(in) :: bonds  !! of slot `k`
+    integer, intent(in) :: i               !! number of the bond, from 1
+    real(wp) :: deformed(size(u, 2)), y
+    integer :: j
+
+    j = bonds%j(i)
+    call deform(u, k, bonds, i, deformed, y, stretch)
+    if (model%thermal) stretch = stretch - (model%expansion(k) + model%expansion(j))/2
+  end function stretch_of_bond
+
+  !> The deformed bond, its length, and its stretch, which is formed without cancellation
+  !> (doc/theory.md, 2).
+  pure subroutine deform(u, k, bonds, i, deformed, y, stretch)
+    real(wp), intent(in) :: u(:, :)
+    integer, intent(in) :: k, i
+    type(bonds_type), intent(in) :: bonds
+    real(wp), intent(out) :: deformed(:), y, stretch
+    real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length
+
+    length = bonds%length(i)
+    xi = bonds%xi(i, :)
+    eta = u(bonds%j(i), :) - u(k, :)
+    deformed = xi + eta
+    y = norm2(deformed)
+    stretch = (2*dot_product(xi, eta) + dot_product(eta, eta))/(length*(y + length))
+  end subroutine deform
 
   !> theta of slot `k` (7.39).
   pure real(wp) function point_dilatation(model, u, k, bonds) result(theta)

@@ -45,7 +45,7 @@ contains
     real(wp), parameter :: per_weight = 16.0_wp                         !! tables of lattices
     real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded
     real(wp), parameter :: per_breaking = 30.0_wp                       !! limits and damage
-    real(wp), parameter :: per_solver = 80.0_wp, per_rule = 24.0_wp     !! a component
+    real(wp), parameter :: per_solver = 95.0_wp, per_rule = 24.0_wp     !! a component
     real(wp), parameter :: block = 8.0_wp                               !! slots with one table
     real(wp), parameter :: per_generic_bond = 33.0_wp                   !! of both directions each
     real(wp), parameter :: per_history = 13.0_wp                        !! a real, two states

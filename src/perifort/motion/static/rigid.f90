@@ -23,6 +23,10 @@ module pd_motion_static_rigid
   real(wp), parameter :: held_at_all = 1.0e-12_wp
   integer, parameter :: most_turns = 60         !! iterations to find a finite rotation
   real(wp), parameter :: negligible = 1.0e-14_wp !! motion over the displacements
+  !> So many turns that bring neither the goal nearer nor an end: what is to be fitted does not look
+  !> like a rigid motion, or only rounding is left.
+  integer, parameter :: most_vain_turns = 3
+  real(wp), parameter :: no_nearer = 1 - 1.0e-6_wp, no_smaller = 0.5_wp
 
   !> A piece, and its free rigid motions as combinations of three translations and three rotations.
   type :: piece_type
@@ -485,16 +489,21 @@ contains
       !! (n_slots, dim) of each component, 0 for those that do not count
     real(wp), intent(inout) :: u(:, :)
       !! (n_slots, dim) displacements; those of the piece change [m]
-    real(wp) :: matrix(6, 6), side(6), mode(6), part(6), centre(3)
-    type(running_type) :: of_matrix(6), of_side
-    integer :: turn, n, k, c, i
+    real(wp) :: matrix(6, 6), side(6), mode(6), part(6), centre(3), size_now, size_before, &
+      & misfit, least
+    type(running_type) :: of_matrix(6), of_side, of_misfit
+    integer :: turn, n, k, c, i, vain
 
     associate (piece => rigid%piece(p), pieces => rigid%pieces)
       associate (slots => pieces%slots(pieces%start(p):pieces%start(p + 1) - 1))
+        size_before = huge(size_before)
+        least = huge(least)
+        vain = 0
         do turn = 1, most_turns
           centre = piece%centre
           centre(:system%body%dim) = centre(:system%body%dim) + mean_over(system, slots, u)
           call new_running(system%body%order, of_side)
+          call new_running(system%body%order, of_misfit)
           do i = 1, 6
             call new_running(system%body%order, of_matrix(i))
           end do
@@ -503,6 +512,8 @@ contains
             do c = 1, system%body%dim
               if (.not. weight(k, c) > 0.0_wp) cycle
               part = motion_at(centre, piece%size, system%body%x(k, :) + u(k, :), c)
+              call add_point(system%body%order, system%body%point(k), &
+                & [weight(k, c)*(target(k, c) - u(k, c))**2], of_misfit)
               call add_point(system%body%order, system%body%point(k), &
                 & weight(k, c)*(target(k, c) - u(k, c))*part, of_side)
               do i = 1, 6
@@ -519,8 +530,15 @@ contains
           ! at most a radian at a time
           mode = mode/max(1.0_wp, norm2(mode(4:))/piece%size)
           call move_rigidly(system, piece, slots, mode, u)
-          if (norm2(mode) <= negligible*largest_of_ranks(system%body%order, &
+          size_now = norm2(mode)
+          if (size_now <= negligible*largest_of_ranks(system%body%order, &
             & maxval(abs(u(slots, :))))) exit
+          part = total_of_running(system%body%order, of_misfit)
+          misfit = part(1)
+          if (size_now > no_smaller*size_before .and. misfit >= no_nearer*least) vain = vain + 1
+          if (vain == most_vain_turns) exit
+          size_before = size_now
+          least = min(least, misfit)
         end do
       end associate
     end associate
