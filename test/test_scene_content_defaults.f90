@@ -34,6 +34,8 @@ contains
       & new_unittest('rows of the history', test_rows), &
       & new_unittest('lines of a relaxation', test_lines), &
       & new_unittest('temperature changes in relaxation', test_temperature), &
+      & new_unittest('the critical stretch', test_critical), &
+      & new_unittest('growth in relaxation', test_growth), &
       & new_unittest('the resolved scene names its version', test_resolved), &
       & new_unittest('a scene built in memory', test_memory)]
   end subroutine collect_scene_content_defaults
@@ -157,6 +159,48 @@ contains
     if (allocated(error)) return
     call expect_true(error, abs(scene%initial(1)%ramp_time - 1.0_wp) <= 0.0_wp, 'this version')
   end subroutine test_temperature
+
+  !> From Gc: version 0.1 by the formula, this one from the lattice's toughness; a name that is
+  !> given stays, and a critical stretch that is given needs none.
+  subroutine test_critical(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: body = &
+      & '&body lower = 0, 0 upper = 1, 0.5 points = 100, 50 /'//line//'&time steps = 5 /'//line
+    character(*), parameter :: brittle = '&material youngs_modulus = 1e9 density = 1e3 '// &
+      & 'poissons_ratio = 0.3 critical_energy_release_rate = 10 '
+
+    call expect_critical("defaults = '0.1'", brittle//'/', 'chapter')
+    call expect_critical('', brittle//'/', 'lattice')
+    call expect_critical("defaults = '0.1'", brittle//"critical = 'lattice' /", 'lattice')
+    call expect_critical('', brittle//"critical = 'chapter' /", 'chapter')
+    call expect_critical('', '&material youngs_modulus = 1e9 density = 1e3 '// &
+      & 'poissons_ratio = 0.3 critical_stretch = 0.01 /', '')
+
+  contains
+
+    subroutine expect_critical(version, material, critical)
+      character(*), intent(in) :: version, material, critical
+      type(scene_type) :: scene
+      if (allocated(error)) return
+      call expect_scene(error, '&scene dimension = 2 '//version//' /'//line//body//material, scene)
+      if (allocated(error)) return
+      call check(error, trim(scene%materials(1)%critical), critical, version//material)
+    end subroutine expect_critical
+  end subroutine test_critical
+
+  !> Version 0.1: by load steps; this one decides when the system is known.
+  subroutine test_growth(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call expect_scene(error, old_head//relaxed, scene)
+    if (allocated(error)) return
+    call check(error, trim(scene%relaxation%growth), 'load_steps', 'version 0.1')
+    if (allocated(error)) return
+    call expect_scene(error, head//relaxed, scene)
+    if (allocated(error)) return
+    call check(error, trim(scene%relaxation%growth), '', 'this version')
+  end subroutine test_growth
 
   !> What is written with the results gives the same scene, whatever version reads it.
   subroutine test_resolved(error)

@@ -4,6 +4,8 @@ A crack's length is that of the elastic body with the same compliance, with a cr
 start; a cut crack is half a spacing longer than given. LEFM's load at that length is P_c = K_c B/...,
 K_c = sqrt(E' Gc), E' = E in plane stress and E/(1 - nu^2) in plane strain.
 """
+import re
+
 import numpy as np
 from common import change
 from measures import spacing_of
@@ -83,6 +85,13 @@ def material(text, nu, plane):
     return change(text, "material", poissons_ratio=nu)
 
 
+def refined(text):
+    """The scene on a lattice of half the spacing; what guides the crack stays so many rows wide."""
+    numbers = re.search(r"^  points = (.*)$", text, re.M).group(1)
+    text = change(text, "body", points=", ".join(str(2 * int(n)) for n in numbers.split(",")))
+    return text.replace("0.0016", "0.0008")
+
+
 def compliance(case, kind, text, label):
     """Lengths [m] and compliances [m/N] of the elastic specimen with cracks cut at these lengths."""
     found = []
@@ -104,12 +113,14 @@ def formula(kind, lengths, values, modulus):
     return np.sqrt(slope / (2 * THICKNESS) * modulus) / kind.shape(lengths[3])
 
 
-def grow(case, kind, nu=0.35, plane="stress", label=""):
+def grow(case, kind, nu=0.35, plane="stress", fine=False, label=""):
     """Let the crack of a specimen grow. Returns a dictionary: the load over P_c(a) averaged over the
     growth from 3 to 10 horizons, the peak load over P_c of the initial crack, the energy per area over
     Gc in the same growth, how far the crack came in horizons, and the curves.
     """
     text = material(case.scene(kind.scene), nu, plane)
+    if fine:
+        text = refined(text)
     label = label or kind.scene[:-4]
     lengths, values, dx = compliance(case, kind, text, label)
     results = case.run(f"{label}_grown.nml", with_rules(text), threads=case.threads)
@@ -150,7 +161,11 @@ def grow(case, kind, nu=0.35, plane="stress", label=""):
 def judge(case, kind, **settings):
     """A specimen's rows."""
     found = grow(case, kind, **settings)
-    where = kind.name + (f", nu {settings['nu']:.2g}, plane {settings['plane']}" if settings else "")
+    where = kind.name
+    if settings.get("fine"):
+        where += ", half the spacing"
+    elif settings:
+        where += f", nu {settings['nu']:.2g}, plane {settings['plane']}"
     case.near(f"{where}: mean P/P_c(a), growth of 3 to 10 horizons", found["mean"], 1.0, relative=0.05)
     case.near("   energy per area over Gc in the same growth", found["energy"], 1.0, relative=0.05)
     case.above("   growth reached, in horizons", found["reach"], 10.0)
@@ -176,6 +191,7 @@ def specimen(name):
             return []
         pictures = [(judge(case, kind)["results"], "damage", kind.name)]
         if case.options.full and GROWTH == "events":
+            judge(case, kind, fine=True, label=f"{kind.scene[:-4]}_fine")
             for nu in (0.2, 1 / 3, 0.4):
                 for plane in ("stress", "strain"):
                     judge(case, kind, nu=nu, plane=plane,

@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import bodies  # noqa: E402
 import dynamics  # noqa: E402
 import specimens  # noqa: E402
+import sweep  # noqa: E402
 import waves  # noqa: E402
 
 PARTS = {
@@ -27,7 +28,10 @@ PARTS = {
     "strip": dynamics.strip,
     "kalthoff": dynamics.kalthoff,
     "ring": dynamics.ring,
+    "sweep": sweep.sweep,
 }
+# Parts that only --full and --only run
+LONG = ("sweep",)
 
 
 def pictures(case, shown):
@@ -68,7 +72,9 @@ def main():
     case.threads = case.options.threads
     # Load over growth of the specimens, for a picture
     case.curves = {}
-    names = case.options.only.split(",") if case.options.only else list(PARTS)
+    names = [name for name in PARTS if case.options.full or name not in LONG]
+    if case.options.only:
+        names = case.options.only.split(",")
     unknown = [name for name in names if name not in PARTS]
     if unknown:
         sys.exit(f"error: no part is called {', '.join(unknown)}; known: {', '.join(PARTS)}")

@@ -53,7 +53,7 @@ contains
     call frame_pins(system, mass, krylov%origin, krylov%frames)
   end subroutine make_room
 
-  !> Give the preconditioner a part for slowly varying displacements, where the body is large enough.
+  !> Give the preconditioner a part for slowly varying displacements where the body is large enough.
   subroutine make_coarse_part(system, krylov)
     type(system_type), intent(inout) :: system  !! whose memory keeps it
     type(krylov_type), intent(inout) :: krylov  !! gets room for its unknowns
