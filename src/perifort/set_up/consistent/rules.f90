@@ -25,6 +25,10 @@ contains
 
     if (scene%horizon%surface_correction /= 'consistent') return
     do i = 1, size(scene%bodies)
+      if (scene%bodies(i)%mesh /= '') then
+        call refuse('body', i, 'mesh', 'a mesh', 'its areas make no weights for uneven points')
+        return
+      end if
       if (scene%bodies(i)%file == '') cycle
       call refuse('body', i, 'file', 'a cloud', 'the surface areas of its points are not known')
       return
