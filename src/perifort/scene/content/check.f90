@@ -237,6 +237,15 @@ contains
       allocate (scene%output%fields(size(default_fields)))
       scene%output%fields(:) = default_fields
     end if
+    if (scene%output%cells .and. all(scene%bodies%mesh == '')) then
+      call rule_fault(error, 'output', 1, 'cells', "'cells' without a mesh", &
+        & "cells are the elements of bodies with the key 'mesh'; ./pf plot draws the cells of "// &
+        & 'lattices without it', source)
+    else if (scene%output%cells .and. scene%output%format /= 'vtkhdf') then
+      call rule_fault(error, 'output', 1, 'format', "format = '"//trim(scene%output%format)// &
+        & "' has no cells of meshes", "only format = 'vtkhdf' has them", source)
+    end if
+    if (allocated(error)) return
     do i = 1, size(scene%probes)
       associate (probe => scene%probes(i))
         if (probe%name == '') then
