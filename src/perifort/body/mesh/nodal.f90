@@ -86,7 +86,11 @@ contains
     call begin(mean, size(elements))
     do i = 1, size(elements)
       points = points_of(part, elements(i:i))
-      call put(mean, i, points, volume(points)/sum(volume(points)))
+      if (size(points) == 1) then
+        call put(mean, i, points, [1.0_wp])  ! a quotient might round
+      else
+        call put(mean, i, points, volume(points)/sum(volume(points)))
+      end if
     end do
     call finish(mean)
   end subroutine sums_of_elements
@@ -99,7 +103,7 @@ contains
     real(wp), allocatable, intent(out) :: weight(:)
     logical, intent(out) :: complete
     real(wp) :: centre(size(at)), spread(size(at), size(at)), values(size(at)), &
-      & vectors(size(at), size(at)), slope(size(at)), along
+      & vectors(size(at), size(at)), slope(size(at)), along, none
     integer :: i, p
 
     weight = volume/sum(volume)
@@ -111,12 +115,14 @@ contains
       end do
     end do
     call eigenvectors(spread, values, vectors)
+    ! of a single point rounding leaves a variance that means nothing
+    none = flat*sum(values) + (16*epsilon(1.0_wp)*maxval(abs(x)))**2
     complete = .true.
     slope = 0.0_wp
     do i = 1, size(at)
       along = dot_product(at - centre, vectors(:, i))
-      if (values(i) <= flat*sum(values)) then
-        complete = complete .and. along**2 <= flat*sum(values)
+      if (values(i) <= none) then
+        complete = complete .and. along**2 <= none
       else if (along**2 > farthest**2*values(i)) then
         complete = .false.
       else
