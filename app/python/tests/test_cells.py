@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import perifort
+import perifort.pictures
 from perifort.pictures import elements
 
 try:
@@ -293,7 +294,10 @@ class TestCells(unittest.TestCase):
                 "displacement", of="nodes"), atol=1e-12)
         except ImportError:
             pass
-        pictures = results.plot(field=["displacement"], component="x")
+        pictures = results.plot(field=["displacement"], component="x", quiet=True)
+        self.assertTrue(all(path.stat().st_size > 5000 for path in pictures))
+        pictures = perifort.pictures.compare_results(results, results, field="stress",
+                                                     component="xx", clip="z=0.4", quiet=True)
         self.assertTrue(all(path.stat().st_size > 5000 for path in pictures))
 
     def test_room_and_restart(self):
