@@ -18,6 +18,7 @@ program main
   use test_base_text, only: collect_base_text
   use test_base_threads, only: collect_base_threads
   use test_base_version, only: collect_base_version
+  use test_body_shapes, only: collect_body_shapes
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
   use test_law_contract, only: collect_law_contract
@@ -134,6 +135,7 @@ program main
   call register('base_text', collect_base_text)
   call register('base_threads', collect_base_threads)
   call register('base_version', collect_base_version)
+  call register('body_shapes', collect_body_shapes)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
   call register('law_contract', collect_law_contract)

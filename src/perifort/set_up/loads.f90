@@ -9,7 +9,8 @@ module pd_set_up_loads
   use pd_scene_content_types, only: scene_type, load_group, is_set
   use pd_body_body, only: body_type
   use pd_body_meshes, only: facet_areas, names_set, place_set_fault
-  use pd_body_regions, only: region_mask, values_on
+  use pd_body_choice, only: values_on
+  use pd_body_regions, only: region_mask
   use pd_family_areas, only: behind_share, next_points, outermost_share
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_motion_loads, only: load_type, add_part
