@@ -276,18 +276,22 @@ contains
       & "a sphere without the key 'radius'|a/b.nml:4")
     call expect_fault(error, space//"&body shape = 'sphere' radius = 1 /"//line, &
       & "needs the key 'spacing'|a/b.nml:4")
-    call expect_fault(error, space//"&body shape = 'sphere' radius = 1 spacing = 0.1 points = 2 2 "// &
+    call expect_fault(error, space//"&body shape = 'sphere' radius = 1 spacing = 0.1 points = "// &
+      & "2 2 "// &
       & '2 /'//line, "a body with a 'shape' has no key 'points'|a/b.nml:4")
-    call expect_fault(error, space//"&body shape = 'sphere' radius = 1 spacing = 0.1 lower = 0 0 "// &
+    call expect_fault(error, space//"&body shape = 'sphere' radius = 1 spacing = 0.1 lower = 0 "// &
+      & "0 "// &
       & '0 /'//line, "a sphere has no key 'lower'|a/b.nml:4")
     call expect_fault(error, space//"&body shape = 'cylinder' radius = 1 spacing = 0.1 /"//line, &
       & "a cylinder without the key 'height'|a/b.nml:4")
     call expect_fault(error, space//"&body shape = 'cylinder' radius = 1 height = 0.33 "// &
       & 'spacing = 0.1 /'//line, 'the spacing does not divide the length of 0.33 m along z|'// &
       & '0.11 m (3 points)|a/b.nml:4')
-    call expect_fault(error, plane//"&body shape = 'cylinder' radius = 1 height = 1 spacing = 0.1 /" &
+    call expect_fault(error, plane//"&body shape = 'cylinder' radius = 1 height = 1 spacing = "// &
+      & "0.1 /" &
       & //line, "this cylinder in a scene of dimension 2|axis = 'z'|a/b.nml:4")
-    call expect_fault(error, plane//'&body lower = 0 0 upper = 1 1 points = 9 9 radius = 1 /'//line, &
+    call expect_fault(error, plane//'&body lower = 0 0 upper = 1 1 points = 9 9 radius = 1 '// &
+      & '/'//line, &
       & "a body without a shape has no key 'radius'|a/b.nml:4")
     call expect_fault(error, plane//square//"&keep /"//line, "&keep lacks the key 'shape'|"// &
       & "'region' or 'where'|a/b.nml:5")
@@ -298,12 +302,14 @@ contains
       & "lacks the key 'direction'|a/b.nml:5")
     call expect_fault(error, plane//square//"&remove shape = 'cone' direction = 1 0 /"//line, &
       & "a cone without the key 'angle'|a/b.nml:5")
-    call expect_fault(error, plane//square//"&remove shape = 'half_space' direction = 0 0 /"//line, &
+    call expect_fault(error, plane//square//"&remove shape = 'half_space' direction = 0 0 "// &
+      & "/"//line, &
       & "'direction' is zero|a/b.nml:5")
     call expect_fault(error, plane//square//"&remove shape = 'half_space' direction = 1 0 "// &
       & 'radius = 1 /'//line, "'radius' is no key of a half_space|a/b.nml:5")
     call expect_fault(error, plane//square//"&remove shape = 'cylinder' direction = 1 0 "// &
-      & "axis = 'z' radius = 1 /"//line, "'axis' is no key of a cylinder with a direction|a/b.nml:5")
+      & "axis = 'z' radius = 1 /"//line, "'axis' is no key of a cylinder with a "// &
+      & "direction|a/b.nml:5")
   end subroutine test_refused
 
 end module test_body_shapes

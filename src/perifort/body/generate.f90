@@ -8,14 +8,14 @@ module pd_body_generate
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: is_box, is_lattice, scene_type, is_set
+  use pd_scene_content_types, only: body_group, is_lattice, scene_type, is_set, unset
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_meshes, only: keep_part, material_number, mesh_body
   use pd_body_mesh_part, only: part_type
-  use pd_body_lattices, only: lattice_points, lattice_grid
+  use pd_body_lattices, only: lattice_points, lattice_grid, place_in
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
   use pd_body_choice, only: choose_points
@@ -25,6 +25,7 @@ module pd_body_generate
   public :: generate_body, horizon_of
 
   real(wp), parameter :: same_grid = 1.0e-6_wp  !! how far two grids may differ [spacings]
+  real(wp), parameter :: same_axes = 1.0e-9_wp  !! how far those of one grid may differ
   real(wp), parameter :: largest_ratio = 1.0e4_wp  !! of horizon to spacing
   real(wp), parameter :: most_members = 2.0e5_wp  !! of the box around a horizon [points]
 
@@ -65,8 +66,7 @@ contains
         if (allocated(error)) return
       else
         call lattice_points(body%dim, scene%bodies(i), depth, one)
-        if (.not. is_box(scene%bodies(i))) call keep_points(one, inside_body(scene%bodies(i), &
-          & one%x, touch*minval(one%spacing)))
+        if (scene%bodies(i)%shape /= '') call keep_shape(scene%bodies(i), depth, one)
         one%grid = number_of_grid(body, lattice_grid(scene%bodies(i), body%dim))
       end if
       one%body = int(i, i2)
@@ -92,6 +92,20 @@ contains
     if (present(counts)) call move_alloc(counted, counts)
     call check_lattices(scene, body, error)
   end subroutine generate_body
+
+  !> Leave out the points of a lattice that do not lie in its shape, which is turned with it.
+  pure subroutine keep_shape(group, depth, body)
+    type(body_group), intent(in) :: group
+    real(wp), intent(in) :: depth
+    type(body_type), intent(inout) :: body
+    type(body_group) :: straight
+    type(body_type) :: points
+
+    straight = group
+    straight%axis_1 = unset
+    call lattice_points(body%dim, straight, depth, points)
+    call keep_points(body, inside_body(group, points%x, touch*minval(points%spacing)))
+  end subroutine keep_shape
 
   !> Leave out the points that no `&keep` keeps, then those that a `&remove` takes. An error if that
   !> takes points of a mesh, or all.
@@ -234,7 +248,9 @@ contains
 
     do i = 1, size(body%grids)
       if (abs(body%grids(i)%spacing - grid%spacing) > same_grid*grid%spacing) cycle
-      shift = (grid%origin - body%grids(i)%origin)/grid%spacing
+      if (any(abs(body%grids(i)%axes - grid%axes) > same_axes)) cycle
+      shift = 0.0_wp
+      shift(:body%dim) = place_in(body%grids(i), grid%origin(:body%dim))
       if (maxval(abs(shift - anint(shift))) > same_grid) cycle
       number = int(i, i2)
       return

@@ -215,7 +215,8 @@ contains
     end do
   end function points_on
 
-  !> How large a crack is [m]: the length of a segment or chain; a parallelogram's two edges; a disc's diameter.
+  !> How large a crack is [m]: the length of a segment or chain; a parallelogram's two edges; a
+  !> disc's diameter.
   pure function extents_of(group, dim) result(extents)
     type(crack_group), intent(in) :: group   !! the crack
     integer, intent(in) :: dim               !! of the scene

@@ -9,7 +9,8 @@ module pd_body_mesh_elements
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: shape_type, shape_of, shape_numbered, shape_functions, face_nodes, face_shape, edge_between
+  public :: shape_type, shape_of, shape_numbered, shape_functions, face_nodes, face_shape, &
+    & edge_between
   public :: n_shapes, most_nodes, kind_point, kind_line, kind_triangle, kind_quadrilateral, &
     & kind_tetrahedron, kind_hexahedron, kind_wedge, kind_pyramid
 

@@ -79,7 +79,7 @@ contains
     type(part_type), intent(in) :: part          !! with its faces
     integer(i4), intent(in) :: elements(:)       !! (elements) with points
     real(wp), intent(in) :: volume(:)            !! (points of the part) [m3]
-    type(sums_type), intent(out) :: mean         !! (elements) with the numbers of points in the part
+    type(sums_type), intent(out) :: mean         !! (elements) by numbers of points in the part
     integer(i4), allocatable :: points(:)
     integer :: i
 

@@ -144,7 +144,7 @@ contains
     call append_sums(cells%node_means, mean, part%first - 1)
     call append_sums(cells%node_fits, linear, part%first - 1)
     call append_sums(cells%means, inside, part%first - 1)
-    cells%nearest_of_node = [cells%nearest_of_node, nearest(part, nodes, x, mean)]
+    cells%nearest_of_node = [cells%nearest_of_node, nearest_points(part, nodes, x, mean)]
     cells%nearest_of_cell = [cells%nearest_of_cell, int(part%points(1, elements), i4) &
       & + int(part%first - 1, i4)]
     cells%offsets = [cells%offsets, cells%offsets(size(cells%offsets)) + offsets]
@@ -170,7 +170,7 @@ contains
   end subroutine add_nodes
 
   !> Of the points of the elements around a node the nearest one, by its number among all.
-  pure function nearest(part, nodes, x, around) result(found)
+  pure function nearest_points(part, nodes, x, around) result(found)
     type(part_type), intent(in) :: part
     integer(i4), intent(in) :: nodes(:)
     real(wp), intent(in) :: x(:, :)
@@ -190,7 +190,7 @@ contains
         found(i) = around%point(t) + int(part%first - 1, i4)
       end do
     end do
-  end function nearest
+  end function nearest_points
 
   !> Values at the nodes.
   pure function at_nodes(cells, rule, values) result(found)
@@ -234,7 +234,8 @@ contains
   elemental integer(i1) function vtk_type(shape) result(number)
     type(shape_type), intent(in) :: shape  !! of the element
 
-    number = int(pick(shape, [1, 3, 5, 9, 10, 12, 13, 14], [0, 21, 22, 23, 24, 25, 26, 0], 28, 29), &
+    number = int(pick(shape, [1, 3, 5, 9, 10, 12, 13, 14], [0, 21, 22, 23, 24, 25, 26, 0], 28, &
+      & 29), &
       & i1)
   end function vtk_type
 
@@ -245,7 +246,8 @@ contains
     number = pick(shape, [1, 2, 4, 5, 6, 9, 8, 7], [0, 34, 36, 37, 38, 48, 40, 0], 35, 50)
   end function xdmf_type
 
-  !> A number for each shape from tables by kind: of linear ones, quadratic ones, quadrilaterals of 9
+  !> A number for each shape from tables by kind: of linear ones, quadratic ones, quadrilaterals of
+  !> 9
   !> and hexahedra of 27 nodes.
   pure integer function pick(shape, linear, quadratic, nine, twenty_seven) result(number)
     type(shape_type), intent(in) :: shape

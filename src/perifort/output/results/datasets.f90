@@ -22,7 +22,8 @@ module pd_output_results_datasets
   implicit none (type, external)
   private
   public :: put_array, make_dataset, make_series, write_rows, read_rows, set_rows, get_shape
-  public :: put_unsigned, get_chunk, make_view, settled_properties, storage_f8, storage_f4, storage_i8
+  public :: put_unsigned, get_chunk, make_view, settled_properties, storage_f8, storage_f4, &
+    & storage_i8
 
   integer, parameter :: storage_f8 = 1  !! 64-bit real
   integer, parameter :: storage_f4 = 2  !! 32-bit real

@@ -1,6 +1,7 @@
 !> How the results file is laid out, and how its parts are made and copied.
 !>
-!> `/VTKHDF` follows VTK's file format of that name (version 2.0, with steps): of type PolyData, each
+!> `/VTKHDF` follows VTK's file format of that name (version 2.0, with steps): of type PolyData,
+!> each
 !> point a vertex, or, with cells, UnstructuredGrid. The nodes of cells then stand behind the points
 !> in `Points` and in all of `PointData`, and `CellData` has the values of cells.
 !> `/scene`, `/points`, `/cells` and `/history` are this program's own, and other readers pass over
@@ -406,7 +407,8 @@ contains
   pure integer(i8) function fixed_bytes(self)
     class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
 
-    fixed_bytes = self%rows_of_output()*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
+    fixed_bytes = self%rows_of_output()*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + &
+      & size(self%fields)) &
       & + self%row_capacity*8*size(self%columns)
     ! a view has a record and a place in the index of its group
     if (views_fit(self%fields, self%capacity)) &

@@ -108,7 +108,8 @@ contains
   !> An error if the description is unusable, if older results are in the way, if the files do not
   !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
-    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, lines, cells)
+    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, &
+    & lines, cells)
     class(results_type), intent(out) :: self       !! open on return, unless an error is set
     character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
                                                    !! the current one

@@ -71,7 +71,7 @@ contains
   elemental type(view_type) function view_of_cells(view) result(of_cells)
     type(view_type), intent(in) :: view          !! of the points
     of_cells = view
-    of_cells%group = folder_of_cells//view%group(len(folder) + 1:)
+    of_cells%group = folder_of_cells//trim(view%group(len(folder) + 1:))
   end function view_of_cells
 
   !> Whether a file with room for `outputs` outputs of these fields has views of them.

@@ -49,6 +49,7 @@ contains
       call check_mesh(scene, number, lattice, error, source)
       if (allocated(error)) return
       call fill_shape(body, d, number, error, source)
+      if (.not. allocated(error)) call check_axes(scene, body, number, error, source)
       if (allocated(error) .or. body%mesh /= '') return
       lattice = lattice .or. body%shape /= ''
       if (body%file /= '') then
@@ -90,7 +91,83 @@ contains
     end associate
   end subroutine check_body
 
-  !> The box of cells of a body that has a shape: `lower`, `upper` and `points` follow from its keys.
+  !> The axes of a turned lattice: directions that span a frame, and nothing beside them that knows
+  !> x,
+  !> y and z alone.
+  subroutine check_axes(scene, body, number, error, source)
+    type(scene_type), intent(in) :: scene
+    type(body_group), intent(in) :: body
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    real(wp), parameter :: parallel = 1.0e-6_wp
+    real(wp) :: cross(3)
+    integer :: i
+
+    if (.not. any(is_set([body%axis_1, body%axis_2]))) return
+    associate (d => scene%header%dimension)
+      if (body%file /= '' .or. body%mesh /= '' .or. d == 1) then
+        call rule_fault(error, 'body', number, 'axis_1', 'only lattices in 2D and 3D have axes', &
+          & 'a cloud or a mesh is turned in its file', source)
+        return
+      end if
+      call check_vector(body%axis_1, d, 'axis_1', 'body', number, error, source)
+      if (allocated(error)) return
+      if (d == 2 .and. any(is_set(body%axis_2))) then
+        call rule_fault(error, 'body', number, 'axis_2', "'axis_2' in a scene of dimension 2", &
+          & "it is 'axis_1' turned left", source)
+        return
+      else if (d == 3) then
+        call check_vector(body%axis_2, d, 'axis_2', 'body', number, error, source)
+        if (allocated(error)) return
+        cross = [body%axis_1(2)*body%axis_2(3) - body%axis_1(3)*body%axis_2(2), &
+          & body%axis_1(3)*body%axis_2(1) - body%axis_1(1)*body%axis_2(3), &
+          & body%axis_1(1)*body%axis_2(2) - body%axis_1(2)*body%axis_2(1)]
+        if (norm2(cross) <= parallel*norm2(body%axis_1)*norm2(body%axis_2)) then
+          call rule_fault(error, 'body', number, 'axis_2', &
+            & "'axis_1' and 'axis_2' are parallel or "// &
+            & 'zero', 'expected two directions', source)
+          return
+        end if
+      end if
+      if (norm2(body%axis_1(:d)) <= 0.0_wp) then
+        call rule_fault(error, 'body', number, 'axis_1', "'axis_1' is zero", &
+          & 'expected a direction', &
+          & source)
+      else if (scene%horizon%surface_correction == 'consistent') then
+        call rule_fault(error, 'body', number, 'axis_1', &
+          & "a turned body with surface_correction "// &
+          & "= 'consistent'", "its weights are found along x, y and z; 'energy' and 'none' "// &
+          & "know "// &
+          & 'the axes of bodies', source)
+      end if
+      do i = 1, size(scene%boundaries)
+        if (allocated(error) .or. .not. scene%boundaries(i)%absorbing) cycle
+        call rule_fault(error, 'boundary', i, 'absorbing', &
+          & 'an absorbing boundary in a scene with '// &
+          & 'a turned body', 'its dashpots act along x, y and z', source)
+      end do
+      if (allocated(error) .or. size(scene%bodies) == 1) return
+      do i = 1, size(scene%boundaries)
+        if (scene%boundaries(i)%side == '' .or. index(scene%boundaries(i)%side, ':') > 0 .or. &
+          & scene%boundaries(i)%body /= '') cycle
+        call rule_fault(error, 'boundary', i, 'side', 'a side of all bodies, of which some are '// &
+          & 'turned', "sides of a turned body are its own: name it by 'body'", source)
+        return
+      end do
+      do i = 1, size(scene%loads)
+        if (scene%loads(i)%side == '' .or. index(scene%loads(i)%side, ':') > 0 .or. &
+          & scene%loads(i)%body /= '') cycle
+        call rule_fault(error, 'load', i, 'side', 'a side of all bodies, of which some are '// &
+          & 'turned', &
+          & "sides of a turned body are its own: name it by 'body'", source)
+        return
+      end do
+    end associate
+  end subroutine check_axes
+
+  !> The box of cells of a body that has a shape: `lower`, `upper` and `points` follow from its
+  !> keys.
   subroutine fill_shape(body, d, number, error, source)
     type(body_group), intent(inout) :: body
     integer, intent(in) :: d
@@ -337,7 +414,8 @@ contains
       & source)
   end subroutine check_file
 
-  !> The shape keys of `&remove`, `&keep`, `&region` and `&no_fail`: those of its kind and no others. An
+  !> The shape keys of `&remove`, `&keep`, `&region` and `&no_fail`: those of its kind and no
+  !> others. An
   !> error is set if a rule is broken.
   subroutine check_shape(shape, dimension, group, number, error, source)
     class(shape_group), intent(in) :: shape            !! the group, or its part that is a shape
@@ -609,7 +687,8 @@ contains
     disc = any(is_set(crack%centre)) .or. any(is_set(crack%normal)) .or. is_set(crack%radius)
     chain = allocated(crack%points)
     if (chain) then
-      call check_chain(crack, dimension, segment .or. parallelogram .or. disc, number, error, source)
+      call check_chain(crack, dimension, segment .or. parallelogram .or. disc, number, error, &
+        & source)
     else if (dimension == 1) then
       call rule_fault(error, 'crack', number, '', 'a crack in a scene of dimension 1', &
         & 'cracks are segments (2D), parallelograms or discs (3D)', source)

@@ -413,7 +413,8 @@ contains
     type(scene_type), intent(in) :: scene
     type(target_type), intent(in) :: target
     integer, intent(in) :: b
-    follows = is_lattice(scene%bodies(b)) .and. scene%bodies(b)%shape == '' .and. (b == target%number .or. .not. target%numbered)
+    follows = is_lattice(scene%bodies(b)) .and. scene%bodies(b)%shape == '' .and. (b == &
+      & target%number .or. .not. target%numbered)
   end function follows
 
   !> The smallest count along x at which all counts are whole in the same proportion.
