@@ -149,11 +149,12 @@ contains
       deallocate (scene%initial)
       allocate (scene%initial(1))
       scene%initial(1)%displacement_gradient(1, 2) = 1.0e-3_wp
+      scene%file = 'cells.nml'
       options%output_directory = here
       options%overwrite = .true.
       options%quiet = .true.
       call run_scene(scene, options, fault)
-      if (.not. allocated(fault)) call open_file(here//'/scene.vtkhdf', .false., file, fault)
+      if (.not. allocated(fault)) call open_file(here//'/cells.vtkhdf', .false., file, fault)
       if (.not. allocated(fault)) call get_shape(file, '/points/volume', components, points, fault)
       if (.not. allocated(fault)) call get_shape(file, '/VTKHDF/Points', components, rows, fault)
       if (.not. allocated(fault)) call get_shape(file, '/VTKHDF/Types', components, cells, fault)

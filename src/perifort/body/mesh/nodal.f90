@@ -10,7 +10,7 @@ module pd_body_mesh_nodal
   integer, parameter :: most_rings = 3  !! of elements around a node that a linear fit may use
   !> How far outside of the points, in their standard deviations along a direction, a linear fit
   !> goes.
-  real(wp), parameter :: farthest = 3.0_wp
+  real(wp), parameter :: farthest = 4.0_wp
   !> A variance, over that of all directions, of points that lie in a plane or on a line.
   real(wp), parameter :: flat = 1.0e-12_wp
 
