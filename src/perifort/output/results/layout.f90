@@ -20,7 +20,8 @@ module pd_output_results_layout
   use pd_output_results_profiles, only: bytes_of_profiles, copy_profiles, make_profiles, &
     & trim_profiles
   use pd_output_results_types, only: column_type, field_type, line_type
-  use pd_output_results_views, only: view_of_cells, view_of_output, view_type, views_fit, views_of
+  use pd_output_results_views, only: folder, folder_of_cells, view_of_cells, view_of_output, &
+    & view_type, views_fit, views_of
   implicit none (type, external)
   private
   public :: layout_type, put_scene, put_geometry, write_vectors, copy_scene, to_single
@@ -326,22 +327,20 @@ contains
 
     if (.not. views_fit(self%fields, self%capacity)) return
     views = views_of(self%fields)
-    call make_some(views, 'PointData', self%rows_of_output())
+    call make_some(views, folder, 'PointData', self%rows_of_output())
     if (self%cells%n_cells() == 0 .or. allocated(error)) return
-    call make_some(view_of_cells(views), 'CellData', self%cells%n_cells())
+    call make_some(view_of_cells(views), folder_of_cells, 'CellData', self%cells%n_cells())
 
   contains
 
     !> Views of points or of cells, in the same order.
-    subroutine make_some(shown, of, rows)
+    subroutine make_some(shown, top, of, rows)
       type(view_type), intent(in) :: shown(:)
-      character(*), intent(in) :: of
+      character(*), intent(in) :: top, of
       integer(i8), intent(in) :: rows
-      character(:), allocatable :: top
       integer(i8) :: k
       integer :: i
 
-      top = trim(shown(1)%group(:index(shown(1)%group(2:), '/')))
       call make_group(file, top, error)
       do i = 1, size(shown)
         if (allocated(error)) return

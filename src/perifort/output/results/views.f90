@@ -11,8 +11,9 @@ module pd_output_results_views
   use pd_output_results_types, only: field_type, label_length
   implicit none (type, external)
   private
-  public :: view_type, views_of, views_fit, view_of_output, view_of_cells
+  public :: view_type, views_of, views_fit, view_of_output, view_of_cells, folder, folder_of_cells
 
+  !> Groups that hold the views of points and of cells.
   character(*), parameter :: folder = '/outputs', folder_of_cells = '/cell_outputs'
 
   !> A view costs about 500 bytes and a tenth of a millisecond before the first output.
