@@ -295,7 +295,8 @@ contains
       & "a body without a shape has no key 'radius'|a/b.nml:4")
     call expect_fault(error, plane//square//"&keep /"//line, "&keep lacks the key 'shape'|"// &
       & "'region' or 'where'|a/b.nml:5")
-    call expect_fault(error, plane//square//'&remove radius = 1 /'//line, "&remove lacks the key "// &
+    call expect_fault(error, plane//square//'&remove radius = 1 /'//line, &
+      & "&remove lacks the key "// &
       & "'shape'|a/b.nml:5")
     call expect_fault(error, plane//square//"&remove region = 'nowhere' /"//line, &
       & "no region is named 'nowhere'|a/b.nml:5")
