@@ -18,6 +18,8 @@ program main
   use test_base_text, only: collect_base_text
   use test_base_threads, only: collect_base_threads
   use test_base_version, only: collect_base_version
+  use test_body_shapes, only: collect_body_shapes
+  use test_body_turned, only: collect_body_turned
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
   use test_law_contract, only: collect_law_contract
@@ -78,6 +80,7 @@ program main
   use test_output_measures_fragments, only: collect_output_measures_fragments
   use test_output_measures_tip, only: collect_output_measures_tip
   use test_output_report_schedule, only: collect_output_report_schedule
+  use test_output_results_cells, only: collect_output_results_cells
   use test_output_results_base64, only: collect_output_results_base64
   use test_output_checkpoint_checkpoint, only: collect_output_checkpoint_checkpoint
   use test_output_measures_j_integral, only: collect_output_measures_j_integral
@@ -135,6 +138,8 @@ program main
   call register('base_text', collect_base_text)
   call register('base_threads', collect_base_threads)
   call register('base_version', collect_base_version)
+  call register('body_shapes', collect_body_shapes)
+  call register('body_turned', collect_body_turned)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
   call register('law_contract', collect_law_contract)
@@ -191,6 +196,7 @@ program main
   call register('output_fields_interpolate', collect_output_fields_interpolate)
   call register('output_fields_stress', collect_output_fields_stress)
   call register('output_fields_table', collect_output_fields_table)
+  call register('output_results_cells', collect_output_results_cells)
   call register('output_results_base64', collect_output_results_base64)
   call register('output_checkpoint_checkpoint', collect_output_checkpoint_checkpoint)
   call register('output_measures_boundary', collect_output_measures_boundary)

@@ -3,7 +3,7 @@
 module test_family_cracks
   use pd_base_kinds, only: wp, i8
   use pd_set_up_prepare, only: set_up_type
-  use pd_family_cracks, only: crack_type, crosses, new_crack
+  use pd_family_cracks, only: crack_type, crosses, new_crack, pieces_of
   use pd_scene_content_types, only: scene_type, crack_group
   use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
@@ -21,6 +21,7 @@ contains
     testsuite = [ &
       & new_unittest('local damage beside a straight crack', test_damage), &
       & new_unittest('a segment cuts the bonds through it', test_segment), &
+      & new_unittest('a chain of segments', test_chain), &
       & new_unittest('a point on the crack''s plane lies on its normal''s side', test_on_plane), &
       & new_unittest('a bond that touches the rim is cut', test_rim), &
       & new_unittest('a parallelogram, aslant and not rectangular', test_parallelogram), &
@@ -86,6 +87,56 @@ contains
     call expect_true(error, cut .eqv. crosses(crack, b, a, hair), &
       & 'a bond is cut from one end alone')
   end function cut
+
+  !> A chain of segments cuts the bonds that pass through it: a square corner, whose inside a bond
+  !> enters or leaves. Points of bonds in the middle of cells pass the corner itself, too.
+  subroutine test_chain(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: samples = 2520  !! has many divisors, so that corners are met
+    type(crack_group) :: group
+    type(crack_type), allocatable :: pieces(:)
+    real(wp) :: a(2), b(2), at(2)
+    logical :: found, expected, inside, first
+    integer :: i, j, k, l, t, p, number
+
+    group%points = [real(wp) :: -9, 0, -4, 0, 0, 0, 0, -9]
+    pieces = pieces_of(group, 2)
+    call expect_true(error, size(pieces) == 3, 'segments of a chain')
+    number = 0
+    do i = -3, 2
+      do j = -3, 2
+        do k = -3, 3
+          do l = -3, 3
+            a = [i + 0.5_wp, j + 0.5_wp]
+            b = a + [k, l]
+            expected = .false.
+            first = inside_of(a)
+            do t = 1, samples
+              at = a + [k, l]*(real(t, wp)/samples)
+              inside = inside_of(at)
+              if (inside .neqv. first) expected = .true.
+            end do
+            found = .false.
+            do p = 1, size(pieces)
+              found = found .or. cut(pieces(p), a, b, error)
+            end do
+            number = number + merge(1, 0, found)
+            call expect_true(error, found .eqv. expected, 'a bond at a corner of a chain')
+          end do
+        end do
+      end do
+    end do
+    call expect_true(error, number > 100, 'bonds that are cut')
+
+  contains
+
+    !> The corner with its sides.
+    pure logical function inside_of(x)
+      real(wp), intent(in) :: x(2)
+      inside_of = all(x <= 1.0e-9_wp)
+    end function inside_of
+
+  end subroutine test_chain
 
   subroutine test_segment(error)
     type(error_type), allocatable, intent(out) :: error

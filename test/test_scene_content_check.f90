@@ -249,6 +249,14 @@ contains
       & 'a crack in a scene of dimension 1')
     call expect_scene(error, base_3d//'&crack corner = 3*0 edge_1 = 1 0 0 edge_2 = 0 1 0 /'// &
       & '&crack centre = 3*0 normal = 1 0 0 radius = 1 /', scene)
+    call expect_fault(error, base//'&crack points = 0 0 1 /'//line, &
+      & "'points' has 3 values|a/b.nml:5")
+    call expect_fault(error, base//'&crack points = 0 0 0.5 0.5 0.5 0.5 /'//line, &
+      & 'points 2 and 3 are the same|a/b.nml:5')
+    call expect_fault(error, base//'&crack points = 0 0 1 1 from = 0 0 to = 1 0 /'//line, &
+      & 'another kind of crack|a/b.nml:5')
+    call expect_fault(error, scene_3d//soft//cube//go//'&crack points = 0 0 1 1 /'//line, &
+      & 'a chain of segments in a scene of dimension 3|a/b.nml:5')
   end subroutine test_cracks
 
   subroutine test_initial(error)

@@ -100,6 +100,36 @@ class History(dict[str, Quantity]):
                        f"it has {', '.join(self)}")
 
 
+class Cells:
+    """The elements of meshes in results that were written with `&output cells = .true.`.
+
+    `nodes` (n, 3) are positions [m]; `types` (cells) are VTK's kinds of cells, `offsets` (cells + 1)
+    says where the nodes of each begin in `connectivity`, which numbers nodes from 0, in VTK's order.
+    `of_mesh` (points) tells which points belong to a mesh.
+    """
+
+    def __init__(self, root: h5py.Group, points: int) -> None:
+        types = root["Types"][()]
+        offsets = root["Offsets"][()]
+        connectivity = root["Connectivity"][()]
+        elements = int(np.sum(types != 1))
+        # Vertices, which show all other points, stand last
+        self.types: Array = types[:elements]
+        self.offsets: Array = offsets[:elements + 1]
+        self.connectivity: Array = connectivity[:offsets[elements]] - points
+        self.nodes: Array = root["Points"][points:]
+        self.of_mesh: Array = np.ones(points, dtype=bool)
+        self.of_mesh[connectivity[offsets[elements]:]] = False
+
+    def __len__(self) -> int:
+        return len(self.types)
+
+    def nodes_of(self, numbers: Array) -> Array:
+        """The nodes (cells, nodes of one) of cells that have equally many."""
+        count = int(self.offsets[numbers[0] + 1] - self.offsets[numbers[0]])
+        return np.asarray(self.connectivity[self.offsets[numbers][:, None] + np.arange(count)])
+
+
 class Results:
     """The results of one run: points, volumes, fields of every output and the history.
 
@@ -111,7 +141,11 @@ class Results:
         self.path: Path = _find_file(Path(folder))
         with h5py.File(self.path, "r") as file:
             root = file["VTKHDF"]
-            self.points: Array = root["Points"][()]
+            self.volume: Array = file["points/volume"][()]
+            # With cells their nodes stand behind the points
+            self.points: Array = root["Points"][:len(self.volume)]
+            self._rows = len(root["Points"])
+            self.cells: Cells | None = (Cells(root, len(self.volume)) if "Types" in root else None)
             steps = root["Steps"]
             self.outputs: int = int(steps.attrs["NSteps"])
             times = np.asarray(steps["Values"][:self.outputs])
@@ -122,7 +156,6 @@ class Results:
             # Names of the components; of scalars none
             self.components: dict[str, list[str]] = {
                 name: _text(data[name].attrs.get("components", "")).split() for name in data}
-            self.volume: Array = file["points/volume"][()]
             self.layer: Array = file["points/layer"][()]
             # Bodies, materials, regions and levels of refinement, where there are any
             self.marks: dict[str, Array] = {name: file["points"][name][()]
@@ -193,9 +226,9 @@ class Results:
         return range(self.outputs)[output]
 
     def field(self, name: str, output: int | float | None = None, *,
-              time: float | None = None) -> Quantity:
+              time: float | None = None, of: str = "points") -> Quantity:
         """Values of a field, or of one component of it (`stress_xy`), at an output: (n) or (n,
-        components).
+        components). `of` are "points" or, of results with `cells`, "nodes" or "cells".
 
         `output` is its number, a negative one counting from the last, which is the default; a float
         is a time [s] (in statics a load factor), as `time` is, and means the nearest output.
@@ -203,9 +236,19 @@ class Results:
         k = (self.number(time=float(output)) if isinstance(output, (float, np.floating))
              else self.number(output, time))
         base, component = self.split(name)
-        n = len(self.points)
+        if of not in ("points", "nodes", "cells"):
+            raise ValueError(f"there are values of points, nodes and cells, not of '{of}'")
+        if of != "points" and self.cells is None:
+            raise KeyError(f"{self.path.name} has no {of}: its scene lacks cells = .true. in &output")
+        n, rows = len(self.points), self._rows
         with h5py.File(self.path, "r") as file:
-            values = file["VTKHDF/PointData"][base][k * n:(k + 1) * n]
+            if of == "cells":
+                data = file["VTKHDF/CellData"][base]
+                total = len(file["VTKHDF/Types"])
+                values = data[k * total:k * total + len(cast(Cells, self.cells))]
+            else:
+                first, last = (0, n) if of == "points" else (n, rows)
+                values = file["VTKHDF/PointData"][base][k * rows + first:k * rows + last]
         if component is not None:
             values = values[:, component]
         return Quantity(values, self.field_units[base], name)
@@ -351,7 +394,8 @@ class Results:
     def to_pyvista(self, output: int | None = None, *, time: float | None = None,
                    deform: float = 0.0) -> Any:
         """The points at an output, with all fields, as a pyvista.PolyData; moved by `deform` times
-        their displacement.
+        their displacement. Of results with cells the elements on their nodes, as a
+        pyvista.UnstructuredGrid with the fields of both.
         """
         try:
             import pyvista
@@ -359,6 +403,8 @@ class Results:
             raise ImportError(
                 "to_pyvista needs the package pyvista: pip install pyvista") from fault
         k = self.number(output, time)
+        if self.cells is not None:
+            return self._grid(pyvista, self.cells, k, deform)
         points = self.points
         if deform and "displacement" in self.fields:
             points = points + deform * self.field("displacement", k)
@@ -369,6 +415,20 @@ class Results:
             mesh.point_data[name] = values
         mesh.field_data["TimeValue"] = [float(self.times[k])]
         return mesh
+
+    def _grid(self, pyvista: Any, cells: Cells, k: int, deform: float) -> Any:
+        """The elements at output `k` as a pyvista.UnstructuredGrid."""
+        nodes = cells.nodes
+        if deform and "displacement" in self.fields:
+            nodes = nodes + deform * self.field("displacement", k, of="nodes")
+        count = np.diff(cells.offsets)
+        listed = np.insert(cells.connectivity, cells.offsets[:-1], count)
+        grid = pyvista.UnstructuredGrid(listed, cells.types, np.array(nodes, dtype=float))
+        for name in self.fields:
+            grid.point_data[name] = np.asarray(self.field(name, k, of="nodes"))
+            grid.cell_data[name] = np.asarray(self.field(name, k, of="cells"))
+        grid.field_data["TimeValue"] = [float(self.times[k])]
+        return grid
 
 
 def open_results(folder: PathLike) -> Results:

@@ -17,10 +17,13 @@ module pd_body_body
   public :: body_type, not_finite_text, grid_type, allocate_points, append_points, keep_points, &
     & arrange, gather, scatter, own_points, owned, share_halo
 
-  !> A uniform grid: points at origin + (i - 1/2) spacing, i integer.
+  !> A uniform grid: points at origin + axes (i - 1/2) spacing, i integer.
   type :: grid_type
     real(wp) :: origin(3) = 0.0_wp  !! [m]
     real(wp) :: spacing = 0.0_wp    !! [m]
+    logical :: turned = .false.     !! its axes are not x, y and z
+    !> Unit vectors in columns.
+    real(wp) :: axes(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
   end type grid_type
 
   type :: body_type

@@ -8,23 +8,24 @@ module pd_body_generate
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: is_lattice, scene_type, is_set
+  use pd_scene_content_types, only: body_group, is_lattice, scene_type, is_set, unset
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_meshes, only: keep_part, material_number, mesh_body
   use pd_body_mesh_part, only: part_type
-  use pd_body_lattices, only: lattice_points, lattice_grid
+  use pd_body_lattices, only: lattice_points, lattice_grid, place_in
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
-  use pd_body_shapes, only: inside
+  use pd_body_choice, only: choose_points
+  use pd_body_shapes, only: inside_body, touch
   implicit none (type, external)
   private
-  public :: generate_body, horizon_of, touch
+  public :: generate_body, horizon_of
 
   real(wp), parameter :: same_grid = 1.0e-6_wp  !! how far two grids may differ [spacings]
-  real(wp), parameter :: touch = 1.0e-6_wp      !! what counts as on a surface [spacings]
+  real(wp), parameter :: same_axes = 1.0e-9_wp  !! how far those of one grid may differ
   real(wp), parameter :: largest_ratio = 1.0e4_wp  !! of horizon to spacing
   real(wp), parameter :: most_members = 2.0e5_wp  !! of the box around a horizon [points]
 
@@ -42,7 +43,6 @@ contains
                                                             !! of each layer came to
     type(warnings_type), intent(inout), optional :: warnings  !! get what may surprise of meshes
     type(part_type) :: part
-    logical, allocatable :: taken(:)
     real(wp) :: spacing, largest
     type(layer_count_type), allocatable :: counted(:)
     type(body_type) :: one
@@ -66,6 +66,7 @@ contains
         if (allocated(error)) return
       else
         call lattice_points(body%dim, scene%bodies(i), depth, one)
+        if (scene%bodies(i)%shape /= '') call keep_shape(scene%bodies(i), depth, one)
         one%grid = number_of_grid(body, lattice_grid(scene%bodies(i), body%dim))
       end if
       one%body = int(i, i2)
@@ -74,23 +75,11 @@ contains
       spacing = max(spacing, largest)
       call append_points(body, one)
     end do
-    do i = 1, size(scene%removed)
-      taken = inside(scene%removed(i), body%x, touch*minval(body%spacing))
-      if (any(taken .and. of_mesh(scene, body))) then
-        call scene_fault(error, scene, 'remove', i, 'shape', '&remove takes points of a mesh', &
-          & 'cut the shape out of the geometry before it is meshed')
-        return
-      end if
-      call keep_points(body, .not. taken)
-    end do
+    call cut_shapes(scene, body, error)
+    if (allocated(error)) return
     do i = 1, size(body%parts)
       body%parts(i)%first = findloc(int(body%body), body%parts(i)%body, dim=1)
     end do
-    if (body%n_points == 0) then
-      call scene_fault(error, scene, 'remove', size(scene%removed), 'shape', &
-        & 'the scene has no points: every point of its bodies was removed', '')
-      return
-    end if
     ! of a mesh counts the median; the scene has one horizon
     if (.not. all(of_mesh(scene, body))) spacing = max(spacing, maxval(body%spacing, &
       & mask=.not. of_mesh(scene, body)))
@@ -103,6 +92,66 @@ contains
     if (present(counts)) call move_alloc(counted, counts)
     call check_lattices(scene, body, error)
   end subroutine generate_body
+
+  !> Leave out the points of a lattice that do not lie in its shape, which is turned with it.
+  pure subroutine keep_shape(group, depth, body)
+    type(body_group), intent(in) :: group
+    real(wp), intent(in) :: depth
+    type(body_type), intent(inout) :: body
+    type(body_group) :: straight
+    type(body_type) :: points
+
+    straight = group
+    straight%axis_1 = unset
+    call lattice_points(body%dim, straight, depth, points)
+    call keep_points(body, inside_body(group, points%x, touch*minval(points%spacing)))
+  end subroutine keep_shape
+
+  !> Leave out the points that no `&keep` keeps, then those that a `&remove` takes. An error if that
+  !> takes points of a mesh, or all.
+  subroutine cut_shapes(scene, body, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(inout) :: body
+    type(error_type), allocatable, intent(out) :: error
+    logical, allocatable :: taken(:), chosen(:)
+    integer :: i, n
+
+    n = size(scene%kept)
+    if (n > 0) then
+      allocate (taken(body%n_points), source=.true.)
+      do i = 1, n
+        call choose_points(scene, body, scene%kept(i), 'keep', i, chosen, error)
+        if (allocated(error)) return
+        taken = taken .and. .not. chosen
+      end do
+      call take('keep', 1)
+      if (allocated(error)) return
+    end if
+    do i = 1, size(scene%removed)
+      call choose_points(scene, body, scene%removed(i), 'remove', i, taken, error)
+      if (.not. allocated(error)) call take('remove', i)
+      if (allocated(error)) return
+    end do
+
+  contains
+
+    !> Leave out the points that are taken.
+    subroutine take(group, number)
+      character(*), intent(in) :: group
+      integer, intent(in) :: number
+
+      if (any(taken .and. of_mesh(scene, body))) then
+        call scene_fault(error, scene, group, number, 'shape', '&'//group//' takes points of a '// &
+          & 'mesh', 'cut the shape out of the geometry before it is meshed')
+        return
+      end if
+      call keep_points(body, .not. taken)
+      if (body%n_points == 0) call scene_fault(error, scene, group, number, 'shape', &
+        & 'the scene has no points: every point of its bodies was '// &
+        & trim(merge('left out', 'removed ', group == 'keep')), '')
+    end subroutine take
+
+  end subroutine cut_shapes
 
   !> An error if the horizon holds more points than any computation is meant to have in a family;
   !> counts in families and offsets below then fit their integers.
@@ -199,7 +248,9 @@ contains
 
     do i = 1, size(body%grids)
       if (abs(body%grids(i)%spacing - grid%spacing) > same_grid*grid%spacing) cycle
-      shift = (grid%origin - body%grids(i)%origin)/grid%spacing
+      if (any(abs(body%grids(i)%axes - grid%axes) > same_axes)) cycle
+      shift = 0.0_wp
+      shift(:body%dim) = place_in(body%grids(i), grid%origin(:body%dim))
       if (maxval(abs(shift - anint(shift))) > same_grid) cycle
       number = int(i, i2)
       return

@@ -9,7 +9,8 @@ module pd_body_initial
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
   use pd_body_body, only: body_type, scatter
-  use pd_body_regions, only: region_mask, values_on
+  use pd_body_choice, only: values_on
+  use pd_body_regions, only: region_mask
   implicit none (type, external)
   private
   public :: initial_state

@@ -11,7 +11,7 @@ module pd_body_layers
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: adds_layer, scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
-  use pd_body_lattices, only: lattice_grid, box_of_cells, cell_of
+  use pd_body_lattices, only: lattice_grid, box_of_cells, cell_of, place_in
   implicit none (type, external)
   private
   public :: add_layers, layer_rows, layer_count_type, layer_count_text
@@ -367,7 +367,8 @@ contains
     integer(i8) :: key
 
     ! the numbers of cells count from the body's corner, bodies of one grid from different ones
-    shift = nint((side%grid%origin - body%grids(side%number)%origin)/side%grid%spacing)
+    shift = 0
+    shift(:body%dim) = nint(place_in(body%grids(side%number), side%grid%origin(:body%dim)))
     n = 0
     do k = first(3), last(3)
       do j = first(2), last(2)

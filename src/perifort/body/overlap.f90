@@ -7,7 +7,7 @@ module pd_body_overlap
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: adds_layer, is_lattice, scene_type
   use pd_body_body, only: body_type, grid_type
-  use pd_body_lattices, only: lattice_grid, cell_of
+  use pd_body_lattices, only: lattice_grid, cell_of, place_in
   implicit none (type, external)
   private
   public :: check_lattices
@@ -83,6 +83,7 @@ contains
         meet = layered(b)
         return
       end if
+      if (bodies(a)%grid%turned .or. bodies(b)%grid%turned) return
       associate (one => bodies(a), other => bodies(b))
         do c = 1, body%dim
           meet = meet .and. centre(one%grid, c, one%low(c)) < centre(other%grid, c, &
@@ -153,17 +154,17 @@ contains
     integer, intent(in) :: points(:)                 !! of another body
     type(cells_type), intent(in) :: cells            !! of `place_points`
     type(error_type), allocatable, intent(out) :: error
-    real(wp) :: place
+    real(wp) :: place(body%dim)
     integer :: i, c, low(3), high(3), inside, corners, other, x, y, z
 
     low = 1
     high = 1
     do i = 1, size(points)
+      place = place_in(cells%grid, body%x(points(i), :))
       do c = 1, body%dim
-        place = (body%x(points(i), c) - cells%grid%origin(c))/cells%grid%spacing
-        if (place < cells%low(c) - 1.0_wp .or. place > cells%high(c)) exit
-        low(c) = floor(place - tolerance) + 1
-        high(c) = floor(place + tolerance) + 1
+        if (place(c) < cells%low(c) - 1.0_wp .or. place(c) > cells%high(c)) exit
+        low(c) = floor(place(c) - tolerance) + 1
+        high(c) = floor(place(c) + tolerance) + 1
         if (low(c) < cells%low(c) .or. high(c) > cells%high(c)) exit
       end do
       if (c <= body%dim) cycle

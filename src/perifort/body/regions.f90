@@ -1,19 +1,16 @@
 !> Regions and expressions of a scene on the points of its bodies.
 module pd_body_regions
   use pd_base_error, only: error_type
-  use pd_base_expression, only: expression_type
-  use pd_base_field, only: field_type, field_values, new_field
+  use pd_base_field, only: field_type, field_values
   use pd_base_kinds, only: wp, i4
-  use pd_body_body, only: body_type, not_finite_text
-  use pd_body_generate, only: touch
+  use pd_body_body, only: body_type
+  use pd_body_choice, only: field_on, values_on
   use pd_body_meshes, only: check_set, names_set, set_mask
-  use pd_body_shapes, only: inside
-  use pd_scene_content_expressions, only: expression_of
-  use pd_scene_content_rules, only: scene_fault
+  use pd_body_shapes, only: inside, touch
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
-  public :: check_regions, in_region, region_mask, field_on, values_on
+  public :: check_regions, in_region, region_mask
 
 contains
 
@@ -117,39 +114,5 @@ contains
       mask(slots) = abs(values) > 0.0_wp
     end associate
   end function in_region
-
-  !> An expression of a checked scene at some points.
-  subroutine field_on(scene, text, body, slots, field)
-    type(scene_type), intent(in) :: scene    !! a checked scene
-    character(*), intent(in) :: text         !! the expression
-    type(body_type), intent(in) :: body      !! the points
-    integer(i4), intent(in) :: slots(:)      !! (points) of them
-    type(field_type), intent(out) :: field   !! ready for `field_values`
-    type(expression_type) :: expression
-
-    call expression_of(scene, text, expression)
-    call new_field(expression, body%x(slots, :), field)
-  end subroutine field_on
-
-  !> The values of an expression at t = 0. An error is set at its key if one is not finite.
-  subroutine values_on(scene, text, body, slots, group, number, key, values, error)
-    type(scene_type), intent(in) :: scene      !! a checked scene
-    character(*), intent(in) :: text           !! the expression
-    type(body_type), intent(in) :: body        !! the points
-    integer(i4), intent(in) :: slots(:)        !! (points) of them
-    character(*), intent(in) :: group          !! name of the group that has it, without `&`
-    integer, intent(in) :: number              !! which group of this name
-    character(*), intent(in) :: key            !! that has it
-    real(wp), allocatable, intent(out) :: values(:)  !! (points)
-    type(error_type), allocatable, intent(out) :: error
-    type(field_type) :: field
-    integer :: at
-
-    call field_on(scene, text, body, slots, field)
-    allocate (values(size(slots)))
-    call field_values(field, 0.0_wp, values, at)
-    if (at > 0) call scene_fault(error, scene, group, number, key, "'"//key//"' "// &
-      & not_finite_text(body, slots(at), 0.0_wp), trim(text))
-  end subroutine values_on
 
 end module pd_body_regions

@@ -11,7 +11,7 @@ module pd_family_cracks
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private
-  public :: cut_bonds, part_bodies, crosses, crack_type, new_crack, points_on, extents_of
+  public :: cut_bonds, part_bodies, crosses, crack_type, new_crack, pieces_of, points_on, extents_of
 
   integer, parameter :: segment = 1, parallelogram = 2, disc = 3
   real(wp), parameter :: on_plane = 1.0e-6_wp  !! [spacings]
@@ -28,7 +28,28 @@ module pd_family_cracks
 
 contains
 
-  !> A crack as the scene describes it. In 2D the normal is `to - from` turned left.
+  !> The plane pieces of a crack: one, or the segments of a chain.
+  pure function pieces_of(group, dim) result(pieces)
+    type(crack_group), intent(in) :: group  !! the crack in the scene, checked
+    integer, intent(in) :: dim              !! of the scene: 2 or 3
+    type(crack_type), allocatable :: pieces(:)
+    type(crack_group) :: one
+    integer :: i
+
+    if (.not. allocated(group%points)) then
+      allocate (pieces(1))
+      pieces(1) = new_crack(group, dim)
+      return
+    end if
+    allocate (pieces(size(group%points)/2 - 1))
+    do i = 1, size(pieces)
+      one%from(:2) = group%points(2*i - 1:2*i)
+      one%to(:2) = group%points(2*i + 1:2*i + 2)
+      pieces(i) = new_crack(one, dim)
+    end do
+  end function pieces_of
+
+  !> A crack of one piece as the scene describes it. In 2D the normal is `to - from` turned left.
   pure type(crack_type) function new_crack(group, dim) result(crack)
     type(crack_group), intent(in) :: group  !! the crack in the scene, checked
     integer, intent(in) :: dim              !! of the scene: 2 or 3
@@ -60,12 +81,17 @@ contains
     class(family_type), intent(inout) :: family  !! with the cut bonds broken at both ends on return
     integer(i8), intent(out) :: cut              !! bonds that were intact before, each counted once
     type(bonds_type) :: bonds
+    type(crack_type), allocatable :: pieces(:)
     type(crack_type) :: crack
     integer :: c, k, i
 
     cut = 0_i8
+    allocate (pieces(0))
     do c = 1, size(cracks)
-      crack = new_crack(cracks(c), body%dim)
+      pieces = [pieces, pieces_of(cracks(c), body%dim)]
+    end do
+    do c = 1, size(pieces)
+      crack = pieces(c)
       !$omp parallel default(none) shared(crack, body, family) private(bonds, k, i) reduction(+:cut)
       call allocate_bonds(family, bonds)
       ! chunks of whole groups, whose bonds one thread must break
@@ -170,29 +196,41 @@ contains
   pure integer function points_on(group, body) result(number)
     type(crack_group), intent(in) :: group   !! the crack
     type(body_type), intent(in) :: body      !! whose points are checked, in slots
-    type(crack_type) :: crack
+    type(crack_type), allocatable :: pieces(:)
     real(wp) :: r(3)
-    integer :: k
+    integer :: k, p
 
-    crack = new_crack(group, body%dim)
+    pieces = pieces_of(group, body%dim)
     number = 0
     do k = 1, body%n_slots
       if (body%point(k) == 0) cycle
-      r = -crack%origin
-      r(:body%dim) = r(:body%dim) + body%x(k, :)
-      if (abs(dot_product(r, crack%normal)) > on_plane*body%spacing(k)) cycle
-      if (in_bounds(crack, r, on_plane*body%spacing(k))) number = number + 1
+      do p = 1, size(pieces)
+        r = -pieces(p)%origin
+        r(:body%dim) = r(:body%dim) + body%x(k, :)
+        if (abs(dot_product(r, pieces(p)%normal)) > on_plane*body%spacing(k)) cycle
+        if (.not. in_bounds(pieces(p), r, on_plane*body%spacing(k))) cycle
+        number = number + 1
+        exit
+      end do
     end do
   end function points_on
 
-  !> How large a crack is [m]: a segment's length; a parallelogram's two edges; a disc's diameter.
+  !> How large a crack is [m]: the length of a segment or chain; a parallelogram's two edges; a
+  !> disc's diameter.
   pure function extents_of(group, dim) result(extents)
     type(crack_group), intent(in) :: group   !! the crack
     integer, intent(in) :: dim               !! of the scene
     real(wp), allocatable :: extents(:)
+    type(crack_type), allocatable :: pieces(:)
     type(crack_type) :: crack
+    integer :: p
 
-    crack = new_crack(group, dim)
+    pieces = pieces_of(group, dim)
+    if (size(pieces) > 1) then
+      extents = [sum([(norm2(pieces(p)%edge_1), p=1, size(pieces))])]
+      return
+    end if
+    crack = pieces(1)
     select case (crack%kind)
     case (disc); extents = [2*crack%radius]
     case (segment); extents = [norm2(crack%edge_1)]

@@ -16,11 +16,13 @@ module pd_family_lattice
   use pd_base_error, only: error_type, fail
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
+  use pd_body_lattices, only: coordinate
   use pd_body_body, only: body_type, arrange
   use pd_family_cells, only: cells_type, sort_into_cells, joins_labels
   use pd_family_classes, only: find_classes
   use pd_family_family, only: family_type, bonds_type
-  use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, first_cell, &
+  use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, turn_offsets, &
+    & first_cell, &
     & whole_blocks, both_ends
   use pd_family_slabs, only: slabs_type, find_slabs
   use pd_family_volume, only: volume_rule_type, reach
@@ -123,13 +125,15 @@ contains
   pure function extent(body, g) result(cells)
     type(body_type), intent(in) :: body
     integer, intent(in) :: g
+    real(wp), allocatable :: along(:)
     integer :: cells(3), c
 
     cells = 1
     do c = 1, body%dim
       ! far apart, two bodies may span more cells than a number has room for
-      cells(c) = nint(min(real(most_slots, wp), (maxval(body%x(:, c), mask=body%grid == g) &
-        & - minval(body%x(:, c), mask=body%grid == g))/body%grids(g)%spacing)) + 1
+      along = coordinate(body%grids(g), body%x, c)
+      cells(c) = nint(min(real(most_slots, wp), (maxval(along, mask=body%grid == g) &
+        & - minval(along, mask=body%grid == g))/body%grids(g)%spacing)) + 1
     end do
   end function extent
 
@@ -215,6 +219,7 @@ contains
         grid%shift(o) = grid%shift(o) + nint(grid%xi(o, c)/grid%spacing)*int(grid%stride(c), i8)
       end do
     end do
+    if (body%grids(g)%turned) call turn_offsets(grid, body%grids(g)%axes(:body%dim, :body%dim))
     call order_offsets(grid)
     family%grids = [family%grids, grid]
   end subroutine add_grid
@@ -226,6 +231,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer(i4), allocatable :: point(:)
     real(wp), allocatable :: lower(:, :)
+    real(wp) :: x(body%dim)
     integer(i8) :: n_slots, need, at
     integer :: c, k, n, g
     integer, allocatable :: number(:)
@@ -251,7 +257,7 @@ contains
       n = n + 1
       number(g) = n
       do c = 1, body%dim
-        lower(c, g) = minval(body%x(:, c), mask=body%grid == g)
+        lower(c, g) = minval(coordinate(body%grids(g), body%x, c), mask=body%grid == g)
       end do
     end do
     allocate (point(n_slots), source=0_i4)
@@ -259,8 +265,10 @@ contains
       g = body%grid(k)
       associate (grid => family%grids(number(g)))
         at = first_cell(grid)
+        x = body%x(k, :)
+        if (body%grids(g)%turned) x = matmul(x, body%grids(g)%axes(:body%dim, :body%dim))
         do c = 1, body%dim
-          at = at + nint((body%x(k, c) - lower(c, g))/grid%spacing)*int(grid%stride(c), i8)
+          at = at + nint((x(c) - lower(c, g))/grid%spacing)*int(grid%stride(c), i8)
         end do
       end associate
       if (point(at) > 0_i4) then

@@ -6,7 +6,8 @@ module pd_family_offsets
   use pd_family_volume, only: volume_rule_type, volume_correction, reach
   implicit none (type, external)
   private
-  public :: offsets_type, make_offsets, order_offsets, first_cell, whole_blocks, both_ends
+  public :: offsets_type, make_offsets, turn_offsets, order_offsets, first_cell, whole_blocks, &
+    & both_ends
 
   !> One grid: its box of slots and its table of offsets.
   type :: offsets_type
@@ -69,6 +70,19 @@ contains
     end do
     grid%n = n
   end subroutine make_offsets
+
+  !> Turn the bond vectors of a grid to its axes. Lengths, volumes and cells stay.
+  pure subroutine turn_offsets(grid, axes)
+    type(offsets_type), intent(inout) :: grid  !! with the shifts of its offsets
+    real(wp), intent(in) :: axes(:, :)         !! (dim, dim) unit vectors in columns
+    integer :: o, dim
+
+    dim = size(axes, 1)
+    do o = 1, grid%n
+      grid%xi(o, :) = matmul(axes, grid%xi(o, :))
+      grid%geometry(:dim, o) = grid%xi(o, :)*grid%geometry(4, o)
+    end do
+  end subroutine turn_offsets
 
   !> The order in which loops take a grid's offsets: forward ones first, so that a loop that adds to
   !> both ends of a bond takes these alone; and one of each row in turn, since what was just added

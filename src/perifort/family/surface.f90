@@ -16,7 +16,7 @@ contains
   !> D and S (n_slots, dim) of every slot: classical over peridynamic dilatation and energy under
   !> unit uniaxial strain along each direction, with the linearised stretch. A point without bonds
   !> along a direction gets 1. Families must be whole: cracks are cut afterwards.
-  subroutine surface_factors(body, family, materials, D, S, laws)
+  subroutine surface_factors(body, family, materials, D, S, laws, axes)
     type(body_type), intent(in) :: body                     !! arranged in the slots of the family
     class(family_type), intent(in) :: family                !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the numbers that points have
@@ -24,6 +24,8 @@ contains
       !! (n_slots, dim) factors of the dilatation and of the bond part of the energy [-]
     type(law_item_type), intent(in), optional :: laws(:)
       !! (materials) their bond laws; points of laws without correction get 1
+    real(wp), intent(in), optional :: axes(:, :)
+      !! (dim, dim) directions of the factors in columns, absent: x, y, z
     type(bonds_type) :: bonds
     real(wp) :: strain, dilatation, energy, scale, gb, gd
     integer :: k, i, c
@@ -31,7 +33,7 @@ contains
 
     weighted = has_factors(laws)
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
-    !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted) &
+    !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted, axes) &
     !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, k, i, c)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
@@ -42,6 +44,7 @@ contains
         if (.not. laws(body%material(k))%law%corrected) cycle
       end if
       call family%bonds_of(k, bonds)
+      if (present(axes)) bonds%xi(:bonds%n, :) = matmul(bonds%xi(:bonds%n, :), axes)
       associate (m => materials(body%material(k)))
         do c = 1, body%dim
           dilatation = 0.0_wp
@@ -117,10 +120,16 @@ contains
   end subroutine law_factors
 
   !> G of a bond along the unit vector `n` between points with factors `gk` and `gj`.
-  pure real(wp) function bond_factor(n, gk, gj) result(G)
+  pure real(wp) function bond_factor(n, gk, gj, axes) result(G)
     real(wp), intent(in) :: n(:)          !! (dim) unit vector along the bond [-]
     real(wp), intent(in) :: gk(:), gj(:)  !! (dim) D or S of the bond's two ends [-]
-    G = 1.0_wp/sqrt(sum((2*n/(gk + gj))**2))
+    real(wp), intent(in), optional :: axes(:, :)
+      !! (dim, dim) directions of the factors in columns, absent: x, y, z
+    if (present(axes)) then
+      G = 1.0_wp/sqrt(sum((2*matmul(n, axes)/(gk + gj))**2))
+    else
+      G = 1.0_wp/sqrt(sum((2*n/(gk + gj))**2))
+    end if
   end function bond_factor
 
 end module pd_family_surface

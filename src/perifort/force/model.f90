@@ -49,6 +49,7 @@ module pd_force_model
     integer(i2), allocatable :: material(:)  !! of each slot
     real(wp), allocatable :: scale(:)        !! of q, t and p of each slot, if some law has scales
     real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
+    real(wp), allocatable :: axes(:, :)      !! axes of D and S in columns, none: x, y, z
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
     type(bond_weights_type) :: weights       !! of the bonds, if consistent
     real(wp), allocatable :: expansion(:)    !! alpha dT of each slot [-], allocated if thermal

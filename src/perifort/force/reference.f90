@@ -41,8 +41,8 @@ contains
     if (model%projected) state%lambda = dot_product(state%direction(:size(u, 2)), xi)/length
     if (model%thermal) state%stretch = state%stretch - (model%expansion(k) + model%expansion(j))/2
     if (model%surface) then
-      state%Gd = bond_factor(xi/length, model%D(k, :), model%D(j, :))
-      state%Gb = bond_factor(xi/length, model%S(k, :), model%S(j, :))
+      state%Gd = bond_factor(xi/length, model%D(k, :), model%D(j, :), model%axes)
+      state%Gb = bond_factor(xi/length, model%S(k, :), model%S(j, :), model%axes)
     end if
     if (model%consistent) then
       associate (place => model%weights%before(k) + i)

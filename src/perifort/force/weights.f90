@@ -324,10 +324,11 @@ contains
             if (model%dilatation) weights%dilatation(l, m) = weight*model%weights%Gd(place(l, o))
           end if
           if (.not. model%surface) cycle
-          weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, :))
+          weights%stretch(l, m) = weights%stretch(l, m)*bond_factor(n, model%S(k, :), model%S(j, &
+            & :), model%axes)
           if (.not. model%dilatation) cycle
           weights%dilatation(l, m) = weights%dilatation(l, m) &
-            & *bond_factor(n, model%D(k, :), model%D(j, :))
+            & *bond_factor(n, model%D(k, :), model%D(j, :), model%axes)
         end do
       end do
     end associate

@@ -9,10 +9,10 @@ module pd_set_up_conditions
   use pd_scene_groups_course, only: ramp_of
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
-  use pd_body_generate, only: touch
   use pd_body_meshes, only: facet_mask, names_set
-  use pd_body_regions, only: region_mask, values_on
-  use pd_body_shapes, only: inside
+  use pd_body_choice, only: values_on
+  use pd_body_regions, only: region_mask
+  use pd_body_shapes, only: inside, touch
   use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
     & vary_in_time
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve

@@ -1,6 +1,9 @@
 !> Families of a scene: a lattice where the points allow it, a list otherwise.
 module pd_set_up_families
   use pd_base_error, only: error_type, internal_fault
+  use pd_base_kinds, only: wp
+  use pd_base_text, only: to_text
+  use pd_body_lattices, only: axes_of
   use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_rule_type
@@ -8,11 +11,11 @@ module pd_set_up_families
   use pd_force_weights, only: build_weights
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: is_turned, scene_type
   use pd_set_up_memory, only: any_critical
   implicit none (type, external)
   private
-  public :: make_family, finish_family
+  public :: make_family, finish_family, axes_of_factors
 
 contains
 
@@ -62,6 +65,41 @@ contains
       call move_alloc(list, system%family)
     end if
   end subroutine make_family
+
+  !> The directions of surface factors where bodies are turned: their axes. An error if these differ
+  !> between bodies, or on lists, whose loops have factors along x, y and z.
+  subroutine axes_of_factors(scene, system, error)
+    type(scene_type), intent(in) :: scene         !! a checked scene
+    type(system_type), intent(inout) :: system    !! with its family; its model gets the axes
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: same_axes = 1.0e-9_wp
+    character(:), allocatable :: reason
+    real(wp) :: axes(3, 3)
+    integer :: b, turned
+
+    turned = findloc(is_turned(scene%bodies), .true., dim=1)
+    if (turned == 0) return
+    reason = ''
+    axes = axes_of(scene%bodies(turned), system%body%dim)
+    do b = 1, size(scene%bodies)
+      if (any(abs(axes_of(scene%bodies(b), system%body%dim) - axes) > same_axes)) &
+        & reason = 'the axes of bodies 1 and '//to_text(b)//' differ'
+    end do
+    select type (family => system%family)
+    type is (lattice_family_type)
+      continue
+    class default  ! lists: their loops take the factors along x, y and z
+      reason = 'the scene gets lists, which take it along x, y and z'
+    end select
+    if (reason == '') then
+      system%model%axes = axes(:system%body%dim, :system%body%dim)
+    else
+      call scene_fault(error, scene, 'body', turned, 'axis_1', &
+        & "surface_correction = 'energy' is "// &
+        & "taken along the rows of a turned body, but "//reason, "surface_correction = 'none' "// &
+        & 'needs no axes')
+    end if
+  end subroutine axes_of_factors
 
   !> What the force loops keep of the model: the weights of the bonds.
   subroutine finish_family(system)

@@ -6,10 +6,12 @@ module pd_set_up_loads
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_scene_content_expressions, only: expression_of, varies_in_time
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type, load_group, is_set
+  use pd_scene_content_types, only: body_group, is_turned, scene_type, load_group, is_set
   use pd_body_body, only: body_type
+  use pd_body_lattices, only: axes_of
   use pd_body_meshes, only: facet_areas, names_set, place_set_fault
-  use pd_body_regions, only: region_mask, values_on
+  use pd_body_choice, only: values_on
+  use pd_body_regions, only: region_mask
   use pd_family_areas, only: behind_share, next_points, outermost_share
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_motion_loads, only: load_type, add_part
@@ -79,8 +81,8 @@ contains
 
     !> Pressure on the row at the load's side, and the force density of a unit of it.
     subroutine by_side()
-      real(wp) :: outward
-      integer :: axis
+      real(wp) :: outward, axes(3, 3)
+      integer :: axis, d
 
       if (allocated(pressed)) deallocate (pressed)
       allocate (pressed(size(loads(l)%slots), body%dim), source=0.0_wp)
@@ -88,6 +90,15 @@ contains
         if (side == '') return
         axis = index('xyz', side(1:1))
         outward = merge(-1.0_wp, 1.0_wp, side(3:5) == 'min')
+        if (is_turned(side_body(scene, scene%loads(l)%body))) then
+          axes = axes_of(side_body(scene, scene%loads(l)%body), body%dim)
+          do d = 1, body%dim
+            pressed(:, d) = -part*(axes(d, axis)*outward/body%spacing(loads(l)%slots))
+            if (is_set(scene%loads(l)%pressure)) loads(l)%density(:, d) = loads(l)%density(:, d) &
+              & + scene%loads(l)%pressure*pressed(:, d)
+          end do
+          return
+        end if
         pressed(:, axis) = -part*(outward/body%spacing(loads(l)%slots))
         if (is_set(scene%loads(l)%pressure)) loads(l)%density(:, axis) = &
           & loads(l)%density(:, axis) - part*(scene%loads(l)%pressure*outward/body%spacing( &
@@ -248,7 +259,7 @@ contains
     type(load_group), intent(in) :: group
     logical, allocatable :: chosen(:)
     real(wp), allocatable :: face(:)
-    real(wp) :: direction, outermost
+    real(wp) :: direction, outermost, axes(3, 3)
     integer :: axis
 
     axis = index('xyz', group%side(1:1))
@@ -257,9 +268,21 @@ contains
     if (group%body /= '') chosen = chosen .and. body%body == body_number(scene, group%body)
     ! a row's points reach half a spacing further out than their centres
     face = direction*body%x(:, axis) + body%spacing/2
+    if (is_turned(side_body(scene, group%body))) then
+      axes = axes_of(side_body(scene, group%body), body%dim)
+      face = direction*matmul(body%x, axes(:body%dim, axis)) + body%spacing/2
+    end if
     outermost = maxval(face, mask=chosen)
     chosen = chosen .and. face > outermost - body%spacing/2
   end function outermost_row
+
+  !> The body whose side a load means: the one it names, or the first. Where some are turned a scene
+  !> of several bodies has names.
+  pure type(body_group) function side_body(scene, name) result(group)
+    type(scene_type), intent(in) :: scene
+    character(*), intent(in) :: name
+    group = scene%bodies(max(1, body_number(scene, name)))
+  end function side_body
 
   !> Number of a body by name.
   pure integer function body_number(scene, name) result(number)

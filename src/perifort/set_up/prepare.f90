@@ -30,7 +30,7 @@ module pd_set_up_prepare
   use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
     & gravity_of_scene, leave_uncorrected, sides_of_contact
-  use pd_set_up_families, only: make_family, finish_family
+  use pd_set_up_families, only: axes_of_factors, make_family, finish_family
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
   use pd_set_up_plan, only: plan_type, make_plan
@@ -137,8 +137,10 @@ contains
       call timer%start('surface correction')
       system%model%surface = scene%horizon%surface_correction == 'energy' .and. &
         & any([(laws(i)%law%corrected, i=1, size(laws))])
+      if (system%model%surface) call axes_of_factors(scene, system, error)
+      if (allocated(error)) return
       if (system%model%surface) call surface_factors(system%body, system%family, materials, &
-        & system%model%D, system%model%S, laws)
+        & system%model%D, system%model%S, laws, system%model%axes)
       if (system%model%surface) call leave_uncorrected(scene, system%motions, system%model%D, &
         & system%model%S)
       if (scene%horizon%surface_correction == 'consistent') then

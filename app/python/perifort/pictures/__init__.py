@@ -161,13 +161,20 @@ class _Difference(Results):
         self.__dict__.update(first.__dict__)
         self._only = np.asarray(values_of(second, name, j) - values_of(first, name, k))
         self._named, self._first, self._at = name, first, k
+        if first.cells is not None and second.cells is not None and \
+                np.array_equal(first.cells.connectivity, second.cells.connectivity):
+            self._of_cells = np.asarray(values_of(second, name, j, "cells")
+                                        - values_of(first, name, k, "cells"))
+        else:
+            self.cells = None
 
-    def field(self, name: str, output: float | None = None, *,
-              time: float | None = None) -> Quantity:
+    def field(self, name: str, output: float | None = None, *, time: float | None = None,
+              of: str = "points") -> Quantity:
         """The difference, at any output; the displacements are those of the first run."""
-        if name == base_name(self._named):
-            return Quantity(self._only, self.field_units[self.split(name)[0]], name)
-        return self._first.field(name, self._at)
+        if name == base_name(self._named) and of != "nodes":
+            return Quantity(self._of_cells if of == "cells" else self._only,
+                            self.field_units[self.split(name)[0]], name)
+        return self._first.field(name, self._at, of=of)
 
 
 def _fields(results: Results, field: str | Sequence[str] | None, component: str | None, quiet: bool,

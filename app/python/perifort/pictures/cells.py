@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..results import Results
+from ..results import Cells, Results
 
 Array = npt.NDArray[Any]
 
@@ -109,12 +109,13 @@ class Lattice:
 @dataclass
 class Part:
     """Points that are drawn alike: their numbers in the results, their size, and the lattice they
-    are on, None for a cloud.
+    are on, None for a cloud; or, of meshes whose elements are known, with these elements.
     """
 
     points: Array
     sizes: Array
     lattice: Lattice | None
+    mesh: Cells | None = None
 
 
 def spacing_of(points: Array, dimension: int) -> float:
@@ -150,17 +151,26 @@ def lattice_of(points: Array, dimension: int) -> Lattice | None:
 
 def parts_of(results: Results) -> list[Part]:
     """The body's points, without layers: on one lattice if they all are, else body by body (and
-    level by level of a refined one), each on its own or as a cloud.
+    level by level of a refined one), each on its own or as a cloud. Meshes whose elements are known
+    are one part.
     """
     dimension = results.dimension
     inside = np.flatnonzero(results.body)
+    found = []
+    if results.cells is not None and dimension > 1:
+        points = np.flatnonzero(results.cells.of_mesh)
+        sizes = spacing_of(results.points[points], dimension) * (
+            results.volume[points] / np.median(results.volume[points])) ** (1 / dimension)
+        found.append(Part(points, sizes, None, results.cells))
+        inside = inside[~results.cells.of_mesh[inside]]
+        if not len(inside):
+            return found
     whole = lattice_of(results.points[inside], dimension) if len(inside) > 1 else None
     if whole is not None:
-        return [Part(inside, np.full(len(inside), whole.spacing), whole)]
+        return [*found, Part(inside, np.full(len(inside), whole.spacing), whole)]
     marks = np.stack([results.marks.get(name, np.zeros(len(results.points)))[inside]
                       for name in ("body", "level")], axis=1)
     kinds, kind = np.unique(marks, axis=0, return_inverse=True)
-    found = []
     for number in range(len(kinds)):
         points = inside[kind.ravel() == number]
         lattice = lattice_of(results.points[points], dimension) if len(points) > 1 else None

@@ -20,6 +20,7 @@ from ..reference import nearest
 from ..results import Results
 from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing_of
 from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
+from .elements import cut_of, outer_faces, polygons
 from .layout import FONT, Panel, Place, lay_out, write_caption
 from .units import Scale, number, scale_of, state_text, words
 
@@ -88,6 +89,15 @@ class View:
             return self.results.points
         moved = self.results.field("displacement", output)
         return np.asarray(self.results.points + self.scale * np.asarray(moved))
+
+    def nodes(self, output: int) -> Array:
+        """Positions (n, 3) of the nodes of elements as they are drawn."""
+        cells = self.results.cells
+        assert cells is not None
+        if not self.scale:
+            return cells.nodes
+        moved = self.results.field("displacement", output, of="nodes")
+        return np.asarray(cells.nodes + self.scale * np.asarray(moved))
 
     def colours(self, name: str) -> Colours:
         """The colours of a field or component, over all outputs."""
@@ -160,12 +170,12 @@ def base_name(name: str) -> str:
     return name[:-len("_magnitude")] if name.endswith("_magnitude") else name
 
 
-def values_of(results: Results, name: str, output: int = -1) -> Array:
+def values_of(results: Results, name: str, output: int = -1, of: str = "points") -> Array:
     """Values (n) of a field, of a component of it ('displacement_x', 'stress_xy'), or the magnitude
-    of a vector or tensor ('displacement_magnitude').
+    of a vector or tensor ('displacement_magnitude'), of points or of cells.
     """
     base = base_name(name)
-    values = np.asarray(results.field(base, output), dtype=float)
+    values = np.asarray(results.field(base, output, of=of), dtype=float)
     if base == "fragment":
         # Numbers of colours, the same for a fragment at all outputs; none for crumbs
         _, which, sizes = np.unique(values, return_inverse=True, return_counts=True)
@@ -249,8 +259,13 @@ def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool | Ax
         colours = view.colours(name)
         scale = scale_of(unit_of(results, name), [colours.low, colours.high])
         positions = view.positions(output)
+        for part in view.parts:
+            if part.mesh is not None:
+                corners, cells = polygons(part.mesh, view.nodes(output)[:, :2])
+                _draw_polygons(axes, corners, values_of(results, name, output, "cells")[cells],
+                               colours, scale.factor)
         _draw_cells(axes, [(part, positions[part.points], values[part.points])
-                           for part in view.parts], colours, scale.factor)
+                           for part in view.parts if part.mesh is None], colours, scale.factor)
         _label(axes, "xy", frame_of(view, output))
         if bar:
             add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)), bar)
@@ -293,12 +308,18 @@ def _draw_cells(axes: Axes, parts: Sequence[tuple[Part, Array, Array]], colours:
             _draw_image(axes, part, positions, factor * values, norm, cmap,
                         colours.map == "magma_r")
             continue
-        corners = quads(part, positions)
-        middle = corners.mean(axis=1, keepdims=True)
-        # Two in a hundred: less than is seen, more than rounding to pixels leaves open
-        drawn = PolyCollection(middle + 1.02 * (corners - middle), array=factor * values, cmap=cmap,
-                               norm=norm, linewidths=0, antialiaseds=False, rasterized=True)
-        axes.add_collection(drawn)
+        _draw_polygons(axes, quads(part, positions), values, colours, factor)
+
+
+def _draw_polygons(axes: Axes, corners: Array, values: Array, colours: Colours,
+                   factor: float) -> None:
+    """Polygons (n, corners, 2) in the colours of their values, a hair larger than they are."""
+    middle = corners.mean(axis=1, keepdims=True)
+    # Two in a hundred: less than is seen, more than rounding to pixels leaves open
+    axes.add_collection(PolyCollection(
+        middle + 1.02 * (corners - middle), array=factor * values, cmap=_map(colours),
+        norm=Normalize(factor * colours.low, factor * colours.high), linewidths=0,
+        antialiaseds=False, rasterized=True))
 
 
 def _draw_image(axes: Axes, part: Part, positions: Array, values: Array, norm: Normalize,
@@ -442,6 +463,17 @@ def surface_of(view: View, name: str, output: int, camera: Camera,
     positions = view.positions(output)
     found, shades = [], []
     for part in view.parts:
+        if part.mesh is not None:
+            own = np.ones(len(part.mesh), dtype=bool)
+            if clip is not None:
+                middles = np.add.reduceat(
+                    part.mesh.nodes[part.mesh.connectivity, clip.axis],
+                    part.mesh.offsets[:-1]) / np.diff(part.mesh.offsets)
+                own = (middles - position_of(view, clip)) * np.sign(camera.eye[clip.axis]) <= 0
+            faces_found, owners = outer_faces(part.mesh, view.nodes(output), own)
+            found.append(faces_found)
+            shades.append(values_of(results, name, output, "cells")[owners])
+            continue
         kept = np.ones(len(part.points), dtype=bool)
         if clip is not None:
             plane = position_of(view, clip)
@@ -537,7 +569,14 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
     # x to the right where it lies in the plane, z upwards
     shown = [c for c in range(3) if c != clip.axis]
     parts = []
+    colours = view.colours(name)
+    scale = scale_of(unit_of(results, name), [colours.low, colours.high])
     for part in view.parts:
+        if part.mesh is not None:
+            corners, cells = cut_of(part.mesh, part.mesh.nodes, view.nodes(output), clip.axis, plane)
+            _draw_polygons(axes, corners[:, :, shown],
+                           values_of(results, name, output, "cells")[cells], colours, scale.factor)
+            continue
         apart = np.abs(results.points[part.points, clip.axis] - plane)
         near = np.flatnonzero(apart <= part.sizes / 2 * (1 + 1e-6))
         if not len(near):
@@ -551,8 +590,6 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
             flat = None
         cut = Part(part.points[near], part.sizes[near], flat)
         parts.append((cut, positions[cut.points][:, shown], values[cut.points]))
-    colours = view.colours(name)
-    scale = scale_of(unit_of(results, name), [colours.low, colours.high])
     _draw_cells(axes, parts, colours, scale.factor)
     limits = cut_frame(view, output, clip)
     unit = _label(axes, "".join("xyz"[c] for c in shown), limits)

@@ -9,7 +9,8 @@ module pd_body_mesh_elements
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: shape_type, shape_of, shape_numbered, shape_functions, face_nodes, face_shape
+  public :: shape_type, shape_of, shape_numbered, shape_functions, face_nodes, face_shape, &
+    & edge_between
   public :: n_shapes, most_nodes, kind_point, kind_line, kind_triangle, kind_quadrilateral, &
     & kind_tetrahedron, kind_hexahedron, kind_wedge, kind_pyramid
 
@@ -243,7 +244,9 @@ contains
 
   !> The number of the edge between two corners.
   pure integer function edge_between(kind, ends) result(edge)
-    integer, intent(in) :: kind, ends(2)
+    integer, intent(in) :: kind     !! one of `kind_*`
+    integer, intent(in) :: ends(2)  !! the corners, in any order; not those of an edge: a fault of
+                                    !! the program
     integer :: corners(2)
 
     do edge = 1, edge_counts(kind)

@@ -295,8 +295,8 @@ contains
     do i = 1, seen%n
       j = workspace%member(workspace%start(k) + i - 1)
       direction = (workspace%x(j, :) - workspace%x(k, :))/seen%length(i)
-      seen%Gd(i) = bond_factor(direction, model%D(k, :), model%D(j, :))
-      seen%Gb(i) = bond_factor(direction, model%S(k, :), model%S(j, :))
+      seen%Gd(i) = bond_factor(direction, model%D(k, :), model%D(j, :), model%axes)
+      seen%Gb(i) = bond_factor(direction, model%S(k, :), model%S(j, :), model%axes)
     end do
   end subroutine correct
 

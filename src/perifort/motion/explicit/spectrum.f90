@@ -275,8 +275,8 @@ contains
           if (.not. bonds%intact(i)) cycle
           if (model%surface) then
             n = bonds%xi(i, :)/bonds%length(i)
-            Gd = bond_factor(n, model%D(k, :), model%D(bonds%j(i), :))
-            Gb = bond_factor(n, model%S(k, :), model%S(bonds%j(i), :))
+            Gd = bond_factor(n, model%D(k, :), model%D(bonds%j(i), :), model%axes)
+            Gb = bond_factor(n, model%S(k, :), model%S(bonds%j(i), :), model%axes)
           end if
           if (model%consistent) then
             Gd = model%weights%Gd(model%weights%before(k) + i)

@@ -113,7 +113,7 @@ contains
     real(wp), intent(in) :: n(:)
     integer, intent(in) :: k, j
     surface_factor = 1.0_wp
-    if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :)))
+    if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :), model%axes))
   end function surface_factor
 
   !> The size of the consistent weight of the `i`-th bond of slot `k`.

@@ -4,6 +4,7 @@ module pd_output_fields_displacement
   use pd_body_body, only: gather
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type, rank_vector
+  use pd_output_results_types, only: nodes_linear
   implicit none (type, external)
   private
   public :: displacement_field
@@ -16,6 +17,7 @@ contains
     field%unit = 'm'
     field%meaning = 'displacement from the reference position'
     field%rank = rank_vector
+    field%at_nodes = nodes_linear
     field%fill => fill
     field%at_slot => at_slot
     field%exact => exact

@@ -9,7 +9,7 @@ module pd_output_fields_field
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_gradient, only: at_slot_from_gradient, fill_from_gradient, &
     & from_gradient_interface, shared_type
-  use pd_output_results_types, only: field_type
+  use pd_output_results_types, only: field_type, nodes_mean
   use pd_scene_content_types, only: name_length
   implicit none (type, external)
   private
@@ -29,6 +29,7 @@ module pd_output_fields_field
     character(32) :: unit = '1'               !! SI, for instance 'm/s'; '1' for none
     character(160) :: meaning = ''            !! in a few words
     integer :: rank = rank_scalar
+    integer :: at_nodes = nodes_mean          !! values at the nodes of a mesh: one of `nodes_*`
     procedure(fill_interface), pointer, nopass :: fill => null()
     procedure(point_interface), pointer, nopass :: at_slot => null()  !! else `fill` is called
     procedure(from_gradient_interface), pointer, nopass :: of_gradient => null()
@@ -155,6 +156,7 @@ contains
     if (field%rank == rank_vector) shown = 3
     entry%name = field%name
     entry%unit = field%unit
+    entry%at_nodes = field%at_nodes
     entry%components = field%components(shown)
     do c = 1, entry%components
       entry%labels = trim(entry%labels)//' '//field%component_name(c, shown)

@@ -5,6 +5,7 @@ module pd_output_fields_fragment
   use pd_motion_static_pieces, only: find_pieces, pieces_type
   use pd_motion_system, only: system_type
   use pd_output_fields_field, only: moment_type, output_field_type
+  use pd_output_results_types, only: nodes_nearest
   implicit none (type, external)
   private
   public :: fragment_field
@@ -15,6 +16,7 @@ contains
   type(output_field_type) function fragment_field() result(field)
     field%name = 'fragment'
     field%meaning = 'number of the part that chains of intact bonds join, by its first point'
+    field%at_nodes = nodes_nearest
     field%fill => fill
     field%lack => lack
   end function fragment_field

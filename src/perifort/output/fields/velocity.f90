@@ -4,6 +4,7 @@ module pd_output_fields_velocity
   use pd_body_body, only: gather
   use pd_output_fields_exact, only: exact_type
   use pd_output_fields_field, only: moment_type, output_field_type, rank_vector
+  use pd_output_results_types, only: nodes_linear
   implicit none (type, external)
   private
   public :: velocity_field
@@ -16,6 +17,7 @@ contains
     field%unit = 'm/s'
     field%meaning = 'velocity at the time of the output'
     field%rank = rank_vector
+    field%at_nodes = nodes_linear
     field%fill => fill
     field%at_slot => at_slot
     field%exact => exact

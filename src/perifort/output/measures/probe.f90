@@ -5,7 +5,7 @@ module pd_output_measures_probe
   use pd_base_text, only: line => labelled_line, to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_body_body, only: body_type
-  use pd_body_generate, only: touch
+  use pd_body_shapes, only: touch
   use pd_family_cells, only: cells_around, cells_type, sort_into_cells
   use pd_motion_system, only: system_type
   use pd_output_fields_between, only: stencil_at, stencil_type, values_between

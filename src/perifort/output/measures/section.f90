@@ -6,7 +6,7 @@ module pd_output_measures_section
     & total_of_running
   use pd_base_text, only: line => labelled_line, to_text
   use pd_body_body, only: body_type
-  use pd_body_generate, only: touch
+  use pd_body_shapes, only: touch
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_motion_system, only: system_type
   use pd_output_fields_pair_force, only: pair_force

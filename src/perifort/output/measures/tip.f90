@@ -10,7 +10,7 @@ module pd_output_measures_tip
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_text, only: line => labelled_line, to_text
   use pd_base_warnings, only: warnings_type
-  use pd_body_generate, only: touch
+  use pd_body_shapes, only: touch
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_motion_system, only: system_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type

@@ -15,6 +15,7 @@ module pd_output_report_begin
   use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_measures_line, only: profiles_of
+  use pd_output_results_cells, only: cells_of, cells_type
   use pd_output_report_columns, only: history_columns, history_table
   use pd_output_report_recorder, only: recorder_type
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of
@@ -55,7 +56,8 @@ contains
     type(recorder_type), intent(inout) :: recorder
     logical, intent(in) :: in_memory
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: positions(:, :)
+    real(wp), allocatable :: positions(:, :), volume(:)
+    type(cells_type), allocatable :: cells
     type(kept_type), allocatable :: kept
     type(field_table_type) :: table
     type(error_type), allocatable :: ignored
@@ -77,6 +79,11 @@ contains
       do c = 1, body%dim
         call gather(body, body%x(:, c), positions(:, c))
       end do
+      if (scene%output%cells .and. directory /= '') then
+        allocate (cells, volume(body%n_points))
+        call gather(body, body%volume, volume)
+        call cells_of(body%parts, positions, volume, cells)
+      end if
       command = text_of(options%command)
       call recorder%results%create(directory, stem, positions, &
         & [(recorder%fields(f)%in_file(body%dim), f=1, size(recorder%fields))], &
@@ -84,7 +91,7 @@ contains
         & history_columns(system, recorder%measures, plan%relaxes), planned_rows(schedule), &
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
         & program_version, options%overwrite .or. options%restart, error, kept, &
-        & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))])
+        & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))], cells)
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
       if (.not. recorder%results%resumes()) call put_points(scene, body, recorder, error)

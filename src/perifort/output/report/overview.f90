@@ -8,6 +8,7 @@ module pd_output_report_overview
   use pd_scene_content_types, only: is_set, scene_type
   use pd_law_law, only: bond_law_type
   use pd_law_material, only: material_type, never
+  use pd_body_lattices, only: coordinate
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_body_regions, only: region_mask
@@ -106,19 +107,25 @@ contains
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     character(:), allocatable :: text
-    real(wp), allocatable :: extents(:)
+    real(wp), allocatable :: extents(:), along(:)
     logical, allocatable :: mine(:)
     real(wp) :: edges(3)
-    integer :: i, c
+    integer :: i, c, g
 
     associate (body => system%body, delta => system%family%rule%delta)
       text = ''
       do i = 1, size(scene%bodies)
         mine = body%body == i .and. body%layer == 0 .and. body%point > 0
         if (.not. any(mine)) cycle
+        g = body%grid(findloc(mine, .true., dim=1))
         do c = 1, body%dim
-          edges(c) = maxval(body%x(:, c) + body%spacing/2, mask=mine) &
-            & - minval(body%x(:, c) - body%spacing/2, mask=mine)
+          if (g > 0) then
+            along = coordinate(body%grids(g), body%x, c)  ! of a turned body its own edges
+          else
+            along = body%x(:, c)
+          end if
+          edges(c) = maxval(along + body%spacing/2, mask=mine) &
+            & - minval(along - body%spacing/2, mask=mine)
         end do
         text = text//line('body '//to_text(i), with_unit(minval(edges(:body%dim)), 'm', 4)// &
           & ' in its thinnest direction: '//to_text(minval(edges(:body%dim))/delta, 3)// &

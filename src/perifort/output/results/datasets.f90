@@ -9,7 +9,7 @@ module pd_output_results_datasets
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t, c_loc, c_ptr
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5P_DATASET_CREATE_F, &
     & H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_I32LE, &
-    & H5T_STD_I64LE, H5T_STD_I8LE, h5dclose_f, h5dcreate_f, &
+    & H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U8LE, h5dclose_f, h5dcreate_f, &
     & h5dget_create_plist_f, h5dget_space_f, h5dopen_f, &
     & h5dread_f, h5dset_extent_f, h5dwrite_f, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, &
     & h5pget_chunk_f, h5pset_chunk_f, h5pset_fill_time_f, h5pset_virtual_f, h5sclose_f, &
@@ -22,13 +22,15 @@ module pd_output_results_datasets
   implicit none (type, external)
   private
   public :: put_array, make_dataset, make_series, write_rows, read_rows, set_rows, get_shape
-  public :: get_chunk, make_view, settled_properties, storage_f8, storage_f4, storage_i8
+  public :: put_unsigned, get_chunk, make_view, settled_properties, storage_f8, storage_f4, &
+    & storage_i8
 
   integer, parameter :: storage_f8 = 1  !! 64-bit real
   integer, parameter :: storage_f4 = 2  !! 32-bit real
   integer, parameter :: storage_i8 = 3  !! 64-bit integer
   integer, parameter :: storage_i4 = 4  !! 32-bit integer
   integer, parameter :: storage_i1 = 5  !! 8-bit integer
+  integer, parameter :: storage_u1 = 6  !! 8-bit integer without sign
 
   !> Write a whole array as a dataset of its own, or one value as a dataset of shape (1).
   interface put_array
@@ -73,6 +75,8 @@ contains
       storage_id = H5T_STD_I32LE
     case (storage_i1)
       storage_id = H5T_STD_I8LE
+    case (storage_u1)
+      storage_id = H5T_STD_U8LE
     case default
       storage_id = -1
       call internal_fault('storage_id does not know a kind of number')
@@ -368,6 +372,19 @@ contains
     call move_rows(file, path, storage_i1, 1, 0_i8, size(values, kind=i8), c_loc(values), .true., &
       & error)
   end subroutine put_array_i1
+
+  !> A vector of 8-bit integers, none below 0, as a dataset of integers without sign.
+  subroutine put_unsigned(file, path, values, error)
+    type(hdf5_file), intent(in) :: file  !! open and writable
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i1), contiguous, target, intent(in) :: values(:)  !! (rows), 0 to 127
+    type(error_type), allocatable, intent(out) :: error
+
+    call make_dataset(file, path, storage_u1, 1, size(values, kind=i8), error)
+    if (allocated(error) .or. size(values) == 0) return
+    call move_rows(file, path, storage_i1, 1, 0_i8, size(values, kind=i8), c_loc(values), .true., &
+      & error)
+  end subroutine put_unsigned
 
   !> A vector of 32-bit integers as a dataset.
   subroutine put_array_i4(file, path, values, error)

@@ -1,24 +1,30 @@
 !> How the results file is laid out, and how its parts are made and copied.
 !>
-!> `/VTKHDF` follows VTK's file format of that name (version 2.0, type PolyData, with steps);
-!> `/scene`, `/points` and `/history` are this program's own, and other readers pass over them.
+!> `/VTKHDF` follows VTK's file format of that name (version 2.0, with steps): of type PolyData,
+!> each
+!> point a vertex, or, with cells, UnstructuredGrid. The nodes of cells then stand behind the points
+!> in `Points` and in all of `PointData`, and `CellData` has the values of cells.
+!> `/scene`, `/points`, `/cells` and `/history` are this program's own, and other readers pass over
+!> them.
 !>
 !> An error is set if HDF5 fails to read or write the file.
 module pd_output_results_layout
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, sp, i8
+  use pd_output_results_cells, only: cells_type
   use pd_output_results_datasets, only: get_shape, make_dataset, make_series, make_view, &
-    & put_array, read_rows, set_rows, storage_f4, storage_f8, storage_i8, write_rows
+    & put_array, put_unsigned, read_rows, set_rows, storage_f4, storage_f8, storage_i8, write_rows
   use pd_output_results_hdf5, only: change_attribute, copy_object, hdf5_file, make_group, &
     & object_exists, put_attribute, put_text, remove_object
   use pd_output_results_profiles, only: bytes_of_profiles, copy_profiles, make_profiles, &
     & trim_profiles
   use pd_output_results_types, only: column_type, field_type, line_type
-  use pd_output_results_views, only: view_of_output, view_type, views_fit, views_of
+  use pd_output_results_views, only: folder, folder_of_cells, view_of_cells, view_of_output, &
+    & view_type, views_fit, views_of
   implicit none (type, external)
   private
-  public :: layout_type, put_scene, put_geometry, write_vectors, copy_static, copy_scene, to_single
+  public :: layout_type, put_scene, put_geometry, write_vectors, copy_scene, to_single
   public :: chunk_rows, block_rows
 
   integer, parameter :: block_rows = 65536  !! points converted and written at a time
@@ -34,10 +40,13 @@ module pd_output_results_layout
     integer(i8) :: capacity = 0      !! outputs there is room for
     integer(i8) :: row_capacity = 0  !! rows of the history there is room for
     logical :: single = .false.      !! fields in single precision
+    type(cells_type) :: cells        !! none: each point is a vertex
   contains
+    procedure :: rows_of_output
     procedure :: make_heart
     procedure :: make_time_series
     procedure, private :: make_views
+    procedure :: copy_static
     procedure :: copy_time_series
     procedure :: trim_time_series
     procedure :: field_bytes
@@ -68,8 +77,18 @@ contains
     if (allocated(error)) return
     call put_attribute(file, '/VTKHDF', 'Version', [2_i8, 0_i8], error)
     if (allocated(error)) return
-    call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
+    if (self%cells%n_cells() > 0) then
+      call put_attribute(file, '/VTKHDF', 'Type', 'UnstructuredGrid', error)
+    else
+      call put_attribute(file, '/VTKHDF', 'Type', 'PolyData', error)
+    end if
   end subroutine make_heart
+
+  !> Rows of `PointData` that an output takes: a value for each point, and for each node of cells.
+  pure integer(i8) function rows_of_output(self)
+    class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
+    rows_of_output = self%points + self%cells%n_nodes()
+  end function rows_of_output
 
   !> `/scene`: what was computed, by what.
   subroutine put_scene(file, scene_text, command, version, error)
@@ -87,16 +106,22 @@ contains
       & call put_attribute(file, '/scene', 'compiler', compiler_version(), error)
   end subroutine put_scene
 
-  !> What doesn't change with time: points, each of them a vertex, and no other cells.
-  subroutine put_geometry(file, positions, error)
+  !> What doesn't change with time: points, each of them a vertex, and no other cells; or points and
+  !> nodes, with cells.
+  subroutine put_geometry(file, positions, cells, error)
     type(hdf5_file), intent(in) :: file      !! writable, with `/VTKHDF`
     real(wp), intent(in) :: positions(:, :)  !! (n_points, 3) [m]
+    type(cells_type), intent(in) :: cells    !! of the file; none: vertices
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: empty(3) = [character(8) :: 'Lines', 'Polygons', 'Strips']
     character(:), allocatable :: group
     integer(i8) :: n
     integer :: i
 
+    if (cells%n_cells() > 0) then
+      call put_grid(file, positions, cells, error)
+      return
+    end if
     n = size(positions, 1, kind=i8)
     call put_array(file, '/VTKHDF/NumberOfPoints', [n], error)
     if (allocated(error)) return
@@ -129,6 +154,39 @@ contains
       if (allocated(error)) return
     end do
   end subroutine put_geometry
+
+  !> Points, nodes and cells of an unstructured grid.
+  subroutine put_grid(file, positions, cells, error)
+    type(hdf5_file), intent(in) :: file
+    real(wp), intent(in) :: positions(:, :)
+    type(cells_type), intent(in) :: cells
+    type(error_type), allocatable, intent(out) :: error
+    integer(i8) :: n
+
+    n = size(positions, 1, kind=i8) + cells%n_nodes()
+    call put_array(file, '/VTKHDF/NumberOfPoints', [n], error)
+    if (allocated(error)) return
+    call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, n, error)
+    if (allocated(error)) return
+    call write_vectors(file, '/VTKHDF/Points', 0_i8, positions, .false., error)
+    if (allocated(error)) return
+    call write_vectors(file, '/VTKHDF/Points', size(positions, 1, kind=i8), cells%nodes, .false., &
+      & error)
+    if (allocated(error)) return
+    call put_array(file, '/VTKHDF/NumberOfCells', [cells%n_cells()], error)
+    if (allocated(error)) return
+    call put_array(file, '/VTKHDF/NumberOfConnectivityIds', &
+      & [size(cells%connectivity, kind=i8)], error)
+    if (allocated(error)) return
+    call put_array(file, '/VTKHDF/Connectivity', cells%connectivity, error)
+    if (allocated(error)) return
+    call put_array(file, '/VTKHDF/Offsets', cells%offsets, error)
+    if (allocated(error)) return
+    call put_unsigned(file, '/VTKHDF/Types', cells%types, error)
+    if (allocated(error)) return
+    call make_group(file, '/cells', error)
+    if (.not. allocated(error)) call put_array(file, '/cells/topology', cells%topology, error)
+  end subroutine put_grid
 
   !> A dataset of `rows` integers 0, step, 2 step, ...; with `chunk` above 0 one that can grow.
   subroutine put_multiples(file, path, rows, step, chunk, error)
@@ -164,7 +222,7 @@ contains
     character(:), allocatable :: path
     integer(i8), allocatable :: constant(:), cells(:, :)
     integer(i8) :: s, chunk
-    integer :: i
+    integer :: i, kinds
 
     s = self%capacity
     chunk = min(s, small_chunk/8)
@@ -177,37 +235,28 @@ contains
     allocate (constant(s), source=1_i8)
     call write_rows(file, steps//'/NumberOfParts', 0_i8, constant, error)
     if (allocated(error)) return
-    allocate (cells(4, s), source=0_i8)
-    call make_series(file, steps//'/CellOffsets', storage_i8, 4, s, chunk, error)
+    kinds = kinds_of_cells(self)
+    allocate (cells(kinds, s), source=0_i8)
+    call make_series(file, steps//'/CellOffsets', storage_i8, kinds, s, chunk, error)
+    if (.not. allocated(error)) call make_series(file, steps//'/ConnectivityIdOffsets', &
+      & storage_i8, kinds, s, chunk, error)
     if (allocated(error)) return
-    call write_rows(file, steps//'/CellOffsets', 0_i8, cells, error)
-    if (allocated(error)) return
-    call make_series(file, steps//'/ConnectivityIdOffsets', storage_i8, 4, s, chunk, error)
-    if (allocated(error)) return
-    call write_rows(file, steps//'/ConnectivityIdOffsets', 0_i8, cells, error)
+    if (kinds > 1) then
+      call write_rows(file, steps//'/CellOffsets', 0_i8, cells, error)
+      if (.not. allocated(error)) call write_rows(file, steps//'/ConnectivityIdOffsets', 0_i8, &
+        & cells, error)
+    else
+      call write_rows(file, steps//'/CellOffsets', 0_i8, cells(1, :), error)
+      if (.not. allocated(error)) call write_rows(file, steps//'/ConnectivityIdOffsets', 0_i8, &
+        & cells(1, :), error)
+    end if
     if (allocated(error)) return
 
-    call make_group(file, '/VTKHDF/PointData', error)
+    call make_fields(self, file, 'PointData', self%rows_of_output(), error)
     if (allocated(error)) return
-    call make_group(file, steps//'/PointDataOffsets', error)
+    if (self%cells%n_cells() > 0) call make_fields(self, file, 'CellData', self%cells%n_cells(), &
+      & error)
     if (allocated(error)) return
-    do i = 1, size(self%fields)
-      associate (field => self%fields(i))
-        path = '/VTKHDF/PointData/'//trim(field%name)
-        call make_series(file, path, merge(storage_f4, storage_f8, self%single), &
-          & field%components, s*self%points, &
-          & chunk_rows(self%points, field_bytes(self, i), s), error)
-        if (allocated(error)) return
-        call put_attribute(file, path, 'units', trim(field%unit), error)
-        if (allocated(error)) return
-        if (field%labels /= '') call put_attribute(file, path, 'components', trim(field%labels), &
-          & error)
-        if (allocated(error)) return
-        call put_multiples(file, steps//'/PointDataOffsets/'//trim(field%name), s, self%points, &
-          & chunk, error)
-        if (allocated(error)) return
-      end associate
-    end do
 
     call make_group(file, '/history', error)
     if (allocated(error)) return
@@ -229,34 +278,85 @@ contains
     if (.not. allocated(error)) call make_profiles(file, self%lines, self%capacity, error)
   end subroutine make_time_series
 
-  !> `/outputs`: the outputs one by one, where they are not too many.
+  !> Kinds of cells that the format counts: vertices, lines, polygons, strips; or one of any kind.
+  pure integer function kinds_of_cells(self) result(kinds)
+    class(layout_type), intent(in) :: self
+    kinds = merge(1, 4, self%cells%n_cells() > 0)
+  end function kinds_of_cells
+
+  !> All fields of points or cells, with `rows` rows in each output.
+  subroutine make_fields(self, file, of, rows, error)
+    class(layout_type), intent(in) :: self
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: of           !! 'PointData' or 'CellData'
+    integer(i8), intent(in) :: rows
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: path
+    integer(i8) :: s
+    integer :: i
+
+    s = self%capacity
+    call make_group(file, '/VTKHDF/'//of, error)
+    if (allocated(error)) return
+    call make_group(file, '/VTKHDF/Steps/'//of//'Offsets', error)
+    if (allocated(error)) return
+    do i = 1, size(self%fields)
+      associate (field => self%fields(i))
+        path = '/VTKHDF/'//of//'/'//trim(field%name)
+        call make_series(file, path, merge(storage_f4, storage_f8, self%single), &
+          & field%components, s*rows, chunk_rows(rows, field_bytes(self, i), s), error)
+        if (allocated(error)) return
+        call put_attribute(file, path, 'units', trim(field%unit), error)
+        if (allocated(error)) return
+        if (field%labels /= '') call put_attribute(file, path, 'components', trim(field%labels), &
+          & error)
+        if (allocated(error)) return
+        call put_multiples(file, '/VTKHDF/Steps/'//of//'Offsets/'//trim(field%name), s, rows, &
+          & min(s, small_chunk/8), error)
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine make_fields
+
+  !> `/outputs`: the outputs one by one, where they are not too many; `/cell_outputs`: of cells.
   subroutine make_views(self, file, error)
     class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
     type(hdf5_file), intent(in) :: file     !! writable, with all fields
     type(error_type), allocatable, intent(out) :: error
     type(view_type), allocatable :: views(:)
-    character(:), allocatable :: source
-    integer(i8) :: k
-    integer :: i
 
     if (.not. views_fit(self%fields, self%capacity)) return
     views = views_of(self%fields)
-    call make_group(file, '/outputs', error)
-    do i = 1, size(views)
-      if (allocated(error)) return
-      associate (view => views(i), field => self%fields(views(i)%field))
-        source = '/outputs/'//trim(field%name)
-        if (view%component == 1) call make_group(file, source, error)
-        if (.not. allocated(error)) call make_group(file, trim(view%group), error)
-        source = '/VTKHDF/PointData/'//trim(field%name)
-        do k = 0, self%capacity - 1
-          if (allocated(error)) return
-          call make_view(file, view_of_output(view, k), merge(storage_f4, storage_f8, &
-            & self%single), source, field%components, self%capacity*self%points, &
-            & k*self%points, self%points, view%component, error)
-        end do
-      end associate
-    end do
+    call make_some(views, folder, 'PointData', self%rows_of_output())
+    if (self%cells%n_cells() == 0 .or. allocated(error)) return
+    call make_some(view_of_cells(views), folder_of_cells, 'CellData', self%cells%n_cells())
+
+  contains
+
+    !> Views of points or of cells, in the same order.
+    subroutine make_some(shown, top, of, rows)
+      type(view_type), intent(in) :: shown(:)
+      character(*), intent(in) :: top, of
+      integer(i8), intent(in) :: rows
+      integer(i8) :: k
+      integer :: i
+
+      call make_group(file, top, error)
+      do i = 1, size(shown)
+        if (allocated(error)) return
+        associate (view => shown(i), field => self%fields(shown(i)%field))
+          if (view%component == 1) call make_group(file, top//'/'//trim(field%name), error)
+          if (.not. allocated(error)) call make_group(file, trim(view%group), error)
+          do k = 0, self%capacity - 1
+            if (allocated(error)) return
+            call make_view(file, view_of_output(view, k), merge(storage_f4, storage_f8, &
+              & self%single), '/VTKHDF/'//of//'/'//trim(field%name), field%components, &
+              & self%capacity*rows, k*rows, rows, view%component, error)
+          end do
+        end associate
+      end do
+    end subroutine make_some
+
   end subroutine make_views
 
   !> Rows per chunk, for outputs of `points` rows of `row_bytes` bytes: several outputs if they
@@ -297,7 +397,8 @@ contains
 
     output_bytes = bytes_of_profiles(self%lines)
     do i = 1, size(self%fields)
-      output_bytes = output_bytes + self%points*field_bytes(self, i)
+      output_bytes = output_bytes + (self%rows_of_output() + self%cells%n_cells()) &
+        & *field_bytes(self, i)
     end do
   end function output_bytes
 
@@ -305,11 +406,15 @@ contains
   pure integer(i8) function fixed_bytes(self)
     class(layout_type), intent(in) :: self  !! what the file holds, and room for how much of it
 
-    fixed_bytes = self%points*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + size(self%fields)) &
+    fixed_bytes = self%rows_of_output()*(3*8 + 2*8 + 8 + 4*4) + self%capacity*8*(12 + &
+      & size(self%fields)) &
       & + self%row_capacity*8*size(self%columns)
     ! a view has a record and a place in the index of its group
     if (views_fit(self%fields, self%capacity)) &
-      & fixed_bytes = fixed_bytes + 500*self%capacity*size(views_of(self%fields))
+      & fixed_bytes = fixed_bytes + merge(1000, 500, self%cells%n_cells() > 0)*self%capacity &
+      & *size(views_of(self%fields))
+    if (self%cells%n_cells() > 0) fixed_bytes = fixed_bytes + 8*(size(self%cells%connectivity, &
+      & kind=i8) + size(self%cells%topology, kind=i8))
   end function fixed_bytes
 
   !> Write `values(n, components)` as rows of components from row `at` on, turned block by block.
@@ -350,15 +455,27 @@ contains
   end function to_single
 
   !> Copy all that doesn't grow but the scene.
-  subroutine copy_static(from, to, error)
+  subroutine copy_static(self, from, to, error)
+    class(layout_type), intent(in) :: self  !! what the file holds
     type(hdf5_file), intent(in) :: from  !! a complete file of this layout
     type(hdf5_file), intent(in) :: to    !! writable, begun by `make_heart`
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: parts(7) = [character(24) :: '/points', &
       & '/VTKHDF/NumberOfPoints', '/VTKHDF/Points', '/VTKHDF/Vertices', '/VTKHDF/Lines', &
       & '/VTKHDF/Polygons', '/VTKHDF/Strips']
+    character(*), parameter :: of_grid(8) = [character(32) :: '/points', '/cells', &
+      & '/VTKHDF/NumberOfPoints', '/VTKHDF/Points', '/VTKHDF/NumberOfCells', &
+      & '/VTKHDF/NumberOfConnectivityIds', '/VTKHDF/Connectivity', '/VTKHDF/Offsets']
     integer :: i
 
+    if (self%cells%n_cells() > 0) then
+      do i = 1, size(of_grid)
+        call copy_object(from, trim(of_grid(i)), to, error)
+        if (allocated(error)) return
+      end do
+      call copy_object(from, '/VTKHDF/Types', to, error)
+      return
+    end if
     do i = 1, size(parts)
       call copy_object(from, trim(parts(i)), to, error)
       if (allocated(error)) return
@@ -391,7 +508,10 @@ contains
     do i = 1, size(self%fields)
       if (allocated(error)) return
       call copy_rows(from, to, '/VTKHDF/PointData/'//trim(self%fields(i)%name), &
-        & (outputs + 1)*self%points, self%single, error)
+        & (outputs + 1)*self%rows_of_output(), self%single, error)
+      if (allocated(error) .or. self%cells%n_cells() == 0) cycle
+      call copy_rows(from, to, '/VTKHDF/CellData/'//trim(self%fields(i)%name), &
+        & (outputs + 1)*self%cells%n_cells(), self%single, error)
     end do
     do i = 1, size(self%columns)
       if (allocated(error)) return
@@ -458,6 +578,8 @@ contains
       do i = 1, size(views)
         do k = self%capacity - 1, outputs, -1
           call remove_object(file, view_of_output(views(i), k), error)
+          if (.not. allocated(error) .and. self%cells%n_cells() > 0) call remove_object(file, &
+            & view_of_output(view_of_cells(views(i)), k), error)
           if (allocated(error)) return
         end do
       end do
@@ -468,19 +590,13 @@ contains
         if (allocated(error)) return
       end do
       do i = 1, size(tables)
-        call set_rows(file, steps//trim(tables(i)), 4, outputs, error)
+        call set_rows(file, steps//trim(tables(i)), kinds_of_cells(self), outputs, error)
         if (allocated(error)) return
       end do
-      do i = 1, size(self%fields)
-        associate (field => self%fields(i))
-          call set_rows(file, steps//'PointDataOffsets/'//trim(field%name), 1, &
-            & outputs, error)
-          if (allocated(error)) return
-          call set_rows(file, '/VTKHDF/PointData/'//trim(field%name), field%components, &
-            & outputs*self%points, error)
-          if (allocated(error)) return
-        end associate
-      end do
+      call trim_fields('PointData', self%rows_of_output())
+      if (self%cells%n_cells() > 0 .and. .not. allocated(error)) &
+        & call trim_fields('CellData', self%cells%n_cells())
+      if (allocated(error)) return
     end if
     if (rows == 0) then
       do i = 1, size(self%columns)
@@ -488,6 +604,26 @@ contains
         if (allocated(error)) return
       end do
     end if
+
+  contains
+
+    !> Cut the fields of points or cells, which have `each` rows in an output.
+    subroutine trim_fields(of, each)
+      character(*), intent(in) :: of
+      integer(i8), intent(in) :: each
+      integer :: f
+
+      do f = 1, size(self%fields)
+        associate (field => self%fields(f))
+          call set_rows(file, steps//of//'Offsets/'//trim(field%name), 1, outputs, error)
+          if (allocated(error)) return
+          call set_rows(file, '/VTKHDF/'//of//'/'//trim(field%name), field%components, &
+            & outputs*each, error)
+          if (allocated(error)) return
+        end associate
+      end do
+    end subroutine trim_fields
+
   end subroutine trim_time_series
 
 end module pd_output_results_layout

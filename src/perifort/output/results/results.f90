@@ -20,6 +20,7 @@ module pd_output_results_results
   use pd_base_text, only: join, lower_case, to_text, with_unit
   use pd_output_checkpoint_checkpoint, only: remove_checkpoints
   use pd_output_results_answer, only: answer_type, values_type
+  use pd_output_results_cells, only: cells_type
   use pd_output_results_description, only: check_description, has_list
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
@@ -107,7 +108,8 @@ contains
   !> An error if the description is unusable, if older results are in the way, if the files do not
   !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
-    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, lines)
+    & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, &
+    & lines, cells)
     class(results_type), intent(out) :: self       !! open on return, unless an error is set
     character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
                                                    !! the current one
@@ -128,6 +130,7 @@ contains
     type(kept_type), intent(in), optional :: kept  !! rows, times and scene of a checkpoint to start
                                                    !! from; absent: a new run
     type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles in each output
+    type(cells_type), intent(in), optional :: cells    !! of meshes, for the HDF5 file and its list
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
@@ -166,11 +169,12 @@ contains
     end if
     if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
     if (self%use_xdmf) call self%xdmf%create(in_directory(directory, self%stem//'.xdmf'), &
-      & self%stem//'.vtkhdf', size(positions, 1, kind=i8), fields, planned_outputs, single)
+      & self%stem//'.vtkhdf', size(positions, 1, kind=i8), fields, planned_outputs, single, &
+      & cells)
     if (self%resumed) then
       if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
         & size(positions, 1, kind=i8), fields, planned_outputs, columns, planned_rows, single, &
-        & scene_text, kept, error, self%lines)
+        & scene_text, kept, error, self%lines, cells)
       if (self%use_vtkhdf .and. .not. allocated(error)) &
         & call cut_back(self, kept%times, scene_text, command, version, error)
       if (.not. allocated(error)) call resume_others(self, kept, error)
@@ -178,7 +182,7 @@ contains
     else if (self%use_vtkhdf) then
       call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), positions, fields, &
         & planned_outputs, columns, planned_rows, single, scene_text, command, version, error, &
-        & self%lines)
+        & self%lines, cells)
       if (allocated(error)) then
         call explain_need(self, 'the layout', self%vtkhdf%layout_bytes(), error)
         call remove_empty(self%directory, self%made_folder)

@@ -4,8 +4,14 @@ module pd_output_results_types
   implicit none (type, external)
   private
   public :: field_type, column_type, line_type, kept_type, label_length
+  public :: nodes_mean, nodes_linear, nodes_nearest
 
   integer, parameter :: label_length = 160  !! longest name of a field or column [characters]
+
+  !> How values at the nodes and of the elements of a mesh follow from those of its points.
+  integer, parameter :: nodes_mean = 0     !! means
+  integer, parameter :: nodes_linear = 1   !! nodes: the linear function that fits; elements: means
+  integer, parameter :: nodes_nearest = 2  !! the value of one point: numbers, not quantities
 
   !> A quantity that every output holds at every point.
   type :: field_type
@@ -13,6 +19,7 @@ module pd_output_results_types
     integer :: components = 1              !! 3 for vectors in any dimension (unused ones 0)
     character(32) :: unit = ''             !! SI, for instance 'm/s'; '1' for none
     character(32) :: labels = ''           !! names of the components, parted by blanks: 'x y z'
+    integer :: at_nodes = nodes_mean       !! one of `nodes_*`
   end type field_type
 
   !> A quantity that every row of the history holds.

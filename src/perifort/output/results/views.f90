@@ -11,9 +11,10 @@ module pd_output_results_views
   use pd_output_results_types, only: field_type, label_length
   implicit none (type, external)
   private
-  public :: view_type, views_of, views_fit, view_of_output
+  public :: view_type, views_of, views_fit, view_of_output, view_of_cells, folder, folder_of_cells
 
-  character(*), parameter :: folder = '/outputs'
+  !> Groups that hold the views of points and of cells.
+  character(*), parameter :: folder = '/outputs', folder_of_cells = '/cell_outputs'
 
   !> A view costs about 500 bytes and a tenth of a millisecond before the first output.
   integer(i8), parameter :: most_views = 50000_i8
@@ -66,6 +67,13 @@ contains
       end associate
     end do
   end function views_of
+
+  !> The view of the cells that belongs to one of the points: `/cell_outputs/damage`.
+  elemental type(view_type) function view_of_cells(view) result(of_cells)
+    type(view_type), intent(in) :: view          !! of the points
+    of_cells = view
+    of_cells%group = folder_of_cells//trim(view%group(len(folder) + 1:))
+  end function view_of_cells
 
   !> Whether a file with room for `outputs` outputs of these fields has views of them.
   pure logical function views_fit(fields, outputs)

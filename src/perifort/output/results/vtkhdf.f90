@@ -1,4 +1,5 @@
-!> The results file: one HDF5 file that VTK reads as a time series of points (VTKHDF, PolyData).
+!> The results file: one HDF5 file that VTK reads as a time series of points or cells
+!> (VTKHDF: PolyData, UnstructuredGrid).
 !>
 !> It must be whole whenever its writer dies. HDF5 doesn't write its own records in one step, so
 !> they change only rarely: the file is laid out under another name with room for all planned
@@ -13,13 +14,14 @@ module pd_output_results_vtkhdf
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_text, only: to_text
+  use pd_output_results_cells, only: at_nodes, cells_type, of_cells
   use pd_output_results_datasets, only: get_chunk, get_shape, put_array, read_rows, set_rows, &
     & write_rows
   use pd_output_results_files, only: remove_file, rename_file, sync_path
   use pd_output_results_hdf5, only: change_attribute, close_file, create_file, flush_file, &
     & get_attribute, get_text, hdf5_file, make_group, object_exists, open_file, put_text, &
     & remove_object, start_hdf5
-  use pd_output_results_layout, only: block_rows, copy_scene, copy_static, layout_type, &
+  use pd_output_results_layout, only: block_rows, copy_scene, layout_type, &
     & put_geometry, put_scene, to_single, write_vectors
   use pd_output_results_profiles, only: put_profile
   use pd_output_results_types, only: column_type, field_type, kept_type, line_type
@@ -72,7 +74,7 @@ contains
   !> `columns` (0 = unknown) at the points `positions(n, 3)` [m]. It is
   !> made under another name until `publish`.
   subroutine create(self, path, positions, fields, planned_outputs, columns, planned_rows, single, &
-    & scene_text, command, version, error, lines)
+    & scene_text, command, version, error, lines, cells)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
     character(*), intent(in) :: path             !! of the file, with its ending
     real(wp), intent(in) :: positions(:, :)      !! (n_points, 3) in point order [m]
@@ -86,9 +88,11 @@ contains
     character(*), intent(in) :: version          !! of the program
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles; none without
+    type(cells_type), intent(in), optional :: cells    !! of meshes; none without
 
     self%path = path
     self%current = path//'.part'
+    if (present(cells)) self%layout%cells = cells
     call plan_layout(self, size(positions, 1, kind=i8), fields, planned_outputs, columns, &
       & planned_rows, single, lines)
     call start_hdf5(error)
@@ -100,7 +104,8 @@ contains
       return
     end if
     call self%layout%make_heart(self%file, error)
-    if (.not. allocated(error)) call put_geometry(self%file, positions, error)
+    if (.not. allocated(error)) call put_geometry(self%file, positions, &
+      & self%layout%cells, error)
     if (.not. allocated(error)) call put_scene(self%file, scene_text, command, version, error)
     if (.not. allocated(error)) call make_group(self%file, '/points', error)
     if (.not. allocated(error)) call self%layout%make_time_series(self%file, error)
@@ -135,7 +140,7 @@ contains
   !> `cut`; it is not changed yet. The other arguments are those of `create`. An error
   !> if the file has fewer of them, other times, or the results of another scene.
   subroutine resume(self, path, points, fields, planned_outputs, columns, planned_rows, single, &
-    & scene_text, kept, error, lines)
+    & scene_text, kept, error, lines, cells)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
     character(*), intent(in) :: path             !! of the file, with its ending
     integer(i8), intent(in) :: points            !! their number
@@ -148,10 +153,12 @@ contains
     type(kept_type), intent(in) :: kept  !! rows, times and scene that the checkpoint counts on
     type(error_type), allocatable, intent(out) :: error
     type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles; none without
+    type(cells_type), intent(in), optional :: cells    !! of meshes; none without
     character(:), allocatable :: text
 
     self%path = path
     self%current = path
+    if (present(cells)) self%layout%cells = cells
     call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, lines)
     call start_hdf5(error)
     if (allocated(error)) return
@@ -333,23 +340,42 @@ contains
     integer, intent(in) :: i                       !! number of the field, from 1
     real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: path
-    real(sp), allocatable :: short(:)
-    integer(i8) :: first, count, at
+    character(:), allocatable :: name
+    integer(i8) :: at
 
-    path = '/VTKHDF/PointData/'//trim(self%layout%fields(i)%name)
-    at = self%outputs*self%layout%points
+    name = trim(self%layout%fields(i)%name)
+    associate (layout => self%layout, rule => self%layout%fields(i)%at_nodes)
+      at = self%outputs*layout%rows_of_output()
+      call put_column(self, '/VTKHDF/PointData/'//name, at, values, error)
+      if (layout%cells%n_cells() == 0 .or. allocated(error)) return
+      call put_column(self, '/VTKHDF/PointData/'//name, at + layout%points, &
+        & at_nodes(layout%cells, rule, values), error)
+      if (.not. allocated(error)) call put_column(self, '/VTKHDF/CellData/'//name, &
+        & self%outputs*layout%cells%n_cells(), of_cells(layout%cells, rule, values), error)
+    end associate
+  end subroutine put_scalar
+
+  !> Write numbers from row `at` of a dataset on.
+  subroutine put_column(self, path, at, values, error)
+    class(vtkhdf_file), intent(in) :: self
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: at
+    real(wp), contiguous, intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    real(sp), allocatable :: short(:)
+    integer(i8) :: first, count
+
     if (.not. self%layout%single) then
       call write_rows(self%file, path, at, values, error)
       return
     end if
-    do first = 0, self%layout%points - 1, block_rows
-      count = min(int(block_rows, i8), self%layout%points - first)
+    do first = 0, size(values, kind=i8) - 1, block_rows
+      count = min(int(block_rows, i8), size(values, kind=i8) - first)
       short = to_single(values(first + 1:first + count))
       call write_rows(self%file, path, at + first, short, error)
       if (allocated(error)) return
     end do
-  end subroutine put_scalar
+  end subroutine put_column
 
   !> Write field `i` of the output under way: `values(n, components)`.
   subroutine put_vector(self, i, values, error)
@@ -357,9 +383,27 @@ contains
     integer, intent(in) :: i                   !! number of the field, from 1
     real(wp), intent(in) :: values(:, :)       !! (n_points, 3) in point order, in the field's unit
     type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: nodes(:, :), cells(:, :)
+    character(:), allocatable :: name
+    integer(i8) :: at
+    integer :: c
 
-    call write_vectors(self%file, '/VTKHDF/PointData/'//trim(self%layout%fields(i)%name), &
-      & self%outputs*self%layout%points, values, self%layout%single, error)
+    name = trim(self%layout%fields(i)%name)
+    associate (layout => self%layout, rule => self%layout%fields(i)%at_nodes)
+      at = self%outputs*layout%rows_of_output()
+      call write_vectors(self%file, '/VTKHDF/PointData/'//name, at, values, layout%single, error)
+      if (layout%cells%n_cells() == 0 .or. allocated(error)) return
+      allocate (nodes(layout%cells%n_nodes(), size(values, 2)))
+      allocate (cells(layout%cells%n_cells(), size(values, 2)))
+      do c = 1, size(values, 2)
+        nodes(:, c) = at_nodes(layout%cells, rule, values(:, c))
+        cells(:, c) = of_cells(layout%cells, rule, values(:, c))
+      end do
+      call write_vectors(self%file, '/VTKHDF/PointData/'//name, at + layout%points, nodes, &
+        & layout%single, error)
+      if (.not. allocated(error)) call write_vectors(self%file, '/VTKHDF/CellData/'//name, &
+        & self%outputs*layout%cells%n_cells(), cells, layout%single, error)
+    end associate
   end subroutine put_vector
 
   !> Write the profiles of line `i` of the output under way.
@@ -457,7 +501,7 @@ contains
     name = self%path//'.grow'
     call create_file(name, bigger, error)
     if (.not. allocated(error)) call self%layout%make_heart(bigger, error)
-    if (.not. allocated(error)) call copy_static(self%file, bigger, error)
+    if (.not. allocated(error)) call self%layout%copy_static(self%file, bigger, error)
     if (.not. allocated(error)) then
       if (present(scene_text)) then
         call put_scene(bigger, scene_text, command, version, error)

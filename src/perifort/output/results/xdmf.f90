@@ -16,10 +16,11 @@ module pd_output_results_xdmf
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: newline, to_text
+  use pd_output_results_cells, only: cells_type
   use pd_output_results_files, only: remove_file, rename_file, sync_path
   use pd_output_results_sink, only: sink_type
   use pd_output_results_types, only: field_type
-  use pd_output_results_views, only: view_of_output, view_type, views_of
+  use pd_output_results_views, only: view_of_cells, view_of_output, view_type, views_of
   implicit none (type, external)
   private
   public :: xdmf_file, escaped
@@ -41,7 +42,9 @@ module pd_output_results_xdmf
     integer :: outputs = 0                !! listed
     integer :: capacity = 0               !! outputs there is room for
     integer :: planned = default_outputs
-    integer(i8) :: points = 0
+    integer(i8) :: points = 0             !! and nodes
+    integer(i8) :: cells = 0              !! 0: each point is one
+    integer(i8) :: topology = 0           !! length of the list of cells
     integer(i8) :: head = 0               !! length before the first entry [bytes]
     integer(i8) :: record_length = 0       !! [bytes]
     logical :: single = .false.
@@ -66,7 +69,7 @@ contains
 
   !> Begin the list `path` of outputs of `fields` in the HDF5 file `data` beside it; no file is made
   !> yet.
-  subroutine create(self, path, data, points, fields, planned_outputs, single)
+  subroutine create(self, path, data, points, fields, planned_outputs, single, cells)
     class(xdmf_file), intent(out) :: self      !! without an output
     character(*), intent(in) :: path           !! of the list, with its ending
     character(*), intent(in) :: data           !! name of the HDF5 file, in the same folder
@@ -74,11 +77,17 @@ contains
     type(field_type), intent(in) :: fields(:)  !! (any number) that every output has
     integer, intent(in) :: planned_outputs     !! their number; 0: unknown
     logical, intent(in) :: single              !! fields in single precision
+    type(cells_type), intent(in), optional :: cells  !! of meshes; none without
 
     self%path = path
     self%current = ''
     self%data = escaped(data)
     self%points = points
+    if (present(cells)) then
+      self%points = points + cells%n_nodes()
+      self%cells = cells%n_cells()
+      if (self%cells > 0) self%topology = size(cells%topology, kind=i8)
+    end if
     self%views = views_of(fields)
     self%single = single
     if (planned_outputs > 0) self%planned = planned_outputs
@@ -167,30 +176,52 @@ contains
     integer :: i
 
     n = to_text(self%points)
-    text = before_time//time//'"/>'//newline &
-      & //'<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="'//n//'">' &
-      & //item(self, '/VTKHDF/Vertices/Connectivity', 'Int', 8, 1)//'</Topology>'//newline &
-      & //'<Geometry GeometryType="XYZ">'//item(self, '/VTKHDF/Points', 'Float', 8, 3) &
-      & //'</Geometry>'//newline
+    if (self%cells > 0) then
+      text = '<Topology TopologyType="Mixed" NumberOfElements="'//to_text(self%cells)//'">' &
+        & //item(self, '/cells/topology', 'Int', 8, self%topology, 1)//'</Topology>'
+    else
+      text = '<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="'//n &
+        & //'">'//item(self, '/VTKHDF/Vertices/Connectivity', 'Int', 8, self%points, 1) &
+        & //'</Topology>'
+    end if
+    text = before_time//time//'"/>'//newline//text//newline &
+      & //'<Geometry GeometryType="XYZ">' &
+      & //item(self, '/VTKHDF/Points', 'Float', 8, self%points, 3)//'</Geometry>'//newline
     do i = 1, size(self%views)
       associate (view => self%views(i))
-        text = text//'<Attribute Name="'//trim(view%name)//'" AttributeType="'// &
-          & merge('Vector', 'Scalar', view%components == 3)//'" Center="Node">'// &
-          & item(self, view_of_output(view, int(output, i8)), 'Float', &
-          & merge(4, 8, self%single), view%components)//'</Attribute>'//newline
+        text = text//attribute(self, view, 'Node', self%points, output)
+        if (self%cells > 0) text = text//attribute(self, view_of_cells(view), 'Cell', &
+          & self%cells, output)
       end associate
     end do
     text = text//'</Grid>'
   end function record
 
-  !> A reference to a dataset of the HDF5 file with a row for each point.
-  function item(self, path, kind_name, bytes, components) result(text)
+  !> A field of points or cells in an output.
+  function attribute(self, view, centre, rows, output) result(text)
     type(xdmf_file), intent(in) :: self
-    character(*), intent(in) :: path, kind_name
-    integer, intent(in) :: bytes, components
+    type(view_type), intent(in) :: view
+    character(*), intent(in) :: centre   !! 'Node' or 'Cell'
+    integer(i8), intent(in) :: rows
+    integer, intent(in) :: output        !! its number, from 0
     character(:), allocatable :: text
 
-    text = to_text(self%points)
+    text = '<Attribute Name="'//trim(view%name)//'" AttributeType="'// &
+      & merge('Vector', 'Scalar', view%components == 3)//'" Center="'//centre//'">'// &
+      & item(self, view_of_output(view, int(output, i8)), 'Float', merge(4, 8, self%single), &
+      & rows, view%components)//'</Attribute>'//newline
+  end function attribute
+
+  !> A reference to a dataset of the HDF5 file.
+  function item(self, path, kind_name, bytes, rows, components) result(text)
+    type(xdmf_file), intent(in) :: self
+    character(*), intent(in) :: path, kind_name
+    integer, intent(in) :: bytes
+    integer(i8), intent(in) :: rows
+    integer, intent(in) :: components
+    character(:), allocatable :: text
+
+    text = to_text(rows)
     if (components > 1) text = text//' '//to_text(components)
     text = '<DataItem Format="HDF" NumberType="'//kind_name//'" Precision="'//to_text(bytes) &
       & //'" Dimensions="'//text//'">'//self%data//':'//path//'</DataItem>'

@@ -15,7 +15,7 @@ module pd_scene_content_check
     & check_unique, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_relaxation, only: safety_of
-  use pd_scene_content_types, only: group_table, scene_type, is_set, name_length
+  use pd_scene_content_types, only: group_table, scene_type, shape_group, is_set, name_length
   implicit none (type, external)
   private
   public :: check_scene, allocate_groups
@@ -53,8 +53,12 @@ contains
         call check_body(scene, i, error, source)
         if (allocated(error)) return
       end do
+      do i = 1, size(scene%kept)
+        call check_cut(scene, scene%kept(i), 'keep', i, error, source)
+        if (allocated(error)) return
+      end do
       do i = 1, size(scene%removed)
-        call check_shape(scene%removed(i), d, 'remove', i, error, source)
+        call check_cut(scene, scene%removed(i), 'remove', i, error, source)
         if (allocated(error)) return
       end do
       do i = 1, size(scene%regions)
@@ -204,6 +208,29 @@ contains
       & i=1, size(scene%tips))], 'tip', error, source)
   end subroutine check_names
 
+  !> One `&keep` or `&remove`: a region of space, an expression or a shape, or several of them.
+  subroutine check_cut(scene, cut, group, number, error, source)
+    type(scene_type), intent(in) :: scene
+    type(shape_group), intent(in) :: cut
+    character(*), intent(in) :: group
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    if (index(cut%region, ':') > 0) then
+      call rule_fault(error, group, number, 'region', "'"//trim(cut%region)//"' names a set of "// &
+        & 'a mesh, whose points cannot be left out', 'cut the shape out of the geometry before '// &
+        & 'it is meshed', source)
+      return
+    end if
+    call check_region(scene, cut%region, group, number, 'region', error, source)
+    call check_expression(scene, cut%where, group, number, 'where', 'xyz', at_the_start, error, &
+      & source)
+    if (allocated(error)) return
+    if (cut%shape /= '' .or. (cut%region == '' .and. cut%where == '')) &
+      & call check_shape(cut, scene%header%dimension, group, number, error, source)
+  end subroutine check_cut
+
   !> One `&no_fail`: a region or a shape.
   subroutine check_no_fail(scene, number, error, source)
     type(scene_type), intent(in) :: scene
@@ -237,6 +264,15 @@ contains
       allocate (scene%output%fields(size(default_fields)))
       scene%output%fields(:) = default_fields
     end if
+    if (scene%output%cells .and. all(scene%bodies%mesh == '')) then
+      call rule_fault(error, 'output', 1, 'cells', "'cells' without a mesh", &
+        & "cells are the elements of bodies with the key 'mesh'; ./pf plot draws the cells of "// &
+        & 'lattices without it', source)
+    else if (scene%output%cells .and. scene%output%format /= 'vtkhdf') then
+      call rule_fault(error, 'output', 1, 'format', "format = '"//trim(scene%output%format)// &
+        & "' has no cells of meshes", "only format = 'vtkhdf' has them", source)
+    end if
+    if (allocated(error)) return
     do i = 1, size(scene%probes)
       associate (probe => scene%probes(i))
         if (probe%name == '') then

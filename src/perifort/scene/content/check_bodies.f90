@@ -2,7 +2,7 @@
 module pd_scene_content_check_bodies
   use pd_base_elasticity, only: bond_based_ratio
   use pd_base_kinds, only: wp
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, internal_fault
   use pd_base_text, only: join, nearest_name, to_text, with_unit
   use pd_law_law, only: required
   use pd_law_laws, only: law_item_type, law_table_type
@@ -47,7 +47,11 @@ contains
       if (allocated(error)) return
       lattice = any(is_set(body%lower)) .or. any(is_set(body%upper)) .or. any(body%points /= 0)
       call check_mesh(scene, number, lattice, error, source)
+      if (allocated(error)) return
+      call fill_shape(body, d, number, error, source)
+      if (.not. allocated(error)) call check_axes(scene, body, number, error, source)
       if (allocated(error) .or. body%mesh /= '') return
+      lattice = lattice .or. body%shape /= ''
       if (body%file /= '') then
         if (lattice) then
           call rule_fault(error, 'body', number, 'file', &
@@ -86,6 +90,184 @@ contains
       call check_spacing(body, d, number, error, source)
     end associate
   end subroutine check_body
+
+  !> The axes of a turned lattice: directions that span a frame, and nothing beside them that knows
+  !> x,
+  !> y and z alone.
+  subroutine check_axes(scene, body, number, error, source)
+    type(scene_type), intent(in) :: scene
+    type(body_group), intent(in) :: body
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    real(wp), parameter :: parallel = 1.0e-6_wp
+    real(wp) :: cross(3)
+    integer :: i
+
+    if (.not. any(is_set([body%axis_1, body%axis_2]))) return
+    associate (d => scene%header%dimension)
+      if (body%file /= '' .or. body%mesh /= '' .or. d == 1) then
+        call rule_fault(error, 'body', number, 'axis_1', 'only lattices in 2D and 3D have axes', &
+          & 'a cloud or a mesh is turned in its file', source)
+        return
+      end if
+      call check_vector(body%axis_1, d, 'axis_1', 'body', number, error, source)
+      if (allocated(error)) return
+      if (d == 2 .and. any(is_set(body%axis_2))) then
+        call rule_fault(error, 'body', number, 'axis_2', "'axis_2' in a scene of dimension 2", &
+          & "it is 'axis_1' turned left", source)
+        return
+      else if (d == 3) then
+        call check_vector(body%axis_2, d, 'axis_2', 'body', number, error, source)
+        if (allocated(error)) return
+        cross = [body%axis_1(2)*body%axis_2(3) - body%axis_1(3)*body%axis_2(2), &
+          & body%axis_1(3)*body%axis_2(1) - body%axis_1(1)*body%axis_2(3), &
+          & body%axis_1(1)*body%axis_2(2) - body%axis_1(2)*body%axis_2(1)]
+        if (norm2(cross) <= parallel*norm2(body%axis_1)*norm2(body%axis_2)) then
+          call rule_fault(error, 'body', number, 'axis_2', &
+            & "'axis_1' and 'axis_2' are parallel or "// &
+            & 'zero', 'expected two directions', source)
+          return
+        end if
+      end if
+      if (norm2(body%axis_1(:d)) <= 0.0_wp) then
+        call rule_fault(error, 'body', number, 'axis_1', "'axis_1' is zero", &
+          & 'expected a direction', &
+          & source)
+      else if (scene%horizon%surface_correction == 'consistent') then
+        call rule_fault(error, 'body', number, 'axis_1', &
+          & "a turned body with surface_correction "// &
+          & "= 'consistent'", "its weights are found along x, y and z; 'energy' and 'none' "// &
+          & "know "// &
+          & 'the axes of bodies', source)
+      end if
+      do i = 1, size(scene%boundaries)
+        if (allocated(error) .or. .not. scene%boundaries(i)%absorbing) cycle
+        call rule_fault(error, 'boundary', i, 'absorbing', &
+          & 'an absorbing boundary in a scene with '// &
+          & 'a turned body', 'its dashpots act along x, y and z', source)
+      end do
+      if (allocated(error) .or. size(scene%bodies) == 1) return
+      do i = 1, size(scene%boundaries)
+        if (scene%boundaries(i)%side == '' .or. index(scene%boundaries(i)%side, ':') > 0 .or. &
+          & scene%boundaries(i)%body /= '') cycle
+        call rule_fault(error, 'boundary', i, 'side', 'a side of all bodies, of which some are '// &
+          & 'turned', "sides of a turned body are its own: name it by 'body'", source)
+        return
+      end do
+      do i = 1, size(scene%loads)
+        if (scene%loads(i)%side == '' .or. index(scene%loads(i)%side, ':') > 0 .or. &
+          & scene%loads(i)%body /= '') cycle
+        call rule_fault(error, 'load', i, 'side', 'a side of all bodies, of which some are '// &
+          & 'turned', &
+          & "sides of a turned body are its own: name it by 'body'", source)
+        return
+      end do
+    end associate
+  end subroutine check_axes
+
+  !> The box of cells of a body that has a shape: `lower`, `upper` and `points` follow from its
+  !> keys.
+  subroutine fill_shape(body, d, number, error, source)
+    type(body_group), intent(inout) :: body
+    integer, intent(in) :: d
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: c, half, along
+    real(wp) :: length
+
+    if (body%shape == '') then
+      call refuse(['spacing', 'centre ', 'radius ', 'axis   ', 'height '], 'a body without a shape')
+      return
+    end if
+    call refuse(['file  ', 'mesh  ', 'points'], "a body with a 'shape'")
+    if (allocated(error)) return
+    if (.not. is_set(body%spacing)) then
+      call fault('', "a body with a 'shape' needs the key 'spacing'", 'distance of its points [m]')
+      return
+    end if
+    along = 0
+    select case (body%shape)
+    case ('box')
+      call refuse(['centre', 'radius', 'axis  ', 'height'], 'a box')
+      if (.not. allocated(error)) call check_vector(body%lower, d, 'lower', 'body', number, error, &
+        & source)
+      if (.not. allocated(error)) call check_vector(body%upper, d, 'upper', 'body', number, error, &
+        & source)
+      if (.not. allocated(error)) call check_finite_box(body%lower(:d), body%upper(:d), 'body', &
+        & number, error, source)
+    case ('sphere')
+      call refuse(['lower ', 'upper ', 'axis  ', 'height'], 'a sphere')
+      if (d == 1) call fault('shape', 'a sphere in a scene of dimension 1', "expected 'box'")
+    case ('cylinder')
+      call refuse(['lower', 'upper'], 'a cylinder')
+      along = index('xyz', trim(body%axis))
+      if (d == 1 .or. (d == 2 .and. (along < 3 .or. is_set(body%height)))) then
+        call fault('shape', 'this cylinder in a scene of dimension '//to_text(d), &
+          & "in 2D it is a disc: axis = 'z', without 'height'")
+      else if (d == 3 .and. .not. is_set(body%height)) then
+        call fault('', "a cylinder without the key 'height'", 'its length along the axis [m]')
+      end if
+    case default
+      call internal_fault('a shape of a body')
+    end select
+    if (allocated(error)) return
+    if (body%shape /= 'box' .and. .not. is_set(body%radius)) then
+      call fault('', 'a '//trim(body%shape)//" without the key 'radius'", 'its radius [m]')
+      return
+    end if
+    do c = 1, d
+      if (body%shape == 'box') then
+        length = body%upper(c) - body%lower(c)
+      else if (c == along) then
+        length = body%height
+        body%lower(c) = body%centre(c)
+        body%upper(c) = body%centre(c) + length
+      else
+        ! cells whose centres may lie inside, as many on both sides
+        if (body%radius > most_points*body%spacing) then
+          call fault('spacing', 'too many points', 'the radius is '// &
+            & to_text(body%radius/body%spacing, 3)//' spacings')
+          return
+        end if
+        half = max(1, floor(body%radius/body%spacing + 0.5_wp + spacing_tolerance))
+        body%points(c) = 2*half
+        body%lower(c) = body%centre(c) - half*body%spacing
+        body%upper(c) = body%centre(c) + half*body%spacing
+        cycle
+      end if
+      body%points(c) = nint(min(length/body%spacing, most_points))
+      if (abs(body%points(c)*body%spacing - length) > 0.5_wp*spacing_tolerance*length .or. &
+        & body%points(c) < 1) then
+        call fault('spacing', 'the spacing does not divide the length of '//to_text(length)// &
+          & ' m along '//'xyz'(c:c), 'it does so with '//to_text(length/max(1, body%points(c)))// &
+          & ' m ('//to_text(max(1, body%points(c)))//' points)')
+        return
+      end if
+    end do
+
+  contains
+
+    !> A broken rule of this body.
+    subroutine fault(key, message, note)
+      character(*), intent(in) :: key, message, note
+      call rule_fault(error, 'body', number, key, message, note, source)
+    end subroutine fault
+
+    !> An error if one of these keys is given.
+    subroutine refuse(keys, who)
+      character(*), intent(in) :: keys(:), who
+      integer :: i
+
+      do i = 1, size(keys)
+        if (allocated(error) .or. .not. given('body', number, trim(keys(i)), source)) cycle
+        call fault(trim(keys(i)), who//" has no key '"//trim(keys(i))//"'", &
+          & "keys of a 'shape': see the reference of &body")
+      end do
+    end subroutine refuse
+
+  end subroutine fill_shape
 
   !> The keys of a mesh: none beside those of a lattice or cloud, sets in pairs with materials.
   subroutine check_mesh(scene, number, lattice, error, source)
@@ -232,7 +414,8 @@ contains
       & source)
   end subroutine check_file
 
-  !> The shape keys of `&remove`, `&region` and `&no_fail`: those of its kind and no others. An
+  !> The shape keys of `&remove`, `&keep`, `&region` and `&no_fail`: those of its kind and no
+  !> others. An
   !> error is set if a rule is broken.
   subroutine check_shape(shape, dimension, group, number, error, source)
     class(shape_group), intent(in) :: shape            !! the group, or its part that is a shape
@@ -244,9 +427,7 @@ contains
 
     select case (shape%shape)
     case ('box')
-      call refuse('centre')
-      call refuse('radius')
-      call refuse('axis')
+      call refuse(['centre   ', 'radius   ', 'axis     ', 'direction', 'height   ', 'angle    '])
       if (allocated(error)) return
       if (.not. any(is_set(shape%lower(:dimension))) .and. &
         & .not. any(is_set(shape%upper(:dimension)))) then
@@ -254,16 +435,24 @@ contains
           & "expected 'lower', 'upper' or both; a component not given is unbounded", source)
       end if
     case ('sphere')
-      call refuse('lower')
-      call refuse('upper')
-      call refuse('axis')
-      call need_radius()
+      call refuse(['lower    ', 'upper    ', 'axis     ', 'direction', 'height   ', 'angle    '])
+      call need(shape%radius, 'radius', 'its radius [m]')
     case ('cylinder')
-      call need_radius()
+      call refuse(['angle    '])
+      if (any(is_set(shape%direction))) call refuse(['lower    ', 'upper    ', 'axis     '])
+      call need(shape%radius, 'radius', 'its radius [m]')
+      if (any(is_set(shape%direction))) call need_direction()
+    case ('cone')
+      call refuse(['lower    ', 'upper    ', 'radius   ', 'axis     '])
+      call need(shape%angle, 'angle', 'its opening angle [degrees]')
+      call need_direction()
+    case ('half_space')
+      call refuse(['lower    ', 'upper    ', 'radius   ', 'axis     ', 'height   ', 'angle    '])
+      call need_direction()
     case default
       call rule_fault(error, group, number, 'shape', 'group &'//group//" lacks the key 'shape'", &
-        & "expected 'box', 'sphere' or 'cylinder'"//trim(merge(", or 'where'", &
-          & '            ', group == 'region')), source)
+        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space'"//alternatives(group), &
+        & source)
     end select
     if (allocated(error)) return
     call check_finite_box(shape%lower, shape%upper, group, number, error, source)
@@ -271,21 +460,54 @@ contains
   contains
 
     !> An error if a key of another kind of shape is given.
-    subroutine refuse(key)
-      character(*), intent(in) :: key
-      if (allocated(error) .or. .not. given(group, number, key, source)) return
-      call rule_fault(error, group, number, key, "'"//key//"' is no key of a "// &
-        & trim(shape%shape), "it belongs to another kind of 'shape'", source)
+    subroutine refuse(keys)
+      character(*), intent(in) :: keys(:)
+      integer :: i
+
+      do i = 1, size(keys)
+        if (allocated(error) .or. .not. given(group, number, trim(keys(i)), source)) cycle
+        call rule_fault(error, group, number, trim(keys(i)), "'"//trim(keys(i))// &
+          & "' is no key of a "//trim(shape%shape)//trim(merge(' with a direction', &
+          & '                 ', shape%shape == 'cylinder' .and. keys(i) /= 'angle')), &
+          & "it belongs to another kind of 'shape'", source)
+      end do
     end subroutine refuse
 
-    !> An error if a round shape has no radius.
-    subroutine need_radius()
-      if (allocated(error) .or. is_set(shape%radius)) return
+    !> An error if a measure of the shape is not given.
+    subroutine need(value, key, what)
+      real(wp), intent(in) :: value
+      character(*), intent(in) :: key, what
+
+      if (allocated(error) .or. is_set(value)) return
       call rule_fault(error, group, number, 'shape', 'a '//trim(shape%shape)// &
-        & " without the key 'radius'", 'expected its radius [m]', source)
-    end subroutine need_radius
+        & " without the key '"//key//"'", 'expected '//what, source)
+    end subroutine need
+
+    !> An error if a direction is missing or has no length.
+    subroutine need_direction()
+      if (allocated(error)) return
+      call check_vector(shape%direction, dimension, 'direction', group, number, error, source)
+      if (allocated(error)) return
+      if (norm2(shape%direction(:dimension)) <= 0.0_wp) call rule_fault(error, group, number, &
+        & 'direction', "'direction' is zero", 'expected a vector', source)
+    end subroutine need_direction
 
   end subroutine check_shape
+
+  !> What a group may have instead of a shape, for a message.
+  pure function alternatives(group) result(text)
+    character(*), intent(in) :: group
+    character(:), allocatable :: text
+
+    select case (group)
+    case ('region')
+      text = ", or 'where'"
+    case ('remove', 'keep')
+      text = ", or 'region' or 'where'"
+    case default  ! groups that have a shape or nothing
+      text = ''
+    end select
+  end function alternatives
 
   !> One `&material`; fills in the default Poisson's ratio and density. An error is set if a rule is
   !> broken.
@@ -455,7 +677,7 @@ contains
     integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
-    logical :: segment, parallelogram, disc
+    logical :: segment, parallelogram, disc, chain
     character(:), allocatable :: kinds
     real(wp) :: cross(3)
 
@@ -463,12 +685,16 @@ contains
     parallelogram = any(is_set(crack%corner)) .or. any(is_set(crack%edge_1)) .or. &
       & any(is_set(crack%edge_2))
     disc = any(is_set(crack%centre)) .or. any(is_set(crack%normal)) .or. is_set(crack%radius)
-    if (dimension == 1) then
+    chain = allocated(crack%points)
+    if (chain) then
+      call check_chain(crack, dimension, segment .or. parallelogram .or. disc, number, error, &
+        & source)
+    else if (dimension == 1) then
       call rule_fault(error, 'crack', number, '', 'a crack in a scene of dimension 1', &
         & 'cracks are segments (2D), parallelograms or discs (3D)', source)
     else if (count([segment, parallelogram, disc]) /= 1 .or. (segment .neqv. dimension == 2)) then
       if (dimension == 2) then
-        kinds = "expected a segment: 'from' and 'to'"
+        kinds = "expected a segment: 'from' and 'to', or a chain of them: 'points'"
       else
         kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', or a disc: "// &
           & "'centre', 'normal', 'radius'"
@@ -509,5 +735,34 @@ contains
       end if
     end if
   end subroutine check_crack
+
+  !> A crack that is a chain of segments: two points at least, none of them twice in a row.
+  subroutine check_chain(crack, dimension, others, number, error, source)
+    type(crack_group), intent(in) :: crack
+    integer, intent(in) :: dimension
+    logical, intent(in) :: others             !! it has keys of other kinds of cracks
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer :: i
+
+    if (dimension /= 2) then
+      call rule_fault(error, 'crack', number, 'points', 'a chain of segments in a scene of '// &
+        & 'dimension '//to_text(dimension), 'it belongs to dimension 2', source)
+    else if (others) then
+      call rule_fault(error, 'crack', number, 'points', "'points' with keys of another kind of "// &
+        & 'crack', 'give one kind in a &crack', source)
+    else if (modulo(size(crack%points), 2) == 1 .or. size(crack%points) < 4) then
+      call rule_fault(error, 'crack', number, 'points', "'points' has "// &
+        & to_text(size(crack%points))//' values', 'expected x and y of two points or more', source)
+    else
+      do i = 1, size(crack%points) - 3, 2
+        if (any(abs(crack%points(i:i + 1) - crack%points(i + 2:i + 3)) > 0.0_wp)) cycle
+        call rule_fault(error, 'crack', number, 'points', 'a crack without length', 'points '// &
+          & to_text((i + 1)/2)//' and '//to_text((i + 3)/2)//' are the same', source)
+        return
+      end do
+    end if
+  end subroutine check_chain
 
 end module pd_scene_content_check_bodies

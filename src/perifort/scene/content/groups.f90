@@ -31,8 +31,10 @@ contains
       & 'assumptions that come with it.', once, header_type(), one=header)
     call table%add('define', 'A name for a number, to be used in expressions.', repeated, &
       & define_group(), all=definitions)
-    call table%add('body', 'Material points: a lattice that fills a box, a mesh, or a cloud '// &
-      & 'read from a file.', repeated, body_group(), all=bodies)
+    call table%add('body', 'Material points: a lattice that fills a box, a sphere or a '// &
+      & 'cylinder, a mesh, or a cloud read from a file.', repeated, body_group(), all=bodies)
+    call table%add('keep', 'What stays of the bodies: points that lie inside of none of these '// &
+      & 'groups are left out. `&remove` comes after it.', repeated, shape_group(), all=kept)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
       & 'it are left out.', repeated, shape_group(), all=removed)
     call table%add('region', 'A named part of space, by a shape or an expression; other '// &
@@ -41,9 +43,9 @@ contains
       & repeated, material_group(), all=materials)
     call table%add('horizon', 'How far points interact, and how the sums over families are '// &
       & 'corrected.', once, horizon_group(), one=horizon)
-    call table%add('crack', 'A crack that is there from the start: a segment in 2D (from, to); '// &
-      & 'in 3D a parallelogram (corner, edge_1, edge_2) or a disc (centre, normal, radius).', &
-      & repeated, crack_group(), all=cracks)
+    call table%add('crack', 'A crack that is there from the start: a segment in 2D (from, to), '// &
+      & 'or a chain of them (points); in 3D a parallelogram (corner, edge_1, edge_2) or a disc '// &
+      & '(centre, normal, radius).', repeated, crack_group(), all=cracks)
     call table%add('no_fail', 'A zone where no bond breaks: a region by its name, or a shape.', &
       & repeated, no_fail_group(), all=no_fail)
     call table%add('initial', 'The state at the start, of all points or of a region. The '// &
@@ -136,6 +138,16 @@ contains
     if (.not. allocated(scene%bodies)) allocate (scene%bodies(0))
     groups => scene%bodies
   end subroutine bodies
+
+  subroutine kept(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%kept)) deallocate (scene%kept)
+    if (present(room)) allocate (scene%kept(room))
+    if (.not. allocated(scene%kept)) allocate (scene%kept(0))
+    groups => scene%kept
+  end subroutine kept
 
   subroutine removed(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

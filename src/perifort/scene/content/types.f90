@@ -10,7 +10,7 @@ module pd_scene_content_types
   use pd_scene_format_given, only: is_given, is_set, name_length, path_length, &
     & text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
-  use pd_scene_groups_body, only: body_group, is_lattice
+  use pd_scene_groups_body, only: body_group, is_box, is_lattice, is_turned
   use pd_scene_groups_boundary, only: adds_layer, boundary_group
   use pd_scene_groups_contact, only: contact_group
   use pd_scene_groups_crack, only: crack_group
@@ -38,7 +38,7 @@ module pd_scene_content_types
     & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
     & section_group, line_group, j_integral_group, study_group, contact_group, name_length, &
     & path_length, text_length, unset, is_set, is_given
-  public :: adds_layer, is_lattice
+  public :: adds_layer, is_box, is_lattice, is_turned
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -82,6 +82,7 @@ module pd_scene_content_types
     type(header_type) :: header
     type(define_group), allocatable :: definitions(:)
     type(body_group), allocatable :: bodies(:)
+    type(shape_group), allocatable :: kept(:)
     type(shape_group), allocatable :: removed(:)
     type(region_group), allocatable :: regions(:)
     type(material_group), allocatable :: materials(:)

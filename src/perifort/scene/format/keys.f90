@@ -292,7 +292,7 @@ contains
   end subroutine logical_key
 
   !> Whole numbers along the directions.
-  subroutine integers_key(keys, name, value, unit, meaning, required, at_least, default)
+  subroutine integers_key(keys, name, value, unit, meaning, required, at_least, default, hidden)
     class(keys_type), intent(inout) :: keys        !! the visitor; notes the key, and in reading
                                                    !! what is wrong with it
     character(*), intent(in) :: name               !! of the key, in lower case
@@ -304,11 +304,15 @@ contains
     integer, intent(in), optional :: at_least      !! smallest value of each; absent: no such bound
     character(*), intent(in), optional :: default  !! how the reference calls the default; absent:
                                                    !! by the value
+    logical, intent(in), optional :: hidden        !! the value is not written; absent: it is
     integer, allocatable :: slots(:)
     character(:), allocatable :: shown, message, note
     integer :: i
 
     shown = list_text(value(:findloc(value /= 0, .true., dim=1, back=.true.)))
+    if (present(hidden)) then
+      if (hidden) shown = ''
+    end if
     call keys%note_key(name, 'integer('//to_text(size(value))//')', unit, meaning, shown, &
       & integer_range(at_least), required, default)
     if (keys%mode /= mode_read) return

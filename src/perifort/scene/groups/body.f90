@@ -1,12 +1,16 @@
 !> The group `&body`: material points.
 module pd_scene_groups_body
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: name_length, path_length, unset
-  use pd_scene_format_keys, only: keys_type
+  use pd_scene_format_given, only: is_set, name_length, path_length, unset
+  use pd_scene_format_keys, only: keys_type, mode_write
   use pd_scene_groups_group, only: group_type
+  use pd_scene_groups_shape, only: axes
   implicit none (type, external)
   private
-  public :: body_group, is_lattice
+  public :: body_group, is_lattice, is_box, is_turned, body_shapes
+
+  !> Shapes of lattices.
+  character(8), parameter :: body_shapes(3) = [character(8) :: 'box', 'sphere', 'cylinder']
 
   !> `&body`
   type, extends(group_type) :: body_group
@@ -15,6 +19,14 @@ module pd_scene_groups_body
     real(wp) :: lower(3) = unset                 !! corner of the lattice's box [m]
     real(wp) :: upper(3) = unset                 !! opposite corner [m]
     integer :: points(3) = 0                     !! points along each direction
+    character(name_length) :: shape = ''         !! of `body_shapes`; '' = a box with `points`
+    real(wp) :: spacing = unset                  !! of a shape, instead of `points` [m]
+    real(wp) :: centre(3) = 0.0_wp               !! sphere; cylinder: the middle of its lower end
+    real(wp) :: radius = unset                   !! sphere, cylinder [m]
+    character(name_length) :: axis = 'z'         !! cylinder: 'x', 'y', 'z'
+    real(wp) :: height = unset                   !! cylinder [m]
+    real(wp) :: axis_1(3) = unset                !! lattice: direction of its first rows
+    real(wp) :: axis_2(3) = unset                !! and of the second ones, in 3D
     character(path_length) :: file = ''          !! cloud: columns x y z volume
     character(path_length) :: mesh = ''          !! mesh: .msh or .inp
     integer :: points_per_element = 1            !! 1: the centre; else Gauss points
@@ -33,17 +45,52 @@ contains
     is_lattice = body%file == '' .and. body%mesh == ''
   end function is_lattice
 
+  !> Whether the rows of a lattice have directions of their own.
+  elemental logical function is_turned(body)
+    type(body_group), intent(in) :: body  !! the group
+    is_turned = is_set(body%axis_1(1))
+  end function is_turned
+
+  !> Whether a body is a lattice that fills the box from `lower` to `upper`.
+  elemental logical function is_box(body)
+    type(body_group), intent(in) :: body  !! the group
+    is_box = is_lattice(body) .and. (body%shape == '' .or. body%shape == 'box') .and. &
+      & .not. is_turned(body)
+  end function is_box
+
   !> The keys of the group.
   subroutine visit(group, keys)
     class(body_group), intent(inout) :: group  !! its components are read or shown
     type(keys_type), intent(inout) :: keys     !! the visitor: reads, describes, writes
+    logical :: writes, round
 
+    ! what follows from a shape is not written
+    writes = keys%mode == mode_write
+    round = group%shape == 'sphere' .or. group%shape == 'cylinder'
     call keys%key('name', group%name, 'name of the body', word=.true.)
     call keys%key('material', group%material, 'name of its material', default='the only material')
-    call keys%key('lower', group%lower, 'm', 'lattice: lower corner of the box that the cells fill')
-    call keys%key('upper', group%upper, 'm', 'lattice: upper corner')
+    call keys%key('lower', group%lower, 'm', 'lattice: lower corner of the box that the cells '// &
+      & 'fill', hidden=writes .and. round)
+    call keys%key('upper', group%upper, 'm', 'lattice: upper corner', hidden=writes .and. round)
     call keys%key('points', group%points, '', 'lattice: points along each direction, at the '// &
-      & 'centres of cubic cells', at_least=1)
+      & 'centres of cubic cells', at_least=1, hidden=writes .and. group%shape /= '')
+    call keys%key('shape', group%shape, 'lattice: shape that it fills, with a spacing instead '// &
+      & 'of points; in 2D a sphere is a disc', allowed=body_shapes)
+    call keys%key('spacing', group%spacing, 'm', 'shape: distance of the points, of a sphere '// &
+      & 'and '// &
+      & 'across a cylinder with the centre at a corner of cells', above=0.0_wp)
+    call keys%key('centre', group%centre, 'm', 'shape: centre of a sphere, or the middle of '// &
+      & 'the '// &
+      & 'lower end of a cylinder', hidden=writes .and. .not. round)
+    call keys%key('radius', group%radius, 'm', 'sphere, cylinder: radius', above=0.0_wp)
+    call keys%key('axis', group%axis, 'cylinder: direction from its lower end to the upper one', &
+      & allowed=axes, hidden=writes .and. group%shape /= 'cylinder')
+    call keys%key('height', group%height, 'm', 'cylinder in 3D: length along the axis', &
+      & above=0.0_wp)
+    call keys%key('axis_1', group%axis_1, '-', 'lattice: direction of its rows, of any length; '// &
+      & 'it is turned about its lower corner, or about the centre of its shape', default='along x')
+    call keys%key('axis_2', group%axis_2, '-', 'lattice in 3D: with axis_1 the plane of its '// &
+      & 'second rows, which are normal to the first', default='along y')
     call keys%key('file', group%file, 'cloud instead of a lattice: a text file with the '// &
       & "columns x y z volume, '#' starts a comment")
     call keys%key('mesh', group%mesh, 'mesh instead of a lattice: a file of Gmsh (.msh, 2.2 or '// &

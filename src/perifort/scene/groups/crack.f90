@@ -8,10 +8,11 @@ module pd_scene_groups_crack
   private
   public :: crack_group
 
-  !> `&crack`: a segment (2D), a parallelogram or a disc (3D)
+  !> `&crack`: a segment or a chain of them (2D), a parallelogram or a disc (3D)
   type, extends(group_type) :: crack_group
     real(wp) :: from(3) = unset
     real(wp) :: to(3) = unset
+    real(wp), allocatable :: points(:)           !! x, y of each point of a chain of segments
     real(wp) :: corner(3) = unset
     real(wp) :: edge_1(3) = unset
     real(wp) :: edge_2(3) = unset
@@ -31,6 +32,8 @@ contains
 
     call keys%key('from', group%from, 'm', '2D segment: one end')
     call keys%key('to', group%to, 'm', '2D segment: other end')
+    call keys%list('points', group%points, 'm', '2D chain of segments: x and y of each of its '// &
+      & 'points, one after another')
     call keys%key('corner', group%corner, 'm', '3D parallelogram: a corner')
     call keys%key('edge_1', group%edge_1, 'm', '3D parallelogram: an edge from the corner')
     call keys%key('edge_2', group%edge_2, 'm', '3D parallelogram: the other edge')

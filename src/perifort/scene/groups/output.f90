@@ -20,6 +20,7 @@ module pd_scene_groups_output
     character(name_length), allocatable :: fields(:)
     character(name_length) :: precision = 'double'   !! 'single'
     character(name_length) :: format = 'vtkhdf'      !! 'vtu', 'both'
+    logical :: cells = .false.                   !! meshes are shown as elements
     logical :: fragments = .false.               !! in the history and in fragments.csv
     integer :: checkpoint_every = 0              !! steps (relaxation: iterations); 0 = none so
     real(wp) :: checkpoint_minutes = 15.0_wp     !! of wall time; 0 = not by time
@@ -46,6 +47,8 @@ contains
       & hidden=group%history_every == 0)
     call keys%list('fields', group%fields, 'fields to write', keys%field_names(), &
       & default="'displacement', 'velocity', 'damage'")
+    call keys%key('cells', group%cells, 'show meshes as their elements, with values of nodes '// &
+      & 'and elements beside those of the points')
     call keys%key('fragments', group%fragments, 'count the parts that intact bonds join, in '// &
       & 'the history, and list them in fragments.csv at each output')
     call keys%key('precision', group%precision, 'of the fields in the file', &
@@ -65,7 +68,8 @@ contains
     character(*), intent(in) :: key  !! its name, '' for the group as a whole
 
     change = change_harmless
-    if (any(key == [character(9) :: 'fields', 'fragments', 'precision', 'format'])) &
+    if (any(key == [character(9) :: 'fields', 'cells', 'fragments', 'precision', &
+      & 'format'])) &
       & change = change_of_the_files
   end function change_of
 

@@ -84,7 +84,8 @@ contains
       & twin%model, laws)
     twin%model%surface = system%model%surface
     if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
-      & twin%model%S, laws)
+      & twin%model%S, laws, system%model%axes)
+    if (allocated(system%model%axes)) twin%model%axes = system%model%axes
     if (system%model%consistent) then
       if (any(twin%body%point /= system%body%point)) &
         & call internal_fault('a twin in another order')

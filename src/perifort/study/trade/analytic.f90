@@ -13,8 +13,8 @@ module pd_study_trade_analytic
   use pd_motion_system, only: system_type
   use pd_scene_content_expressions, only: has_expressions
   use pd_scene_content_groups, only: closed_forms
-  use pd_scene_content_types, only: boundary_group, initial_group, is_lattice, is_set, laws_of, &
-    & scene_type
+  use pd_scene_content_types, only: boundary_group, initial_group, is_box, is_set, laws_of, &
+    & scene_type, shape_group
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, form_chain, form_hole, &
     & form_linear, form_wave
   use pd_study_trade_pull, only: pull
@@ -105,8 +105,10 @@ contains
     reason = ''
     if (size(scene%bodies) /= 1) then
       reason = 'it needs a single body'
-    else if (.not. is_lattice(scene%bodies(1))) then
-      reason = 'it needs a lattice; the box of a cloud or mesh is not known'
+    else if (.not. is_box(scene%bodies(1))) then
+      reason = 'it needs a lattice that fills a box'
+    else if (size(scene%kept) > 0) then
+      reason = 'the scene has a &keep'
     else if (size(scene%materials) /= 1) then
       reason = 'it needs a single material'
     else if (has_history(scene)) then
@@ -267,8 +269,7 @@ contains
       reason = 'it is for dimension 2'
     else if (size(scene%removed) /= 1) then
       reason = 'one &remove must cut the hole'
-    else if (scene%removed(1)%shape == 'box' .or. scene%removed(1)%shape == 'cylinder' .and. &
-      & scene%removed(1)%axis /= 'z') then
+    else if (.not. is_round(scene%removed(1))) then
       reason = 'the hole must be round'
     end if
     if (len(reason) > 0) return
@@ -287,6 +288,14 @@ contains
     form%radius = scene%removed(1)%radius
     form%stress = form%modulus*strain
   end subroutine fit_hole
+
+  !> Whether a shape cuts a round hole out of a plate.
+  pure logical function is_round(shape)
+    type(shape_group), intent(in) :: shape
+    is_round = shape%shape == 'sphere' .or. (shape%shape == 'cylinder' .and. shape%axis == 'z' &
+      & .and. .not. any(is_set([shape%direction, shape%height])))
+    is_round = is_round .and. shape%region == '' .and. shape%where == ''
+  end function is_round
 
   !> A bar without ends that matter, started with one wave number from a table.
   subroutine fit_chain(scene, form, reason)

@@ -181,7 +181,7 @@ contains
     integer :: i
 
     step = variable%step
-    if (size(plan%scene%removed) + size(plan%scene%cracks) > 0) then
+    if (size(plan%scene%kept) + size(plan%scene%removed) + size(plan%scene%cracks) > 0) then
       step = 0
       do i = 1, size(variable%numbers)
         step = common_divisor(step, nint(variable%numbers(i)))

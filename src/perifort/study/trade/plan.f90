@@ -234,6 +234,10 @@ contains
         call rule_fault(error, 'study', i, 'vary', 'the points of a cloud or mesh cannot be '// &
           & 'varied', "vary the 'file' or 'mesh' of the body", plan%source)
         return
+      else if (plan%scene%bodies(variable%target%number)%shape /= '') then
+        call rule_fault(error, 'study', i, 'vary', "a body with a 'shape' has no 'points'", &
+          & "vary its 'spacing'", plan%source)
+        return
       end if
       variable%step = smallest_step(plan%scene, variable%target)
     end associate
@@ -409,7 +413,8 @@ contains
     type(scene_type), intent(in) :: scene
     type(target_type), intent(in) :: target
     integer, intent(in) :: b
-    follows = is_lattice(scene%bodies(b)) .and. (b == target%number .or. .not. target%numbered)
+    follows = is_lattice(scene%bodies(b)) .and. scene%bodies(b)%shape == '' .and. (b == &
+      & target%number .or. .not. target%numbered)
   end function follows
 
   !> The smallest count along x at which all counts are whole in the same proportion.

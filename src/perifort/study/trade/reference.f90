@@ -282,7 +282,7 @@ contains
     real(wp), allocatable :: x(:, :), values(:, :), line(:), times(:)
     integer(i8), allocatable :: layer(:)
     character(:), allocatable :: path_of_field
-    integer(i8) :: outputs, n, rows
+    integer(i8) :: outputs, n, each, rows
     integer, allocatable :: kept(:)
     integer :: components, i
 
@@ -292,7 +292,9 @@ contains
       return
     end if
     call get_attribute(file, '/VTKHDF/Steps', 'NSteps', outputs, error)
-    if (.not. allocated(error)) call get_shape(file, '/VTKHDF/Points', components, n, error)
+    if (.not. allocated(error)) call get_shape(file, '/points/layer', components, n, error)
+    ! with cells their nodes stand behind the points
+    if (.not. allocated(error)) call get_shape(file, '/VTKHDF/Points', components, each, error)
     if (allocated(error)) return
     allocate (x(3, n), layer(n), times(outputs))
     call read_rows(file, '/VTKHDF/Points', 0_i8, x, error)
@@ -303,11 +305,11 @@ contains
     if (allocated(error)) return
     if (components == 1) then
       allocate (line(n))
-      call read_rows(file, path_of_field, (outputs - 1)*n, line, error)
+      call read_rows(file, path_of_field, (outputs - 1)*each, line, error)
       values = reshape(line, [1, size(line)])
     else
       allocate (values(components, n))
-      call read_rows(file, path_of_field, (outputs - 1)*n, values, error)
+      call read_rows(file, path_of_field, (outputs - 1)*each, values, error)
     end if
     if (allocated(error)) return
     kept = pack([(i, i=1, int(n))], layer == 0)

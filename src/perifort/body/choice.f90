@@ -1,0 +1,101 @@
+!> Points that a shape, an expression and a region choose, and expressions of a scene on points.
+module pd_body_choice
+  use pd_base_error, only: error_type
+  use pd_base_expression, only: expression_type
+  use pd_base_field, only: field_type, field_values, new_field
+  use pd_base_kinds, only: wp, i4
+  use pd_body_body, only: body_type, not_finite_text
+  use pd_body_shapes, only: inside, touch
+  use pd_scene_content_expressions, only: expression_of
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type, shape_group
+  implicit none (type, external)
+  private
+  public :: choose_points, field_on, values_on
+
+contains
+
+  !> The points inside of a group's shape and region, and where its expression is not 0; what it
+  !> does not have does not bound. An error, with its place, if an expression has no finite value at
+  !> a point that the rest chooses.
+  subroutine choose_points(scene, body, group, name, number, chosen, error)
+    type(scene_type), intent(in) :: scene        !! a checked scene
+    type(body_type), intent(in) :: body          !! in point order
+    class(shape_group), intent(in) :: group      !! with a shape, a region or an expression
+    character(*), intent(in) :: name             !! of the group, without `&`
+    integer, intent(in) :: number                !! which group of this name
+    logical, allocatable, intent(out) :: chosen(:)  !! (n_points)
+    type(error_type), allocatable, intent(out) :: error
+    logical, allocatable :: of_region(:)
+    integer :: r
+
+    call choose(scene, body, group, name, number, chosen, error)
+    if (allocated(error) .or. group%region == '') return
+    do r = 1, size(scene%regions)
+      if (scene%regions(r)%name /= group%region) cycle
+      call choose(scene, body, scene%regions(r), 'region', r, of_region, error)
+      if (allocated(error)) return
+      chosen = chosen .and. of_region
+    end do
+  end subroutine choose_points
+
+  !> The same without a region.
+  subroutine choose(scene, body, group, name, number, chosen, error)
+    type(scene_type), intent(in) :: scene
+    type(body_type), intent(in) :: body
+    class(shape_group), intent(in) :: group
+    character(*), intent(in) :: name
+    integer, intent(in) :: number
+    logical, allocatable, intent(out) :: chosen(:)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: values(:)
+    integer(i4), allocatable :: points(:)
+    integer :: k
+
+    if (group%shape /= '') then
+      chosen = inside(group, body%x, touch*minval(body%spacing))
+    else
+      allocate (chosen(body%n_points), source=.true.)
+    end if
+    if (group%where == '') return
+    points = pack([(int(k, i4), k=1, body%n_points)], chosen)
+    call values_on(scene, group%where, body, points, name, number, 'where', values, error)
+    if (allocated(error)) return
+    chosen(points) = abs(values) > 0.0_wp
+  end subroutine choose
+
+  !> An expression of a checked scene at some points.
+  subroutine field_on(scene, text, body, slots, field)
+    type(scene_type), intent(in) :: scene    !! a checked scene
+    character(*), intent(in) :: text         !! the expression
+    type(body_type), intent(in) :: body      !! the points
+    integer(i4), intent(in) :: slots(:)      !! (points) of them
+    type(field_type), intent(out) :: field   !! ready for `field_values`
+    type(expression_type) :: expression
+
+    call expression_of(scene, text, expression)
+    call new_field(expression, body%x(slots, :), field)
+  end subroutine field_on
+
+  !> The values of an expression at t = 0. An error is set at its key if one is not finite.
+  subroutine values_on(scene, text, body, slots, group, number, key, values, error)
+    type(scene_type), intent(in) :: scene      !! a checked scene
+    character(*), intent(in) :: text           !! the expression
+    type(body_type), intent(in) :: body        !! the points
+    integer(i4), intent(in) :: slots(:)        !! (points) of them
+    character(*), intent(in) :: group          !! name of the group that has it, without `&`
+    integer, intent(in) :: number              !! which group of this name
+    character(*), intent(in) :: key            !! that has it
+    real(wp), allocatable, intent(out) :: values(:)  !! (points)
+    type(error_type), allocatable, intent(out) :: error
+    type(field_type) :: field
+    integer :: at
+
+    call field_on(scene, text, body, slots, field)
+    allocate (values(size(slots)))
+    call field_values(field, 0.0_wp, values, at)
+    if (at > 0) call scene_fault(error, scene, group, number, key, "'"//key//"' "// &
+      & not_finite_text(body, slots(at), 0.0_wp), trim(text))
+  end subroutine values_on
+
+end module pd_body_choice
