@@ -8,7 +8,8 @@ module pd_force_reference
   implicit none (type, external)
   private
   public :: bond_state_type, state_of_bond, stretch_of_bond, point_dilatation, point_force
-  public :: point_energy, energy_product, point_damage, reference_dilatation, reference_force, reference_energy
+  public :: point_energy, energy_product, point_damage, reference_dilatation, reference_force
+  public :: reference_energy
 
   !> How a bond is deformed.
   type :: bond_state_type

@@ -14,8 +14,8 @@ module pd_motion_static_conjugate_gradient
     & check_drowned, rounding_note
   use pd_motion_conditions, only: impose
   use pd_motion_static_krylov, only: make_room, make_coarse_part, linearise, take_residual, &
-    & first_direction, next_direction, take_direction, apply_stiffness, go_along, volume_inner, note_length, &
-    & smallest_curvature
+    & first_direction, next_direction, take_direction, apply_stiffness, go_along, volume_inner, &
+    & note_length, smallest_curvature
   use pd_motion_newton, only: newton_type, krylov_type, sums_type
   use pd_motion_observer, only: observer_type, instant_type, add_note
   use pd_motion_pins, only: fit_pins, held_but_for_pins, snap_pins
