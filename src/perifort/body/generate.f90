@@ -1,5 +1,5 @@
-!> Points of a scene: lattices, clouds, meshes (`pd_body_meshes`), removed shapes, and the layers
-!> that boundaries add (`pd_body_layers`).
+!> Points of a scene: lattices, also inside of surfaces (`pd_body_surfaces`), clouds, meshes
+!> (`pd_body_meshes`), removed shapes, and the layers that boundaries add (`pd_body_layers`).
 !>
 !> Order (that of the results): body by body, a lattice's points x fastest, then y, then z; then
 !> the layers in the order of their boundary groups.
@@ -8,17 +8,19 @@ module pd_body_generate
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: is_lattice, scene_type, is_set
+  use pd_scene_content_types, only: has_cut_cells, is_lattice, scene_type, is_set
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
-  use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
+  use pd_body_body, only: body_type, grid_type, lattice_type, skin_type, allocate_points, &
+    & append_points, keep_points
   use pd_body_meshes, only: keep_part, material_number, mesh_body
   use pd_body_mesh_part, only: part_type
-  use pd_body_lattices, only: lattice_points, lattice_grid
+  use pd_body_lattices, only: lattice_points, lattice_of
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
   use pd_body_shapes, only: inside
+  use pd_body_surfaces, only: inside_surface, keep_skin, surface_body
   implicit none (type, external)
   private
   public :: generate_body, horizon_of, touch
@@ -42,6 +44,8 @@ contains
                                                             !! of each layer came to
     type(warnings_type), intent(inout), optional :: warnings  !! get what may surprise of meshes
     type(part_type) :: part
+    type(skin_type) :: skin
+    type(lattice_type), allocatable :: lattices(:)
     logical, allocatable :: taken(:)
     real(wp) :: spacing, largest
     type(layer_count_type), allocatable :: counted(:)
@@ -55,6 +59,7 @@ contains
     if (scene%header%dimension == 2) depth = scene%header%thickness
     if (scene%header%dimension == 1) depth = scene%header%area
     call allocate_points(body, scene%header%dimension, 0)
+    allocate (lattices(size(scene%bodies)))
     do i = 1, size(scene%bodies)
       largest = -1.0_wp
       if (scene%bodies(i)%mesh /= '') then
@@ -64,9 +69,15 @@ contains
       else if (scene%bodies(i)%file /= '') then
         call cloud_points(scene, i, depth, one, error)
         if (allocated(error)) return
+      else if (scene%bodies(i)%surface /= '') then
+        call surface_body(scene, i, one, lattices(i), skin, error, warnings)
+        if (allocated(error)) return
+        call keep_skin(body, skin)
+        if (.not. has_cut_cells(scene%bodies(i))) one%grid = number_of_grid(body, lattices(i)%grid)
       else
         call lattice_points(body%dim, scene%bodies(i), depth, one)
-        one%grid = number_of_grid(body, lattice_grid(scene%bodies(i), body%dim))
+        lattices(i) = lattice_of(scene%bodies(i), body%dim)
+        one%grid = number_of_grid(body, lattices(i)%grid)
       end if
       one%body = int(i, i2)
       if (scene%bodies(i)%mesh == '') one%material = material_number(scene, &
@@ -74,8 +85,16 @@ contains
       spacing = max(spacing, largest)
       call append_points(body, one)
     end do
+    call move_alloc(lattices, body%lattices)
     do i = 1, size(scene%removed)
-      taken = inside(scene%removed(i), body%x, touch*minval(body%spacing))
+      if (scene%removed(i)%surface /= '') then
+        call inside_surface(scene, scene%removed(i)%surface, scene%removed(i)%scale, body%x, &
+          & minval(body%spacing), taken, error)
+        call place_fault(error, scene, 'remove', i, 'surface')
+        if (allocated(error)) return
+      else
+        taken = inside(scene%removed(i), body%x, touch*minval(body%spacing))
+      end if
       if (any(taken .and. of_mesh(scene, body))) then
         call scene_fault(error, scene, 'remove', i, 'shape', '&remove takes points of a mesh', &
           & 'cut the shape out of the geometry before it is meshed')
@@ -125,6 +144,9 @@ contains
       end do
       do i = 1, size(body%parts)
         points = points + body%parts(i)%n_points
+      end do
+      do i = 1, size(body%skins)
+        points = points + count(body%body == body%skins(i)%body)
       end do
       ! a small body may lie in its horizon as a whole
       if (points <= most_members .and. delta/spacing <= largest_ratio) return

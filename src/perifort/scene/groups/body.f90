@@ -6,7 +6,7 @@ module pd_scene_groups_body
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
   private
-  public :: body_group, is_lattice
+  public :: body_group, is_lattice, has_grid, has_cut_cells
 
   !> `&body`
   type, extends(group_type) :: body_group
@@ -17,8 +17,11 @@ module pd_scene_groups_body
     integer :: points(3) = 0                     !! points along each direction
     character(path_length) :: file = ''          !! cloud: columns x y z volume
     character(path_length) :: mesh = ''          !! mesh: .msh or .inp
+    character(path_length) :: surface = ''       !! closed facets that a lattice fills: .stl
+    real(wp) :: spacing = unset                  !! of that lattice [m]
+    character(name_length) :: fill = 'centre'    !! cells of it: 'centre' or 'volume'
     integer :: points_per_element = 1            !! 1: the centre; else Gauss points
-    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the mesh
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the mesh or surface
     character(name_length), allocatable :: material_set(:)   !! sets of the mesh ...
     character(name_length), allocatable :: material_name(:)  !! ... and the material of each
   contains
@@ -27,11 +30,23 @@ module pd_scene_groups_body
 
 contains
 
-  !> Whether a body is a lattice, neither a cloud nor a mesh.
+  !> Whether a body is a lattice that fills a box: no cloud, no mesh, no surface.
   elemental logical function is_lattice(body)
     type(body_group), intent(in) :: body  !! the group
-    is_lattice = body%file == '' .and. body%mesh == ''
+    is_lattice = body%file == '' .and. body%mesh == '' .and. body%surface == ''
   end function is_lattice
+
+  !> Whether a body's points are whole cells of a lattice: of a box, or inside of a surface.
+  elemental logical function has_grid(body)
+    type(body_group), intent(in) :: body  !! the group
+    has_grid = body%file == '' .and. body%mesh == '' .and. .not. has_cut_cells(body)
+  end function has_grid
+
+  !> Whether a body's points are cells that a surface cuts, each with a volume of its own.
+  elemental logical function has_cut_cells(body) result(cut)
+    type(body_group), intent(in) :: body  !! the group
+    cut = body%surface /= '' .and. body%fill == 'volume'
+  end function has_cut_cells
 
   !> The keys of the group.
   subroutine visit(group, keys)
@@ -40,7 +55,8 @@ contains
 
     call keys%key('name', group%name, 'name of the body', word=.true.)
     call keys%key('material', group%material, 'name of its material', default='the only material')
-    call keys%key('lower', group%lower, 'm', 'lattice: lower corner of the box that the cells fill')
+    call keys%key('lower', group%lower, 'm', 'lattice: lower corner of the box that the cells '// &
+      & 'fill; surface: a corner of some cell')
     call keys%key('upper', group%upper, 'm', 'lattice: upper corner')
     call keys%key('points', group%points, '', 'lattice: points along each direction, at the '// &
       & 'centres of cubic cells', at_least=1)
@@ -48,11 +64,17 @@ contains
       & "columns x y z volume, '#' starts a comment")
     call keys%key('mesh', group%mesh, 'mesh instead of a lattice: a file of Gmsh (.msh, 2.2 or '// &
       & '4.1) or of Abaqus and CalculiX (.inp)')
+    call keys%key('surface', group%surface, 'lattice inside of closed facets: a STL file, as '// &
+      & 'text or binary')
+    call keys%key('spacing', group%spacing, 'm', 'surface: edge of the lattice cells', above=0.0_wp)
+    call keys%key('fill', group%fill, 'surface: whole cells whose centres are inside; or all '// &
+      & 'cells with their volumes inside, on list families', &
+      & allowed=[character(6) :: 'centre', 'volume'], hidden=group%surface == '')
     call keys%key('points_per_element', group%points_per_element, '', 'mesh: points of an '// &
       & 'element, 1 (its centre) or a number of Gauss points that its shape has', at_least=1, &
       & hidden=group%mesh == '')
-    call keys%key('scale', group%scale, 'm', 'mesh: length of its unit, 1e-3 for millimetres', &
-      & above=0.0_wp, hidden=group%mesh == '')
+    call keys%key('scale', group%scale, 'm', 'mesh, surface: length of its unit, 1e-3 for '// &
+      & 'millimetres', above=0.0_wp, hidden=group%mesh == '' .and. group%surface == '')
     call keys%list('material_set', group%material_set, 'mesh: names of sets that have another '// &
       & 'material than the body', [character(1) ::], as_written=.true.)
     call keys%list('material_name', group%material_name, 'mesh: the material of each '// &

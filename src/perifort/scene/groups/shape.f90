@@ -1,7 +1,7 @@
 !> Shapes: the group `&remove`, and the keys that `&region` and `&no_fail` add.
 module pd_scene_groups_shape
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: name_length, text_length, unset
+  use pd_scene_format_given, only: name_length, path_length, text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_write
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
@@ -20,6 +20,8 @@ module pd_scene_groups_shape
     real(wp) :: centre(3) = 0.0_wp               !! sphere, cylinder [m]
     real(wp) :: radius = unset                   !! sphere, cylinder [m]
     character(name_length) :: axis = 'z'         !! cylinder: 'x', 'y', 'z'
+    character(path_length) :: surface = ''       !! instead of a shape: closed facets, .stl
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the surface
   contains
     procedure :: visit => visit_remove
   end type shape_group
@@ -46,7 +48,7 @@ contains
     class(shape_group), intent(inout) :: group  !! its components are read or shown
     type(keys_type), intent(inout) :: keys      !! the visitor: reads, describes, writes
 
-    call visit_shape(group, keys, required=.true.)
+    call visit_shape(group, keys)
   end subroutine visit_remove
 
   !> The keys of `&region`.
@@ -57,7 +59,7 @@ contains
     call keys%key('name', group%name, 'name used elsewhere', required=.true., word=.true.)
     call keys%key('where', group%where, 'expression of x, y, z that is not 0 inside; with a '// &
       & 'shape both must hold')
-    call visit_shape(group, keys, required=.false.)
+    call visit_shape(group, keys)
   end subroutine visit_region
 
   !> The keys of `&no_fail`.
@@ -66,20 +68,19 @@ contains
     type(keys_type), intent(inout) :: keys        !! the visitor: reads, describes, writes
 
     call keys%key('region', group%region, 'name of a region, instead of a shape')
-    call visit_shape(group, keys, required=.false.)
+    call visit_shape(group, keys)
   end subroutine visit_no_fail
 
   !> The keys of a shape.
-  subroutine visit_shape(group, keys, required)
+  subroutine visit_shape(group, keys)
     class(shape_group), intent(inout) :: group
     type(keys_type), intent(inout) :: keys
-    logical, intent(in) :: required
     logical :: plain
 
     ! Written: only keys that the kind of shape has. Reading starts before the kind is known.
     plain = keys%mode == mode_write .and. group%shape /= 'sphere' .and. group%shape /= 'cylinder'
     call keys%key('shape', group%shape, 'kind of shape; in 2D a sphere is a circle', &
-      & required=required, allowed=shape_names)
+      & allowed=shape_names)
     call keys%key('lower', group%lower, 'm', 'box: lower corner; cylinder: its lower end along '// &
       & 'the axis', default='unbounded')
     call keys%key('upper', group%upper, 'm', 'box: upper corner; cylinder: its upper end along '// &
@@ -89,6 +90,9 @@ contains
     call keys%key('radius', group%radius, 'm', 'sphere, cylinder: radius', above=0.0_wp)
     call keys%key('axis', group%axis, 'cylinder: direction of the axis', allowed=axes, &
       & hidden=keys%mode == mode_write .and. group%shape /= 'cylinder')
+    call keys%key('surface', group%surface, 'closed facets instead of a shape (3D): a STL file')
+    call keys%key('scale', group%scale, 'm', 'surface: length of its unit, 1e-3 for '// &
+      & 'millimetres', above=0.0_wp, hidden=group%surface == '')
   end subroutine visit_shape
 
 end module pd_scene_groups_shape
