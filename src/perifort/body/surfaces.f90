@@ -63,11 +63,11 @@ contains
       end if
       call place_fault(error, scene, 'body', number, 'surface')
       if (allocated(error)) return
+      text = gaps_text(solid)
       skin%body = number
       skin%lattice = lattice
       call move_surface(solid%surface, skin%surface)
       if (.not. present(warnings)) return
-      text = gaps_text(solid)
       if (len(text) > 0) call warnings%add('gaps of surface '//to_text(number), &
         & name_of(scene, number)//': '//text, tell=.false.)
       if (any(windings > 1_i1)) call warnings%add('shells of surface '//to_text(number), &
@@ -209,7 +209,7 @@ contains
         & to_text(lattice%grid%origin(1) + lattice%grid%spacing*(at(1) - 0.5_wp), 5)//', '// &
         & to_text(lattice%grid%origin(2) + lattice%grid%spacing*(at(2) - 0.5_wp), 5)//', '// &
         & to_text(lattice%grid%origin(3) + lattice%grid%spacing*(at(3) - 0.5_wp), 5)//') m', &
-        & error, "fill = 'volume' would count the parts of cells there twice; use 'centre', or unite them")
+        & error, "fill = 'volume' would count parts of cells twice; use 'centre', or unite them")
       return
     end if
     call cut_cells(surface, lattice%grid%origin, lattice%grid%spacing, lattice%cells, windings, &

@@ -4,7 +4,7 @@
 module pd_body_surface_edges
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4, i8
-  use pd_base_lookup, only: lookup_type
+  use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text
   use pd_body_surface_surface, only: surface_fault, surface_type
   implicit none (type, external)
@@ -40,7 +40,12 @@ contains
       do i = 1, 3
         a = surface%corner(i, f)
         b = surface%corner(mod(i, 3) + 1, f)
-        call table%number_of(ior(ishft(int(min(a, b), i8), 32), int(max(a, b), i8)), number, is_new)
+        call table%number_of(mix(mix(0_i8, int(min(a, b), i8)), int(max(a, b), i8)), number, is_new)
+        if (.not. is_new) then
+          ! two edges may have one key, if hardly ever: the later one is then open
+          is_new = any(ends(:, number) /= [min(a, b), max(a, b)])
+          if (is_new) call table%own_number(number)
+        end if
         if (is_new) then
           if (number > size(uses)) then
             ! more than two edges to a facet: hardly any is shared

@@ -27,8 +27,8 @@ contains
 
     call keys%key('name', group%name, 'name used elsewhere, as BODY:NAME', required=.true., &
       & word=.true.)
-    call keys%key('where', group%where, "expression of x, y, z, a facet's centre, that is not 0 "// &
-      & 'for its facets; with a normal both must hold')
+    call keys%key('where', group%where, "expression of x, y, z, a facet's centre, that is not "// &
+      & '0 for its facets; with a normal both must hold')
     call keys%key('normal', group%normal, '-', "direction of the facets' outward normal", &
       & default='any')
     call keys%key('angle', group%angle, 'degrees', 'normal: how far a facet may be turned from '// &
