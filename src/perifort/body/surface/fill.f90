@@ -16,6 +16,7 @@ module pd_body_surface_fill
   !> What counts as on the surface: parts of a spacing, and of single precision.
   real(wp), parameter :: touch = 1.0e-6_wp, of_single = 2.4e-7_wp, most_touch = 1.0e-2_wp
   integer, parameter :: most_winding = 100
+  real(wp), parameter :: hem = 0.5_wp   !! around holes, where seams may part [spacings]
 
   !> A surface with what finds its inside.
   type :: solid_type
@@ -136,7 +137,7 @@ contains
     end do
     !$omp end parallel
     again = again .or. near_holes(solid%edges, origin(2:) + 0.5_wp*spacing, [spacing, spacing], &
-      & cells(2:), spacing)
+      & cells(2:), hem*spacing)
     if (any(again)) then
       call new_tree(solid%surface, tree)
       allocate (doubtful(cells(1), cells(2), cells(3)), source=.false._i1)
@@ -260,7 +261,7 @@ contains
     allocate (inside(size(x, 1)), again(size(x, 1)))
     associate (rows => solid%rows)
       open_bins = near_holes(solid%edges, rows%low + rows%width/2, rows%width, rows%n, &
-        & spacing + maxval(rows%width))
+        & hem*spacing + maxval(rows%width))
     end associate
     shift = shift_of(solid%surface, spacing)
     !$omp parallel do default(none) schedule(dynamic, 256) &
