@@ -2,7 +2,7 @@
 module test_body_surfaces
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_error, only: fault_type => error_type
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i8
   use pd_body_body, only: body_type
   use pd_body_generate, only: generate_body
   use pd_body_regions, only: in_region
@@ -10,6 +10,7 @@ module test_body_surfaces
   use pd_body_surface_shares, only: share_facets
   use pd_body_surface_stl, only: read_stl_text
   use pd_body_surface_winding, only: new_tree, tree_type, winding_number
+  use pd_family_family, only: allocate_bonds, bonds_type
   use pd_motion_loads, only: load_of, load_type
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
@@ -47,6 +48,7 @@ contains
       & new_unittest('boundaries move the points near facets', test_boundary), &
       & new_unittest('regions and removed parts inside of surfaces', test_regions), &
       & new_unittest('layers and lattice families', test_layers), &
+      & new_unittest('cracks that are surfaces', test_cracks), &
       & new_unittest('surfaces without an inside are refused', test_bad_surfaces), &
       & new_unittest('damaged files are refused with their place', test_damaged), &
       & new_unittest('what is refused when a scene is read or built', test_refused), &
@@ -577,6 +579,74 @@ contains
     call expect_parts(error, fault, 'overlap')
   end subroutine test_layers
 
+  !> Two facets cut the bonds that a parallelogram cuts. A ball parts its inside, which is convex,
+  !> from the outside: bonds between both are cut, those inside are not.
+  subroutine test_cracks(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: x(:, :, :)
+    logical, allocatable :: inside(:)
+    type(solid_type) :: solid
+    integer(i8) :: cut
+    integer :: k, i, wrong
+    character(*), parameter :: block = '&scene dimension = 3 /'//lf//'&body lower = 0, 0, 0 '// &
+      & 'upper = 5, 4, 3 points = 10, 8, 6 /'//lf//steel
+
+    call ready(block//'&crack corner = 2.52, 0.6, 0.3 edge_1 = 0.1, 2.1, 0 edge_2 = 0, 0.2, 1.6 /')
+    if (allocated(error)) return
+    cut = set_up%cut
+    x = 0*box_facets([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp])
+    x(:, :, 1) = reshape([2.52_wp, 0.6_wp, 0.3_wp, 2.62_wp, 2.7_wp, 0.3_wp, 2.62_wp, 2.9_wp, &
+      & 1.9_wp], [3, 3])
+    x(:, :, 2) = reshape([2.52_wp, 0.6_wp, 0.3_wp, 2.62_wp, 2.9_wp, 1.9_wp, 2.52_wp, 0.8_wp, &
+      & 1.9_wp], [3, 3])
+    call write_file('part.stl', ascii_stl(x(:, :, :2)*1000, 'crack'))
+    call ready(block//"&crack surface = 'part.stl' scale = 1e-3 /")
+    if (allocated(error)) return
+    call expect_true(error, set_up%cut == cut .and. cut > 0_i8, 'the bonds of a parallelogram')
+    x = ball_facets(1.1_wp, 24)
+    x(1, :, :) = x(1, :, :) + 2.4_wp
+    x(2, :, :) = x(2, :, :) + 2.0_wp
+    x(3, :, :) = x(3, :, :) + 1.6_wp
+    call write_file('part.stl', binary_stl(x))
+    call ready(block//"&crack surface = 'part.stl' /")
+    if (allocated(error)) return
+    call solid_of(x, solid, error)
+    associate (body => set_up%system%body, family => set_up%system%family)
+      call points_inside(solid, body%x, 0.5_wp, inside)
+      call allocate_bonds(family, bonds)
+      wrong = 0
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        call family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          if (inside(k) .neqv. inside(bonds%j(i))) then
+            if (bonds%intact(i)) wrong = wrong + 1
+          else if (inside(k) .and. .not. bonds%intact(i)) then
+            wrong = wrong + 1
+          end if
+        end do
+      end do
+      call expect_true(error, wrong == 0 .and. any(inside .and. body%point > 0), &
+        & 'a ball is parted from the rest')
+    end associate
+
+  contains
+
+    subroutine ready(text)
+      character(*), intent(in) :: text
+      type(scene_type) :: scene
+      type(fault_type), allocatable :: fault
+
+      if (allocated(error)) return
+      call read_scene_text(text, 'build/surfaces.nml', scene, fault)
+      if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+      if (allocated(fault)) call test_failed(error, fault%message)
+    end subroutine ready
+
+  end subroutine test_cracks
+
   subroutine test_bad_surfaces(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp) :: x(3, 3, 12), y(3, 3, 12)
@@ -691,6 +761,9 @@ contains
     call refuse(scene_with('spacing = 1', "&remove surface = 'part.stl' /"), 'no points')
     call refuse(scene_with('spacing = 1', "&region name = 'r' surface = 'no.stl' /"), &
       & "cannot find the file 'no.stl'")
+    call refuse(scene_with('spacing = 1', "&crack surface = 'part.stl' radius = 1 /"), &
+      & "'surface' beside another kind of crack")
+    call refuse(scene_with('spacing = 1', "&crack surface = 'no.stl' /"), 'cannot find')
     call refuse(scene_with("spacing = 1 fill = 'volume'", "&horizon family = 'lattice' /"), &
       & 'cut cells')
 
@@ -750,6 +823,7 @@ contains
 
     subroutine change_it()
       integer :: times, at, length
+      character(7) :: word
       character(7), parameter :: words(12) = [character(7) :: 'nan', '1e38', '-1e38', '1e-38', &
         & 'solid', 'facet', 'endloop', '0', '-0', '1e999', '1.5.2', 'inf']
 
@@ -762,9 +836,8 @@ contains
         case (3); text = text(:at)
         case (4); text = text(:at + length - 1)//text(at:)
         case (5)
-          associate (word => trim(words(random_to(size(words)))))
-            text = text(:at - 1)//word//text(min(len(text) + 1, at + len(word)):)
-          end associate
+          word = words(random_to(size(words)))
+          text = text(:at - 1)//trim(word)//text(min(len(text) + 1, at + len_trim(word)):)
         case default; text(at:at) = char(ieor(ichar(text(at:at)), 2**(random_to(8) - 1)))
         end select
         if (len(text) == 0) text = ' '

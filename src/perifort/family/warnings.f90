@@ -153,6 +153,7 @@ contains
     type(warnings_type), intent(inout) :: warnings
     integer :: points
 
+    if (scene%cracks(number)%surface /= '') return
     points = points_on(scene%cracks(number), body)
     if (points == 0) return
     call warnings%add('crack through points '//to_text(number), '&crack number '// &

@@ -224,11 +224,13 @@ contains
     near = more(1:n(1), 1:n(2)) > 0
   end function near_holes
 
-  !> A cell that is in doubt as all of its neighbours are; 0 if there is none.
+  !> A cell that is in doubt as four of its six neighbours or more are, which those beyond the
+  !> lattice count as; 0 if there is none. A hole as wide as two cells has no such cell.
   pure subroutine find_hole(doubtful, at)
     logical(i1), intent(in) :: doubtful(:, :, :)
     integer, intent(out) :: at(3)
-    integer :: i, j, k, n(3)
+    integer, parameter :: enough = 4
+    integer :: i, j, k, n(3), axis, side, there(3), around
 
     n = shape(doubtful)
     at = 0
@@ -236,9 +238,19 @@ contains
       do j = 1, n(2)
         do i = 1, n(1)
           if (.not. doubtful(i, j, k)) cycle
-          if (.not. all(doubtful(max(1, i - 1):min(n(1), i + 1), j, k))) cycle
-          if (.not. all(doubtful(i, max(1, j - 1):min(n(2), j + 1), k))) cycle
-          if (.not. all(doubtful(i, j, max(1, k - 1):min(n(3), k + 1)))) cycle
+          around = 0
+          do axis = 1, 3
+            do side = -1, 1, 2
+              there = [i, j, k]
+              there(axis) = there(axis) + side
+              if (there(axis) < 1 .or. there(axis) > n(axis)) then
+                around = around + 1
+              else if (doubtful(there(1), there(2), there(3))) then
+                around = around + 1
+              end if
+            end do
+          end do
+          if (around < enough) cycle
           at = [i, j, k]
           return
         end do
@@ -254,7 +266,7 @@ contains
     logical, allocatable, intent(out) :: inside(:)   !! (places)
     type(tree_type) :: tree
     logical, allocatable :: again(:), open_bins(:, :)
-    real(wp) :: shift, y, z
+    real(wp) :: shift, y, z, place(3)
     integer :: p, winding(1)
     logical :: balanced
 
@@ -276,9 +288,11 @@ contains
     if (.not. any(again)) return
     call new_tree(solid%surface, tree)
     !$omp parallel do default(none) schedule(dynamic, 256) shared(solid, tree, x, inside, again) &
-    !$omp private(p)
+    !$omp private(p, place)
     do p = 1, size(x, 1)
-      if (again(p)) inside(p) = winding_number(solid%surface, tree, x(p, :)) > 0.5_wp
+      if (.not. again(p)) cycle
+      place = x(p, :)
+      inside(p) = winding_number(solid%surface, tree, place) > 0.5_wp
     end do
   end subroutine points_inside
 

@@ -73,7 +73,7 @@ contains
         if (allocated(error)) return
       end do
       do i = 1, size(scene%cracks)
-        call check_crack(scene%cracks(i), d, i, error, source)
+        call check_crack(scene%cracks(i), d, scene%file, i, error, source)
         if (allocated(error)) return
       end do
     end associate

@@ -540,9 +540,11 @@ contains
 
   !> One `&crack`: one kind, the one of the dimension, complete and not degenerate. An error is set
   !> if a rule is broken.
-  subroutine check_crack(crack, dimension, number, error, source)
+  subroutine check_crack(crack, dimension, scene_file, number, error, source)
     type(crack_group), intent(in) :: crack             !! the group
     integer, intent(in) :: dimension                   !! of the scene
+    character(:), allocatable, intent(in) :: scene_file
+      !! path of the scene file, whose folder is looked in first; may be unallocated
     integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
@@ -554,15 +556,28 @@ contains
     parallelogram = any(is_set(crack%corner)) .or. any(is_set(crack%edge_1)) .or. &
       & any(is_set(crack%edge_2))
     disc = any(is_set(crack%centre)) .or. any(is_set(crack%normal)) .or. is_set(crack%radius)
-    if (dimension == 1) then
+    if (crack%surface /= '') then
+      if (dimension /= 3) then
+        call rule_fault(error, 'crack', number, 'surface', 'a surface in a scene of dimension '// &
+          & to_text(dimension), 'facets are cracks in 3D; in 2D a crack is a segment', source)
+      else if (segment .or. parallelogram .or. disc) then
+        call rule_fault(error, 'crack', number, 'surface', "'surface' beside another kind of "// &
+          & 'crack', 'give a &crack for each', source)
+      else
+        call check_file(crack%surface, scene_file, 'crack', number, error, source, 'surface')
+      end if
+    else if (abs(crack%scale - 1.0_wp) > 0.0_wp) then
+      call rule_fault(error, 'crack', number, 'scale', "'scale' without a surface", &
+        & "it belongs to the key 'surface'", source)
+    else if (dimension == 1) then
       call rule_fault(error, 'crack', number, '', 'a crack in a scene of dimension 1', &
         & 'cracks are segments (2D), parallelograms or discs (3D)', source)
     else if (count([segment, parallelogram, disc]) /= 1 .or. (segment .neqv. dimension == 2)) then
       if (dimension == 2) then
         kinds = "expected a segment: 'from' and 'to'"
       else
-        kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', or a disc: "// &
-          & "'centre', 'normal', 'radius'"
+        kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', a disc: "// &
+          & "'centre', 'normal', 'radius', or a 'surface'"
       end if
       call rule_fault(error, 'crack', number, '', 'this is not a crack of dimension '// &
         & to_text(dimension), kinds, source)

@@ -45,8 +45,8 @@ contains
     call table%add('horizon', 'How far points interact, and how the sums over families are '// &
       & 'corrected.', once, horizon_group(), one=horizon)
     call table%add('crack', 'A crack that is there from the start: a segment in 2D (from, to); '// &
-      & 'in 3D a parallelogram (corner, edge_1, edge_2) or a disc (centre, normal, radius).', &
-      & repeated, crack_group(), all=cracks)
+      & 'in 3D a parallelogram (corner, edge_1, edge_2), a disc (centre, normal, radius), '// &
+      & 'or the facets of a file (surface).', repeated, crack_group(), all=cracks)
     call table%add('no_fail', 'A zone where no bond breaks: a region by its name, or a shape.', &
       & repeated, no_fail_group(), all=no_fail)
     call table%add('initial', 'The state at the start, of all points or of a region. The '// &
