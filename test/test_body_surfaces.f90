@@ -248,6 +248,18 @@ contains
     end if
     call expect_true(error, set_up%system%body%n_points == 1000, 'a full box')
     call expect_true(error, set_up%warnings%has('shells of surface 1'), 'is warned of')
+    call expect_true(error, .not. set_up%warnings%has('volume of surface 1'), 'the volume fits')
+    ! a sheet of one cell is thicker than the surface
+    call write_file('part.stl', binary_stl(box_facets([o, o, o], [9.0_wp, 9.0_wp, 0.4_wp])))
+    call read_scene_text(scene_with('spacing = 1'), 'build/surfaces.nml', scene, fault)
+    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    call expect_true(error, set_up%warnings%has('volume of surface 1'), 'the volume does not')
+    call write_file('part.stl', binary_stl(joined(box_facets([o, o, o], [10.0_wp, 10.0_wp, &
+      & 10.0_wp]), box_facets([3.0_wp, 3.0_wp, 3.0_wp], [7.0_wp, 7.0_wp, 7.0_wp]))))
     call points_of(scene_with("spacing = 1 fill = 'volume'"), body, error, fault)
     call expect_parts(error, fault, 'shells of the surface overlap|part.stl')
   end subroutine test_shells
@@ -664,7 +676,7 @@ contains
     call refuse(spread(reshape([o, o, o, 1.0_wp, o, o, o, 1.0_wp, o], [3, 3]), 3, 1), &
       & 'holds no volume')
     call refuse(0*x, 'has no facets')
-    call refuse(1.0e-6_wp*x, 'no cell of|is 4e-06 x 4e-06 x 4e-06 m')
+    call refuse(1.0e-6_wp*x, 'less than half a cell of|it is 4e-6 x 4e-6 x 4e-6 m')
     call refuse(1.0e6_wp*x, "too many cells|scale")
     call refuse(1.0e12_wp*x, "too many cells|scale")
 

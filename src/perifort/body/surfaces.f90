@@ -30,6 +30,7 @@ module pd_body_surfaces
   real(wp), parameter :: memory_per_point = 400.0_wp  !! while families are built [bytes]
   real(wp), parameter :: same = 1.0e-3_wp             !! of a cell, that a surface may stick out
   real(wp), parameter :: sliver = 0.05_wp             !! of a cell; less goes to a neighbour
+  real(wp), parameter :: much = 0.1_wp                !! of the volume, that whole cells may miss
   real(wp), parameter :: pi = acos(-1.0_wp)
 
 contains
@@ -70,6 +71,11 @@ contains
       if (.not. present(warnings)) return
       if (len(text) > 0) call warnings%add('gaps of surface '//to_text(number), &
         & name_of(scene, number)//': '//text, tell=.false.)
+      if (abs(sum(body%volume) - skin%surface%volume) > much*skin%surface%volume .and. &
+        & all(windings <= 1_i1)) call warnings%add('volume of surface '//to_text(number), &
+        & name_of(scene, number)//': its cells have a volume of '//with_unit(sum(body%volume), &
+        & 'm3', 4)//', its surface holds '//with_unit(skin%surface%volume, 'm3', 4)//"; use a "// &
+        & "smaller spacing, or fill = 'volume'", tell=.false.)
       if (any(windings > 1_i1)) call warnings%add('shells of surface '//to_text(number), &
         & name_of(scene, number)//': '//to_text(count(windings > 1_i1))//' cells are inside of '// &
         & 'several shells of its surface, and count once; the facets of a cavity face into it', &
@@ -111,7 +117,7 @@ contains
   end function name_of
 
   !> The cells around a surface: centred in its box, or with a corner of some cell at `lower`. An
-  !> error if they are too many.
+  !> error if they are too many, or larger than the surface.
   subroutine choose_lattice(surface, spacing, lower, lattice, error)
     type(surface_type), intent(in) :: surface
     real(wp), intent(in) :: spacing               !! [m]
@@ -129,12 +135,15 @@ contains
       number = max(1.0_wp, aint((surface%high - surface%low)/spacing + 1 - same))
       origin = (surface%low + surface%high)/2 - spacing*number/2
     end if
-    if (product(number) > most_cells) then
+    if (surface%volume < spacing**3/2) then
+      call surface_fault(surface, 'the surface holds less than half a cell of '// &
+        & with_unit(spacing, 'm', 4)//': it is '//extent_text(surface), error, note)
+    else if (product(number) > most_cells) then
       call surface_fault(surface, 'too many cells: the surface is '//extent_text(surface)// &
         & ', which takes '//to_text(product(number), 3)//' cells of '//with_unit(spacing, 'm', 4), &
         & error, 'a body has at most '//to_text(most_cells, 3)//'; '//note)
-      return
     end if
+    if (allocated(error)) return
     need = product(number)*2 + memory_per_point*surface%volume/spacing**3
     if (need > real(available_memory(), wp)) then
       call surface_fault(surface, 'the surface is '//extent_text(surface)//' and holds about '// &
