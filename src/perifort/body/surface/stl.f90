@@ -15,6 +15,7 @@ module pd_body_surface_stl
 
   integer, parameter :: header = 84        !! bytes of a binary file before its facets
   integer, parameter :: facet_bytes = 50   !! of one facet
+  integer, parameter :: most_facets = 500000000  !! numbers of edges have 32 bits
   integer, parameter :: longest_shown = 40 !! characters of a word that a message shows
 
 contains
@@ -123,7 +124,7 @@ contains
 
     call add_name(surface, name_in_header(cursor%text(:80)))
     cursor%binary = .true.
-    if (count_in(cursor) > huge(n)/4) then
+    if (count_in(cursor) > most_facets) then
       cursor%at = header - 3
       call cursor%fault('too many facets: '//to_text(count_in(cursor)), error)
       return
@@ -230,7 +231,7 @@ contains
           return
         end if
         line = cursor%line
-        if (number == huge(number)/4) then
+        if (number == most_facets) then
           call cursor%fault('too many facets', error)
           return
         end if
