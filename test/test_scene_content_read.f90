@@ -279,7 +279,9 @@ contains
     call expect_fault(error, '&scene /', "group &scene lacks the key 'dimension'|a/b.nml:1")
     call expect_fault(error, '&material density = 1 /', "lacks the key 'youngs_modulus'|[Pa]")
     call expect_fault(error, "&region shape = 'box' /", "&region lacks the key 'name'")
-    call expect_fault(error, "&remove radius = 1 /", "&remove lacks the key 'shape'")
+    call expect_fault(error, '&scene dimension = 2 / &material youngs_modulus = 1e9 '// &
+      & "poissons_ratio = 0.3 density = 1 / &time steps = 1 / &body lower = 0, 0 upper = 1, 1 "// &
+      & "points = 2, 2 / &remove radius = 1 /", "&remove lacks the key 'shape'")
     call expect_fault(error, "&probe name = 'p' /", "&probe lacks the key 'point'")
   end subroutine test_missing
 
