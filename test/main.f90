@@ -32,6 +32,7 @@ program main
   use test_body_mesh_read, only: collect_body_mesh_read
   use test_body_meshes, only: collect_body_meshes
   use test_body_overlap, only: collect_body_overlap
+  use test_body_surfaces, only: collect_body_surfaces
   use test_body_waves, only: collect_body_waves
   use test_command_line, only: collect_command_line
   use test_driver, only: collect_driver
@@ -151,6 +152,7 @@ program main
   call register('body_mesh_part', collect_body_mesh_part)
   call register('body_mesh_read', collect_body_mesh_read)
   call register('body_meshes', collect_body_meshes)
+  call register('body_surfaces', collect_body_surfaces)
   call register('body_overlap', collect_body_overlap)
   call register('body_waves', collect_body_waves)
   call register('command_line', collect_command_line)

@@ -62,6 +62,8 @@ def small(text, largest):
         return match[1] + ", ".join(map(str, counts))
 
     text = re.sub(r"^(\s*points\s*=\s*)([\d, ]+)", fewer, text, flags=re.M)
+    # The lattice of a surface has a spacing instead of counts
+    text = re.sub(r"^(\s*spacing\s*=\s*)\S+", r"\g<1>4e-3", text, flags=re.M)
     # Larger cells need a larger horizon
     text = re.sub(r"^(\s*)length\s*=.*$", r"\1ratio = 3.015", text, flags=re.M)
     text = re.sub(r"^(\s*steps\s*=\s*)(\d+)", lambda m: m[1] + str(min(int(m[2]), 20)), text,
@@ -98,6 +100,8 @@ def bases(program, project, largest=400):
         if number > 10 * largest:
             continue  # counts without a common factor: too slow for thousands of runs
         files = {SCENE: text.encode()}
+        for name in re.findall(r"^\s*surface\s*=\s*'([^']+)'", text, re.M):
+            files[name] = (path.parent / name).read_bytes()
         for name in re.findall(r"^\s*file\s*=\s*'([^']+)'", text, re.M):
             # Only initial states stand in tables with a header; one row for each point
             if (path.parent / name).is_file():

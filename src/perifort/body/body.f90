@@ -12,10 +12,11 @@ module pd_body_body
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_order, only: number_points, order_type, owns
   use pd_body_mesh_part, only: part_type
+  use pd_body_surface_surface, only: surface_type
   implicit none (type, external)
   private
-  public :: body_type, not_finite_text, grid_type, allocate_points, append_points, keep_points, &
-    & arrange, gather, scatter, own_points, owned, share_halo
+  public :: body_type, not_finite_text, grid_type, lattice_type, skin_type, allocate_points, &
+    & append_points, keep_points, arrange, gather, scatter, own_points, owned, share_halo
 
   !> A uniform grid: points at origin + axes (i - 1/2) spacing, i integer.
   type :: grid_type
@@ -25,6 +26,19 @@ module pd_body_body
     !> Unit vectors in columns.
     real(wp) :: axes(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
   end type grid_type
+
+  !> The cells of a body that is a lattice.
+  type :: lattice_type
+    type(grid_type) :: grid
+    integer :: cells(3) = 0         !! of the box around it, along each axis; 0: no lattice
+  end type lattice_type
+
+  !> The surface that a body's lattice fills.
+  type :: skin_type
+    integer :: body = 0             !! number of the body
+    type(lattice_type) :: lattice   !! its cells
+    type(surface_type) :: surface
+  end type skin_type
 
   type :: body_type
     integer :: dim = 0
@@ -45,6 +59,8 @@ module pd_body_body
     type(grid_type), allocatable :: grids(:)
     real(wp) :: delta = 0.0_wp              !! the horizon [m]
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
+    type(skin_type), allocatable :: skins(:)  !! bodies that fill surfaces
+    type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)
   end type body_type
 
   interface take
@@ -82,7 +98,7 @@ contains
     allocate (body%body(n), body%material(n), body%layer(n), body%grid(n), source=0_i2)
     body%point = [(int(k, i4), k=1, n)]
     body%slot = body%point
-    allocate (body%grids(0), body%parts(0))
+    allocate (body%grids(0), body%parts(0), body%skins(0), body%lattices(0))
     call own_all(body)
   end subroutine allocate_points
 

@@ -6,8 +6,9 @@ module pd_body_choice
   use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type, not_finite_text
   use pd_body_shapes, only: inside, touch
+  use pd_body_surfaces, only: inside_surface
   use pd_scene_content_expressions, only: expression_of
-  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type, shape_group
   implicit none (type, external)
   private
@@ -52,7 +53,12 @@ contains
     integer(i4), allocatable :: points(:)
     integer :: k
 
-    if (group%shape /= '') then
+    if (group%surface /= '') then
+      call inside_surface(scene, group%surface, group%scale, body%x, minval(body%spacing), chosen, &
+        & error)
+      call place_fault(error, scene, name, number, 'surface')
+      if (allocated(error)) return
+    else if (group%shape /= '') then
       chosen = inside(group, body%x, touch*minval(body%spacing))
     else
       allocate (chosen(body%n_points), source=.true.)

@@ -1,5 +1,5 @@
-!> Points of a scene: lattices, clouds, meshes (`pd_body_meshes`), removed shapes, and the layers
-!> that boundaries add (`pd_body_layers`).
+!> Points of a scene: lattices, also inside of surfaces (`pd_body_surfaces`), clouds, meshes
+!> (`pd_body_meshes`), removed shapes, and the layers that boundaries add (`pd_body_layers`).
 !>
 !> Order (that of the results): body by body, a lattice's points x fastest, then y, then z; then
 !> the layers in the order of their boundary groups.
@@ -8,18 +8,20 @@ module pd_body_generate
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: body_group, is_lattice, scene_type, is_set, unset
+  use pd_scene_content_types, only: body_group, has_cut_cells, is_lattice, scene_type, is_set, unset
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
-  use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
+  use pd_body_body, only: body_type, grid_type, lattice_type, skin_type, allocate_points, &
+    & append_points, keep_points
   use pd_body_meshes, only: keep_part, material_number, mesh_body
   use pd_body_mesh_part, only: part_type
-  use pd_body_lattices, only: lattice_points, lattice_grid, place_in
+  use pd_body_lattices, only: lattice_points, lattice_of, place_in
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
   use pd_body_choice, only: choose_points
   use pd_body_shapes, only: inside_body, touch
+  use pd_body_surfaces, only: keep_skin, surface_body
   implicit none (type, external)
   private
   public :: generate_body, horizon_of
@@ -43,6 +45,8 @@ contains
                                                             !! of each layer came to
     type(warnings_type), intent(inout), optional :: warnings  !! get what may surprise of meshes
     type(part_type) :: part
+    type(skin_type) :: skin
+    type(lattice_type), allocatable :: lattices(:)
     real(wp) :: spacing, largest
     type(layer_count_type), allocatable :: counted(:)
     type(body_type) :: one
@@ -55,6 +59,7 @@ contains
     if (scene%header%dimension == 2) depth = scene%header%thickness
     if (scene%header%dimension == 1) depth = scene%header%area
     call allocate_points(body, scene%header%dimension, 0)
+    allocate (lattices(size(scene%bodies)))
     do i = 1, size(scene%bodies)
       largest = -1.0_wp
       if (scene%bodies(i)%mesh /= '') then
@@ -64,10 +69,16 @@ contains
       else if (scene%bodies(i)%file /= '') then
         call cloud_points(scene, i, depth, one, error)
         if (allocated(error)) return
+      else if (scene%bodies(i)%surface /= '') then
+        call surface_body(scene, i, one, lattices(i), skin, error, warnings)
+        if (allocated(error)) return
+        call keep_skin(body, skin)
+        if (.not. has_cut_cells(scene%bodies(i))) one%grid = number_of_grid(body, lattices(i)%grid)
       else
         call lattice_points(body%dim, scene%bodies(i), depth, one)
         if (scene%bodies(i)%shape /= '') call keep_shape(scene%bodies(i), depth, one)
-        one%grid = number_of_grid(body, lattice_grid(scene%bodies(i), body%dim))
+        lattices(i) = lattice_of(scene%bodies(i), body%dim)
+        one%grid = number_of_grid(body, lattices(i)%grid)
       end if
       one%body = int(i, i2)
       if (scene%bodies(i)%mesh == '') one%material = material_number(scene, &
@@ -75,6 +86,7 @@ contains
       spacing = max(spacing, largest)
       call append_points(body, one)
     end do
+    call move_alloc(lattices, body%lattices)
     call cut_shapes(scene, body, error)
     if (allocated(error)) return
     do i = 1, size(body%parts)
@@ -174,6 +186,9 @@ contains
       end do
       do i = 1, size(body%parts)
         points = points + body%parts(i)%n_points
+      end do
+      do i = 1, size(body%skins)
+        points = points + count(body%body == body%skins(i)%body)
       end do
       ! a small body may lie in its horizon as a whole
       if (points <= most_members .and. delta/spacing <= largest_ratio) return

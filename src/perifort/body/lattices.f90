@@ -3,10 +3,11 @@ module pd_body_lattices
   use pd_base_kinds, only: wp
   use pd_base_vectors, only: cross
   use pd_scene_content_types, only: body_group, is_turned
-  use pd_body_body, only: body_type, grid_type, allocate_points
+  use pd_body_body, only: body_type, grid_type, lattice_type, allocate_points
   implicit none (type, external)
   private
-  public :: lattice_points, box_of_cells, lattice_grid, cell_of, axes_of, place_in, coordinate
+  public :: lattice_points, lattice_of, box_of_cells, lattice_grid, cell_of, axes_of, place_in, &
+    & coordinate
 
 contains
 
@@ -25,6 +26,15 @@ contains
     grid = lattice_grid(group, dim)
     call box_of_cells(dim, grid, [1, 1, 1], count, depth, body)
   end subroutine lattice_points
+
+  !> The cells of a lattice body.
+  pure type(lattice_type) function lattice_of(group, dim) result(lattice)
+    type(body_group), intent(in) :: group  !! with lower, upper and points
+    integer, intent(in) :: dim             !! of the scene: 1, 2 or 3
+    lattice%grid = lattice_grid(group, dim)
+    lattice%cells = 1
+    lattice%cells(:dim) = group%points(:dim)
+  end function lattice_of
 
   !> The grid of a lattice body: its cell 1 begins at the body's lower corner.
   pure type(grid_type) function lattice_grid(group, dim) result(grid)

@@ -11,7 +11,7 @@ module pd_body_layers
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: adds_layer, scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
-  use pd_body_lattices, only: lattice_grid, box_of_cells, cell_of, place_in
+  use pd_body_lattices, only: box_of_cells, cell_of, place_in
   implicit none (type, external)
   private
   public :: add_layers, layer_rows, layer_count_type, layer_count_text
@@ -57,10 +57,10 @@ contains
   !> Add the layers of all `&boundary side`, in the order of the groups. An error, with its place,
   !> for a layer without a point.
   subroutine add_layers(scene, delta, depth, body, counts, error)
-    type(scene_type), intent(in) :: scene  !! gives the boundaries and the bodies' lattices
+    type(scene_type), intent(in) :: scene  !! gives the boundaries
     real(wp), intent(in) :: delta            !! horizon [m]
     real(wp), intent(in) :: depth            !! what makes dx^dim a volume: thickness, area or 1
-    type(body_type), intent(inout) :: body   !! in point order, without layers
+    type(body_type), intent(inout) :: body   !! in point order, with its lattices, without layers
     type(layer_count_type), allocatable, intent(out) :: counts(:)
       !! (layers), what their columns came to
     type(error_type), allocatable, intent(out) :: error
@@ -164,10 +164,9 @@ contains
           side%number = body%grid(k)
           side%material = body%material(k)
           side%body = b
-          side%grid = lattice_grid(scene%bodies(b), body%dim)
+          side%grid = body%lattices(b)%grid
           side%rows = layer_rows(delta, side%grid%spacing)
-          points = 1
-          points(:body%dim) = scene%bodies(b)%points(:body%dim)
+          points = body%lattices(b)%cells
           allocate (side%top(points(c(1)), points(c(2))), source=nothing)
           allocate (side%has(points(c(1)), points(c(2))), source=.false.)
         end if

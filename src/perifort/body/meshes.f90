@@ -1,4 +1,5 @@
-!> Bodies that are meshes: their points, and what their names mean among the points of a scene.
+!> Bodies that are meshes: their points, and what their names, and those of surfaces
+!> (`pd_body_surfaces`), mean among the points of a scene.
 module pd_body_meshes
   use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp, i2, i4
@@ -11,6 +12,7 @@ module pd_body_meshes
     & part_type, points_named
   use pd_body_mesh_read, only: read_mesh
   use pd_body_mesh_shares, only: share_areas
+  use pd_body_surfaces, only: facets_of_side, near_side, side_areas, skin_named
   use pd_scene_content_rules, only: place_fault
   use pd_scene_content_types, only: scene_type
   use pd_scene_format_file, only: resolve_path
@@ -160,7 +162,14 @@ contains
     call internal_fault('a set of a body that is no mesh')
   end function part_named
 
-  !> An error, with its place, if a name of a mesh means no points, or no facets.
+  !> The name of a set without that of its body.
+  pure function set_of(name) result(set)
+    character(*), intent(in) :: name
+    character(:), allocatable :: set
+    set = trim(name(index(name, ':') + 1:))
+  end function set_of
+
+  !> An error, with its place, if a name of a mesh or surface means no points, or no facets.
   subroutine check_set(scene, body, name, facets, group, number, key, error)
     type(scene_type), intent(in) :: scene     !! a checked scene
     type(body_type), intent(in) :: body       !! with its parts
@@ -174,6 +183,13 @@ contains
     type(facets_type) :: found
 
     if (.not. names_set(name)) return
+    if (skin_named(scene, body, name) > 0) then
+      if (.not. facets) call internal_fault('a surface has no sets of points')
+      call facets_of_side(scene, body%skins(skin_named(scene, body, name)), set_of(name), chosen, &
+        & error)
+      call place_set_fault(error, scene, group, number, key)
+      return
+    end if
     associate (part => body%parts(part_named(scene, body, name)))
       if (facets) then
         call facets_named(part, trim(name(index(name, ':') + 1:)), found, error)
@@ -237,7 +253,7 @@ contains
     x = body%x(body%slot(part%first:part%first + part%n_points - 1), :)
   end function positions_of
 
-  !> The slots with the points within the horizon of a mesh's facets, and of its body.
+  !> The slots with the points within the horizon of facets of a mesh or surface, and of its body.
   function facet_mask(scene, body, name) result(mask)
     type(scene_type), intent(in) :: scene  !! a checked scene
     type(body_type), intent(in) :: body    !! its points, arranged in slots
@@ -247,6 +263,11 @@ contains
     type(facets_type) :: facets
     type(error_type), allocatable :: error
 
+    if (skin_named(scene, body, name) > 0) then
+      call near_side(scene, body, skin_named(scene, body, name), set_of(name), mask, error)
+      if (allocated(error)) call internal_fault('a side without facets')
+      return
+    end if
     associate (part => body%parts(part_named(scene, body, name)))
       call facets_named(part, trim(name(index(name, ':') + 1:)), facets, error)
       if (allocated(error)) call internal_fault('a set without facets')
@@ -255,8 +276,8 @@ contains
     end associate
   end function facet_mask
 
-  !> The points that share the area of a mesh's facets, with their parts of it. An error if a facet
-  !> lies inside of the body, or has but one point behind it.
+  !> The points that share the area of facets of a mesh or surface, with their parts of it. An error
+  !> if a facet lies inside of the body, or has no points behind it that could share its area.
   subroutine facet_areas(scene, body, name, slots, vector, area, error)
     type(scene_type), intent(in) :: scene   !! a checked scene
     type(body_type), intent(in) :: body     !! its points, arranged in slots
@@ -270,6 +291,11 @@ contains
     integer(i4), allocatable :: points(:)
     integer :: i
 
+    if (skin_named(scene, body, name) > 0) then
+      call side_areas(scene, body, skin_named(scene, body, name), set_of(name), slots, vector, &
+        & area, error)
+      return
+    end if
     associate (part => body%parts(part_named(scene, body, name)))
       call facets_named(part, trim(name(index(name, ':') + 1:)), facets, error)
       if (allocated(error)) call internal_fault('a set without facets')

@@ -5,9 +5,9 @@ module pd_body_overlap
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: adds_layer, is_lattice, scene_type
+  use pd_scene_content_types, only: adds_layer, has_grid, scene_type
   use pd_body_body, only: body_type, grid_type
-  use pd_body_lattices, only: lattice_grid, cell_of, place_in
+  use pd_body_lattices, only: cell_of, place_in
   implicit none (type, external)
   private
   public :: check_lattices
@@ -31,8 +31,8 @@ contains
   !> a layer. A body is the union of the cells that are left of it: a point on the face between two
   !> of its cells lies in it, a point on its surface does not.
   subroutine check_lattices(scene, body, error)
-    type(scene_type), intent(in) :: scene        !! gives the lattices and names of the bodies
-    type(body_type), intent(in) :: body          !! in point order
+    type(scene_type), intent(in) :: scene        !! gives the names of the bodies
+    type(body_type), intent(in) :: body          !! in point order, with its lattices
     type(error_type), allocatable, intent(out) :: error
     type(cells_type), allocatable :: bodies(:)
     integer, allocatable :: first(:), order(:)
@@ -43,7 +43,7 @@ contains
     allocate (bodies(size(scene%bodies)), layered(size(scene%bodies)))
     layered = .false.
     do b = 1, size(bodies)
-      if (is_lattice(scene%bodies(b))) bodies(b)%grid = lattice_grid(scene%bodies(b), body%dim)
+      if (has_grid(scene%bodies(b))) bodies(b)%grid = body%lattices(b)%grid
     end do
     do k = 1, body%n_points
       associate (one => bodies(body%body(k)))
@@ -79,7 +79,7 @@ contains
 
       meet = .true.
       ! clouds matter to layers only
-      if (.not. is_lattice(scene%bodies(a))) then
+      if (.not. has_grid(scene%bodies(a))) then
         meet = layered(b)
         return
       end if

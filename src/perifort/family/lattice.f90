@@ -74,7 +74,7 @@ contains
     suits = .false.
     reason = ''
     if (any(body%grid == 0)) then
-      reason = 'some points are a cloud or a mesh'
+      reason = 'some points are a cloud, a mesh or cut cells'
       return
     end if
     if (any(body%grid /= body%grid(1))) then

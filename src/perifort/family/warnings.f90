@@ -6,7 +6,7 @@ module pd_family_warnings
   use pd_base_numbers, only: pi
   use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: has_cut_cells, scene_type
   use pd_body_body, only: body_type
   use pd_family_cracks, only: points_on
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
@@ -37,9 +37,10 @@ contains
     do i = 1, size(scene%bodies)
       call warn_of_thickness(body, family, i, name_of(scene, i), warnings)
       call warn_of_horizon(body, family, i, name_of(scene, i), warnings)
-      ! the volumes of a mesh are those of its elements, however long these are
-      if (scene%bodies(i)%mesh == '') call warn_of_volumes(body, family, i, name_of(scene, i), &
-        & warnings)
+      ! the volumes of a mesh are those of its elements, however long these are; cut cells
+      ! are smaller than the space that they have
+      if (scene%bodies(i)%mesh == '' .and. .not. has_cut_cells(scene%bodies(i))) &
+        & call warn_of_volumes(body, family, i, name_of(scene, i), warnings)
     end do
     do i = 1, size(scene%cracks)
       call warn_of_crack(scene, body, i, warnings)
@@ -152,6 +153,7 @@ contains
     type(warnings_type), intent(inout) :: warnings
     integer :: points
 
+    if (scene%cracks(number)%surface /= '') return
     points = points_on(scene%cracks(number), body)
     if (points == 0) return
     call warnings%add('crack through points '//to_text(number), '&crack number '// &

@@ -11,8 +11,7 @@ module pd_set_up_conditions
   use pd_body_body, only: body_type
   use pd_body_meshes, only: facet_mask, names_set
   use pd_body_choice, only: values_on
-  use pd_body_regions, only: region_mask
-  use pd_body_shapes, only: inside, touch
+  use pd_body_regions, only: in_shape, region_mask
   use pd_motion_conditions, only: motion_type, moved_by_displacement, moved_by_velocity, &
     & vary_in_time
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve
@@ -196,8 +195,7 @@ contains
     if (scene%no_fail(number)%region /= '') then
       mask = region_mask(scene, body, scene%no_fail(number)%region)
     else
-      mask = inside(scene%no_fail(number), body%x, &
-        & touch*minval(body%spacing, mask=body%point > 0)) .and. body%point > 0
+      mask = in_shape(scene, body, scene%no_fail(number))
     end if
   end function no_fail_mask
 

@@ -6,7 +6,7 @@ module pd_set_up_memory
   use pd_base_text, only: to_text, with_unit
   use pd_law_laws, only: law_table_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: is_lattice, is_set, laws_of, scene_type
+  use pd_scene_content_types, only: has_grid, is_lattice, is_set, laws_of, scene_type
   use pd_body_generate, only: horizon_of
   implicit none (type, external)
   private
@@ -29,11 +29,12 @@ contains
       & with_unit(need, 'B', 3)//' of memory', 'only '//with_unit(there, 'B', 3)//' are available')
   end subroutine check_memory
 
-  !> Largest memory that a run of a scene takes [bytes], without its clouds, whose points are not
-  !> known before they are read; 0 without lattice bodies. The constants are fitted to the largest
-  !> resident sets of runs of 1e5 to 2e5 points in each dimension on two threads, with horizons of 3
-  !> to 5 spacings: both kinds of families, bonds that break, and the generic pass with two laws and
-  !> with laws that have a history. The prediction is 0.9 to 1.2 times what they took.
+  !> Largest memory that a run of a scene takes [bytes], without its clouds and surfaces, whose
+  !> points are not known before they are read; 0 without lattice bodies. The constants are fitted
+  !> to the largest resident sets of runs of 1e5 to 2e5 points in each dimension on two threads,
+  !> with horizons of 3 to 5 spacings: both kinds of families, bonds that break, and the generic
+  !> pass with two laws and with laws that have a history. The prediction is 0.9 to 1.2 times what
+  !> they took.
   real(wp) function predicted_memory(scene) result(bytes)
     type(scene_type), intent(in) :: scene  !! a checked scene
     real(wp), parameter :: program = 18.5e6_wp                          !! without points
@@ -69,7 +70,7 @@ contains
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking
-    if (scene%horizon%family == 'list' .or. any(.not. is_lattice(scene%bodies))) then
+    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies))) then
       bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
         & + per_list_bond*members)
       if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members
@@ -148,6 +149,7 @@ contains
     spacing = 0.0_wp
     do i = 1, size(scene%bodies)
       associate (body => scene%bodies(i))
+        if (body%surface /= '') spacing = max(spacing, body%spacing)
         if (is_lattice(body)) spacing = max(spacing, (body%upper(1) - body%lower(1))/body%points(1))
       end associate
     end do

@@ -10,8 +10,11 @@ module pd_set_up_prepare
   use pd_body_initial, only: initial_state
   use pd_body_regions, only: check_regions
   use pd_body_layers, only: layer_count_type, layer_count_text
+  use pd_body_surface_stl, only: read_stl
+  use pd_body_surface_surface, only: surface_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
+  use pd_family_crack_surface, only: cut_by_facets
   use pd_family_cracks, only: cut_bonds, part_bodies
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
@@ -24,6 +27,7 @@ module pd_set_up_prepare
   use pd_motion_system, only: system_type, start_system, explain_condition
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: scene_type
+  use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_consistent_rules, only: check_consistent, weigh_bonds
   use pd_set_up_conditions, only: motions_of_scene, heating_of_scene, in_no_fail_zones
@@ -73,6 +77,7 @@ contains
     integer(i2), allocatable :: heated_by(:)
     type(layer_count_type), allocatable :: layers(:)
     real(wp) :: delta
+    type(surface_type) :: surface
     integer(i8) :: cut
     integer :: i
 
@@ -154,7 +159,15 @@ contains
 
       call timer%start('cracks')
       do i = 1, size(scene%cracks)
-        call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
+        if (scene%cracks(i)%surface /= '') then
+          call read_stl(resolve_path(trim(scene%cracks(i)%surface), scene%file), &
+            & scene%cracks(i)%scale, surface, error)
+          call place_fault(error, scene, 'crack', i, 'surface')
+          if (allocated(error)) return
+          call cut_by_facets(surface, system%body, system%family, cut)
+        else
+          call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
+        end if
         if (cut == 0_i8) call set_up%warnings%add('idle crack '//to_text(i), '&crack number '// &
           & to_text(i)//' cuts no bond, or only bonds that another crack has cut', tell=.false.)
         set_up%cut = set_up%cut + cut

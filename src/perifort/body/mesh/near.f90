@@ -8,7 +8,7 @@ module pd_body_mesh_near
   use pd_body_mesh_part, only: facets_type, part_type
   implicit none (type, external)
   private
-  public :: points_near
+  public :: points_near, distance
 
 contains
 

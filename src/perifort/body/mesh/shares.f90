@@ -13,7 +13,7 @@ module pd_body_mesh_shares
   use pd_body_mesh_part, only: facets_type, part_type
   implicit none (type, external)
   private
-  public :: share_areas
+  public :: share_areas, fit
 
   integer, parameter :: most_rings = 4          !! of elements around a facet
   real(wp), parameter :: good = 3.0_wp          !! sum of |weights| that needs no wider ring
@@ -169,10 +169,10 @@ contains
   !> Weights of points that reproduce 1 and x at `at`, by moving least squares. `found` is false if
   !> the points lie in one plane, or on one line.
   pure subroutine fit(x, at, weights, found)
-    real(wp), intent(in) :: x(:, :)                  !! (points, dim)
-    real(wp), intent(in) :: at(:)                    !! (dim)
-    real(wp), allocatable, intent(out) :: weights(:) !! (points)
-    logical, intent(out) :: found
+    real(wp), intent(in) :: x(:, :)                  !! (points, dim) [m]
+    real(wp), intent(in) :: at(:)                    !! (dim) [m]
+    real(wp), allocatable, intent(out) :: weights(:) !! (points) [-]
+    logical, intent(out) :: found                    !! whether there are such weights
     real(wp), parameter :: singular = 1.0e-8_wp  !! square of an extent over that of all points
     real(wp) :: p(size(at) + 1, size(x, 1)), near(size(x, 1))
     real(wp) :: m(size(at) + 1, size(at) + 1), c(size(at) + 1), reach, scale

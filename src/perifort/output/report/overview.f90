@@ -132,6 +132,7 @@ contains
           & ' horizons')
       end do
       do i = 1, size(scene%cracks)
+        if (scene%cracks(i)%surface /= '') cycle
         extents = extents_of(scene%cracks(i), body%dim)
         text = text//line('crack '//to_text(i), with_unit(minval(extents), 'm', 4)// &
           & trim(merge(' long                    ', ' in its shorter direction', &

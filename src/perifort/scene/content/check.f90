@@ -6,7 +6,8 @@ module pd_scene_content_check
   use pd_base_text, only: to_text
   use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
   use pd_scene_content_check_contact, only: check_contact
-  use pd_scene_content_check_bodies, only: check_body, check_shape, check_material, check_crack
+  use pd_scene_content_check_bodies, only: check_body, check_shape, check_side, &
+    & check_material, check_crack
   use pd_scene_content_check_measures, only: check_measures
   use pd_scene_content_defaults, only: fill_defaults
   use pd_scene_content_expressions, only: at_the_start, check_definitions, check_expression
@@ -62,14 +63,21 @@ contains
         if (allocated(error)) return
       end do
       do i = 1, size(scene%regions)
-        if (scene%regions(i)%where == '' .or. scene%regions(i)%shape /= '') &
-          & call check_shape(scene%regions(i), d, 'region', i, error, source)
+        if (scene%regions(i)%where == '' .or. scene%regions(i)%shape /= '' .or. &
+          & scene%regions(i)%surface /= '') &
+          & call check_shape(scene%regions(i), d, scene%file, 'region', i, error, source)
         call check_expression(scene, scene%regions(i)%where, 'region', i, 'where', 'xyz', &
           & at_the_start, error, source)
         if (allocated(error)) return
       end do
+      do i = 1, size(scene%sides)
+        call check_side(scene%sides(i), i, error, source)
+        call check_expression(scene, scene%sides(i)%where, 'side', i, 'where', 'xyz', &
+          & at_the_start, error, source)
+        if (allocated(error)) return
+      end do
       do i = 1, size(scene%cracks)
-        call check_crack(scene%cracks(i), d, i, error, source)
+        call check_crack(scene%cracks(i), d, scene%file, i, error, source)
         if (allocated(error)) return
       end do
     end associate
@@ -198,6 +206,9 @@ contains
     call check_unique([character(name_length) :: (scene%regions(i)%name, &
       & i=1, size(scene%regions))], 'region', error, source)
     if (allocated(error)) return
+    call check_unique([character(name_length) :: (scene%sides(i)%name, &
+      & i=1, size(scene%sides))], 'side', error, source)
+    if (allocated(error)) return
     call check_unique([character(name_length) :: (scene%boundaries(i)%name, &
       & i=1, size(scene%boundaries))], 'boundary', error, source)
     if (allocated(error)) return
@@ -227,8 +238,8 @@ contains
     call check_expression(scene, cut%where, group, number, 'where', 'xyz', at_the_start, error, &
       & source)
     if (allocated(error)) return
-    if (cut%shape /= '' .or. (cut%region == '' .and. cut%where == '')) &
-      & call check_shape(cut, scene%header%dimension, group, number, error, source)
+    if (cut%shape /= '' .or. cut%surface /= '' .or. (cut%region == '' .and. cut%where == '')) &
+      & call check_shape(cut, scene%header%dimension, scene%file, group, number, error, source)
   end subroutine check_cut
 
   !> One `&no_fail`: a region or a shape.
@@ -239,16 +250,20 @@ contains
     type(source_type), intent(in), optional :: source
 
     associate (zone => scene%no_fail(number))
-      if (zone%region == '' .and. zone%shape == '') then
+      if (zone%region == '' .and. zone%shape == '' .and. zone%surface == '') then
         call rule_fault(error, 'no_fail', number, '', &
           & "group &no_fail lacks the key 'region' or 'shape'", 'expected one of them', source)
       else if (zone%region /= '' .and. zone%shape /= '') then
         call rule_fault(error, 'no_fail', number, 'shape', "'region' and 'shape' are both given", &
           & 'give one of them', source)
+      else if (zone%region /= '' .and. zone%surface /= '') then
+        call rule_fault(error, 'no_fail', number, 'surface', "'region' and 'surface' are both "// &
+          & 'given', 'give one of them', source)
       else if (zone%region /= '') then
         call check_region(scene, zone%region, 'no_fail', number, 'region', error, source)
       else
-        call check_shape(zone, scene%header%dimension, 'no_fail', number, error, source)
+        call check_shape(zone, scene%header%dimension, scene%file, 'no_fail', number, error, &
+          & source)
       end if
     end associate
   end subroutine check_no_fail

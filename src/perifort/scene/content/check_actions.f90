@@ -10,8 +10,8 @@ module pd_scene_content_check_actions
     & check_components, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_course, only: ramp_of, sides
-  use pd_scene_content_types, only: adds_layer, load_group, scene_type, is_given, is_set, &
-    & name_length
+  use pd_scene_content_types, only: adds_layer, has_cut_cells, load_group, scene_type, is_given, &
+    & is_set, name_length
   implicit none (type, external)
   private
   public :: check_initial, check_boundary, check_load
@@ -334,7 +334,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source
     integer :: i
-    logical :: cloud, mesh
+    logical :: cloud, mesh, cut
 
     if (side == '' .and. region == '') then
       call rule_fault(error, group, number, '', 'group &'//group//" lacks the key 'side' or "// &
@@ -352,7 +352,7 @@ contains
       call check_region(scene, region, group, number, 'region', error, source)
       return
     else if (index(side, ':') > 0) then
-      call check_mesh_name(scene, side, group, number, 'side', error, source)
+      call check_mesh_name(scene, side, group, number, 'side', error, source, facets=.true.)
       if (.not. allocated(error) .and. body /= '') call rule_fault(error, group, number, 'body', &
         & "'body' beside a side that names its body", "leave 'body' out", source)
       return
@@ -371,10 +371,12 @@ contains
     if (allocated(error)) return
     cloud = .false.
     mesh = .false.
+    cut = .false.
     do i = 1, size(scene%bodies)
       if (body /= '' .and. scene%bodies(i)%name /= body) cycle
       cloud = cloud .or. scene%bodies(i)%file /= ''
       mesh = mesh .or. scene%bodies(i)%mesh /= ''
+      cut = cut .or. has_cut_cells(scene%bodies(i))
     end do
     if (cloud) then
       call rule_fault(error, group, number, 'side', &
@@ -382,6 +384,10 @@ contains
     else if (mesh) then
       call rule_fault(error, group, number, 'side', "side '"//trim(side)//"' of a body that is "// &
         & 'a mesh, which has no rows and gets no layers', "name its facets: 'BODY:NAME'", source)
+    else if (cut) then
+      call rule_fault(error, group, number, 'side', "side '"//trim(side)//"' of a body with "// &
+        & "fill = 'volume', which has no rows and gets no layers", &
+        & "name its facets: 'BODY:NAME', or use fill = 'centre'", source)
     end if
   end subroutine check_place
 
@@ -393,7 +399,7 @@ contains
     type(source_type), intent(in), optional :: source
     character(:), allocatable :: note, nearest
 
-    note = 'allowed: '//join(sides, ', ')//", or BODY:NAME for facets of a mesh"
+    note = 'allowed: '//join(sides, ', ')//', or BODY:NAME for facets of a mesh or surface'
     nearest = nearest_name(trim(side), sides)
     if (len(nearest) > 0) note = "did you mean '"//nearest//"'?  "//note
     call rule_fault(error, group, number, 'side', "unknown value '"//trim(side)// &

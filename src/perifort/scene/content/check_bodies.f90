@@ -10,10 +10,10 @@ module pd_scene_content_check_bodies
   use pd_scene_content_rules, only: rule_fault, given, check_known, check_vector, check_finite_box
   use pd_scene_format_source, only: source_type
   use pd_scene_content_types, only: scene_type, body_group, shape_group, material_group, &
-    & crack_group, is_set, laws_of, name_length
+    & crack_group, side_group, is_set, laws_of, name_length
   implicit none (type, external)
   private
-  public :: check_body, check_shape, check_material, check_crack, check_file
+  public :: check_body, check_shape, check_side, check_material, check_crack, check_file
 
   real(wp), parameter :: spacing_tolerance = 1.0e-6_wp  !! relative, between directions
   !> Peak memory of a point of a lattice, while families are built, measured on cubes [bytes].
@@ -46,6 +46,8 @@ contains
         & i=1, size(scene%materials))], 'material', 'body', number, 'material', error, source)
       if (allocated(error)) return
       lattice = any(is_set(body%lower)) .or. any(is_set(body%upper)) .or. any(body%points /= 0)
+      call check_surface(scene, number, error, source)
+      if (allocated(error) .or. body%surface /= '') return
       call check_mesh(scene, number, lattice, error, source)
       if (allocated(error)) return
       call fill_shape(body, d, number, error, source)
@@ -64,8 +66,8 @@ contains
       end if
       if (.not. lattice) then
         call rule_fault(error, 'body', number, '', 'a body without points', &
-          & "expected 'lower', 'upper' and 'points' for a lattice, 'file' for a cloud, or "// &
-          & "'mesh'", source)
+          & "expected 'lower', 'upper' and 'points' for a lattice, 'surface' and 'spacing', "// &
+          & "'file' for a cloud, or 'mesh'", source)
         return
       end if
       call check_vector(body%lower, d, 'lower', 'body', number, error, source)
@@ -92,8 +94,7 @@ contains
   end subroutine check_body
 
   !> The axes of a turned lattice: directions that span a frame, and nothing beside them that knows
-  !> x,
-  !> y and z alone.
+  !> x, y and z alone.
   subroutine check_axes(scene, body, number, error, source)
     type(scene_type), intent(in) :: scene
     type(body_group), intent(in) :: body
@@ -269,6 +270,67 @@ contains
 
   end subroutine fill_shape
 
+  !> The keys of a surface: in 3D, with a spacing, and none beside those of boxes, clouds or meshes.
+  subroutine check_surface(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+
+    associate (body => scene%bodies(number))
+      if (body%surface == '') then
+        if (body%fill /= 'centre') then
+          call rule_fault(error, 'body', number, 'fill', "'fill' of a body without a surface", &
+            & "it belongs to the key 'surface'", source)
+        end if
+      else if (scene%header%dimension /= 3) then
+        call rule_fault(error, 'body', number, 'surface', 'a surface in a scene of dimension '// &
+          & to_text(scene%header%dimension), 'facets enclose a volume in 3D only; in 2D use a '// &
+          & 'mesh, or a lattice with &remove', source)
+      else if (any(is_set([body%axis_1, body%axis_2]))) then
+        call rule_fault(error, 'body', number, 'axis_1', 'a surface with axes', &
+          & 'a surface is turned in its file', source)
+      else if (body%file /= '' .or. body%mesh /= '' .or. body%shape /= '' .or. &
+        & any(is_set(body%upper)) .or. any(body%points /= 0)) then
+        call rule_fault(error, 'body', number, 'surface', 'a body is a box, another shape, a '// &
+          & 'surface, a cloud or a mesh, not several of them', "give 'surface' and 'spacing' alone", source)
+      else if (allocated(body%material_set) .or. allocated(body%material_name) .or. &
+        & body%points_per_element /= 1) then
+        call rule_fault(error, 'body', number, 'surface', 'keys of a mesh beside a surface', &
+          & "'material_set', 'material_name' and 'points_per_element' belong to 'mesh'", source)
+      else if (.not. is_set(body%spacing)) then
+        call rule_fault(error, 'body', number, 'surface', "group &body lacks the key 'spacing'", &
+          & 'a surface needs the edge of the lattice cells [m]', source)
+      else
+        if (any(is_set(body%lower))) call check_vector(body%lower, 3, 'lower', 'body', number, &
+          & error, source)
+        if (.not. allocated(error)) call check_file(body%surface, scene%file, 'body', number, &
+          & error, source, 'surface')
+      end if
+    end associate
+  end subroutine check_surface
+
+  !> One `&side`: an expression or a normal. An error is set if it has neither.
+  subroutine check_side(side, number, error, source)
+    type(side_group), intent(in) :: side               !! the group
+    integer, intent(in) :: number                      !! which group of this name
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source  !! the scanned file, for places
+
+    if (side%where == '' .and. .not. any(is_set(side%normal))) then
+      call rule_fault(error, 'side', number, '', "group &side lacks the key 'where' or 'normal'", &
+        & 'expected one of them, or both', source)
+    else if (any(is_set(side%normal))) then
+      call check_vector(side%normal, 3, 'normal', 'side', number, error, source)
+      if (allocated(error)) return
+      if (norm2(side%normal) <= 0.0_wp) call rule_fault(error, 'side', number, 'normal', &
+        & "'normal' is zero", 'expected a direction', source)
+    else if (given('side', number, 'angle', source)) then
+      call rule_fault(error, 'side', number, 'angle', "'angle' without 'normal'", &
+        & 'it is measured from the normal', source)
+    end if
+  end subroutine check_side
+
   !> The keys of a mesh: none beside those of a lattice or cloud, sets in pairs with materials.
   subroutine check_mesh(scene, number, lattice, error, source)
     type(scene_type), intent(in) :: scene
@@ -290,7 +352,8 @@ contains
         else if (body%points_per_element /= 1 .or. abs(body%scale - 1.0_wp) > 0.0_wp) then
           call rule_fault(error, 'body', number, trim(merge('points_per_element', &
             & 'scale             ', body%points_per_element /= 1)), 'a body without a mesh has '// &
-            & "no elements and no 'scale'", "they belong to the key 'mesh'", source)
+            & "no elements and no 'scale'", "they belong to 'mesh', 'scale' to 'surface', too", &
+            & source)
         end if
         return
       end if
@@ -417,14 +480,24 @@ contains
   !> The shape keys of `&remove`, `&keep`, `&region` and `&no_fail`: those of its kind and no
   !> others. An
   !> error is set if a rule is broken.
-  subroutine check_shape(shape, dimension, group, number, error, source)
+  subroutine check_shape(shape, dimension, scene_file, group, number, error, source)
     class(shape_group), intent(in) :: shape            !! the group, or its part that is a shape
     integer, intent(in) :: dimension                   !! of the scene
+    character(:), allocatable, intent(in) :: scene_file
+      !! path of the scene file, whose folder is looked in first; may be unallocated
     character(*), intent(in) :: group                  !! name of the group
     integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
 
+    if (shape%surface /= '') then
+      call check_shape_surface()
+      return
+    else if (abs(shape%scale - 1.0_wp) > 0.0_wp) then
+      call rule_fault(error, group, number, 'scale', "'scale' without a surface", &
+        & "it belongs to the key 'surface'", source)
+      return
+    end if
     select case (shape%shape)
     case ('box')
       call refuse(['centre   ', 'radius   ', 'axis     ', 'direction', 'height   ', 'angle    '])
@@ -451,13 +524,27 @@ contains
       call need_direction()
     case default
       call rule_fault(error, group, number, 'shape', 'group &'//group//" lacks the key 'shape'", &
-        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space'"//alternatives(group), &
-        & source)
+        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space', or the key 'surface'"// &
+        & alternatives(group), source)
     end select
     if (allocated(error)) return
     call check_finite_box(shape%lower, shape%upper, group, number, error, source)
 
   contains
+
+    !> A surface instead of a shape.
+    subroutine check_shape_surface()
+      if (dimension /= 3) then
+        call rule_fault(error, group, number, 'surface', 'a surface in a scene of dimension '// &
+          & to_text(dimension), 'facets enclose a volume in 3D only', source)
+      else if (shape%shape /= '' .or. any(is_set([shape%lower, shape%upper, shape%direction])) &
+        & .or. any(is_set([shape%radius, shape%height, shape%angle]))) then
+        call rule_fault(error, group, number, 'surface', "'surface' beside a shape", &
+          & 'give one of them', source)
+      else
+        call check_file(shape%surface, scene_file, group, number, error, source, 'surface')
+      end if
+    end subroutine check_shape_surface
 
     !> An error if a key of another kind of shape is given.
     subroutine refuse(keys)
@@ -671,9 +758,11 @@ contains
 
   !> One `&crack`: one kind, the one of the dimension, complete and not degenerate. An error is set
   !> if a rule is broken.
-  subroutine check_crack(crack, dimension, number, error, source)
+  subroutine check_crack(crack, dimension, scene_file, number, error, source)
     type(crack_group), intent(in) :: crack             !! the group
     integer, intent(in) :: dimension                   !! of the scene
+    character(:), allocatable, intent(in) :: scene_file
+      !! path of the scene file, whose folder is looked in first; may be unallocated
     integer, intent(in) :: number                      !! which group of this name
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
@@ -689,6 +778,19 @@ contains
     if (chain) then
       call check_chain(crack, dimension, segment .or. parallelogram .or. disc, number, error, &
         & source)
+    else if (crack%surface /= '') then
+      if (dimension /= 3) then
+        call rule_fault(error, 'crack', number, 'surface', 'a surface in a scene of dimension '// &
+          & to_text(dimension), 'facets are cracks in 3D; in 2D a crack is a segment', source)
+      else if (segment .or. parallelogram .or. disc) then
+        call rule_fault(error, 'crack', number, 'surface', "'surface' beside another kind of "// &
+          & 'crack', 'give a &crack for each', source)
+      else
+        call check_file(crack%surface, scene_file, 'crack', number, error, source, 'surface')
+      end if
+    else if (abs(crack%scale - 1.0_wp) > 0.0_wp) then
+      call rule_fault(error, 'crack', number, 'scale', "'scale' without a surface", &
+        & "it belongs to the key 'surface'", source)
     else if (dimension == 1) then
       call rule_fault(error, 'crack', number, '', 'a crack in a scene of dimension 1', &
         & 'cracks are segments (2D), parallelograms or discs (3D)', source)
@@ -696,8 +798,8 @@ contains
       if (dimension == 2) then
         kinds = "expected a segment: 'from' and 'to', or a chain of them: 'points'"
       else
-        kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', or a disc: "// &
-          & "'centre', 'normal', 'radius'"
+        kinds = "expected a parallelogram: 'corner', 'edge_1', 'edge_2', a disc: "// &
+          & "'centre', 'normal', 'radius', or a 'surface'"
       end if
       call rule_fault(error, 'crack', number, '', 'this is not a crack of dimension '// &
         & to_text(dimension), kinds, source)

@@ -8,7 +8,7 @@ module pd_scene_content_groups
     & shape_group, region_group, no_fail_group, material_group, horizon_group, crack_group, &
     & initial_group, boundary_group, load_group, time_group, relaxation_group, output_group, &
     & probe_group, tip_group, section_group, line_group, j_integral_group, study_group, &
-    & contact_group, group_table
+    & side_group, contact_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -31,21 +31,25 @@ contains
       & 'assumptions that come with it.', once, header_type(), one=header)
     call table%add('define', 'A name for a number, to be used in expressions.', repeated, &
       & define_group(), all=definitions)
-    call table%add('body', 'Material points: a lattice that fills a box, a sphere or a '// &
-      & 'cylinder, a mesh, or a cloud read from a file.', repeated, body_group(), all=bodies)
+    call table%add('body', 'Material points: a lattice that fills a box, a sphere, a cylinder or '// &
+      & 'a surface, a mesh, or a cloud read from a file.', repeated, body_group(), all=bodies)
     call table%add('keep', 'What stays of the bodies: points that lie inside of none of these '// &
       & 'groups are left out. `&remove` comes after it.', repeated, shape_group(), all=kept)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
       & 'it are left out.', repeated, shape_group(), all=removed)
     call table%add('region', 'A named part of space, by a shape or an expression; other '// &
       & 'groups use the points inside it by its name.', repeated, region_group(), all=regions)
+    call table%add('side', 'Facets of a surface by a name: by their centres, their normals, or '// &
+      & 'both; loads and boundaries use them as BODY:NAME.', repeated, side_group(), &
+      & all=named_sides)
     call table%add('material', 'A material: how its bonds carry force and when they break.', &
       & repeated, material_group(), all=materials)
     call table%add('horizon', 'How far points interact, and how the sums over families are '// &
       & 'corrected.', once, horizon_group(), one=horizon)
     call table%add('crack', 'A crack that is there from the start: a segment in 2D (from, to), '// &
-      & 'or a chain of them (points); in 3D a parallelogram (corner, edge_1, edge_2) or a disc '// &
-      & '(centre, normal, radius).', repeated, crack_group(), all=cracks)
+      & 'or a chain of them (points); in 3D a parallelogram (corner, edge_1, edge_2), a disc '// &
+      & '(centre, normal, radius), or the facets of a file (surface).', repeated, crack_group(), &
+      & all=cracks)
     call table%add('no_fail', 'A zone where no bond breaks: a region by its name, or a shape.', &
       & repeated, no_fail_group(), all=no_fail)
     call table%add('initial', 'The state at the start, of all points or of a region. The '// &
@@ -168,6 +172,16 @@ contains
     if (.not. allocated(scene%regions)) allocate (scene%regions(0))
     groups => scene%regions
   end subroutine regions
+
+  subroutine named_sides(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%sides)) deallocate (scene%sides)
+    if (present(room)) allocate (scene%sides(room))
+    if (.not. allocated(scene%sides)) allocate (scene%sides(0))
+    groups => scene%sides
+  end subroutine named_sides
 
   subroutine materials(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

@@ -182,8 +182,9 @@ contains
     call check_known(name, names, 'region', group, number, key, error, source)
   end subroutine check_region
 
-  !> A name `BODY:NAME`: the body must be a mesh. What its sets are is seen when it is read.
-  subroutine check_mesh_name(scene, name, group, number, key, error, source)
+  !> A name `BODY:NAME`: the body must be a mesh, or a surface if facets are meant. What its sets
+  !> are is seen when it is read.
+  subroutine check_mesh_name(scene, name, group, number, key, error, source, facets)
     type(scene_type), intent(in) :: scene              !! with its bodies
     character(*), intent(in) :: name                   !! with a colon
     character(*), intent(in) :: group                  !! name of the group, without `&`
@@ -191,6 +192,7 @@ contains
     character(*), intent(in) :: key                    !! that has the name as its value
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
+    logical, intent(in), optional :: facets            !! whether facets are meant; absent: points
     character(name_length), allocatable :: names(:)
     integer :: i
 
@@ -206,6 +208,12 @@ contains
     call check_known(name(:index(name, ':') - 1), names, 'body', group, number, key, error, source)
     if (allocated(error)) return
     i = findloc(names == name(:index(name, ':') - 1), .true., dim=1)
+    if (scene%bodies(i)%surface /= '') then
+      if (present(facets)) return
+      call rule_fault(error, group, number, key, "'"//trim(name)//"' names facets of a "// &
+        & 'surface, not points', "use it as a 'side', or give a &region", source)
+      return
+    end if
     if (scene%bodies(i)%mesh == '') call rule_fault(error, group, number, key, "the body '"// &
       & trim(names(i))//"' is no mesh: it has no named sets", &
       & "sets belong to a body with the key 'mesh'", source)

@@ -10,7 +10,7 @@ module pd_scene_content_types
   use pd_scene_format_given, only: is_given, is_set, name_length, path_length, &
     & text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
-  use pd_scene_groups_body, only: body_group, is_box, is_lattice, is_turned
+  use pd_scene_groups_body, only: body_group, has_cut_cells, has_grid, is_box, is_lattice, is_turned
   use pd_scene_groups_boundary, only: adds_layer, boundary_group
   use pd_scene_groups_contact, only: contact_group
   use pd_scene_groups_crack, only: crack_group
@@ -28,6 +28,7 @@ module pd_scene_content_types
   use pd_scene_groups_relaxation, only: relaxation_group
   use pd_scene_groups_section, only: section_group
   use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
+  use pd_scene_groups_side, only: side_group
   use pd_scene_groups_study, only: study_group
   use pd_scene_groups_time, only: time_group
   use pd_scene_groups_tip, only: tip_group
@@ -36,9 +37,10 @@ module pd_scene_content_types
   public :: scene_type, header_type, define_group, body_group, shape_group, region_group, &
     & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
     & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
-    & section_group, line_group, j_integral_group, study_group, contact_group, name_length, &
+    & section_group, line_group, j_integral_group, side_group, study_group, contact_group, &
+    & name_length, &
     & path_length, text_length, unset, is_set, is_given
-  public :: adds_layer, is_box, is_lattice, is_turned
+  public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
   !> A group that the scene has no component for.
@@ -85,6 +87,7 @@ module pd_scene_content_types
     type(shape_group), allocatable :: kept(:)
     type(shape_group), allocatable :: removed(:)
     type(region_group), allocatable :: regions(:)
+    type(side_group), allocatable :: sides(:)
     type(material_group), allocatable :: materials(:)
     type(horizon_group) :: horizon
     type(crack_group), allocatable :: cracks(:)

@@ -7,7 +7,8 @@ module pd_scene_groups_body
   use pd_scene_groups_shape, only: axes
   implicit none (type, external)
   private
-  public :: body_group, is_lattice, is_box, is_turned, body_shapes
+  public :: body_group, is_lattice, is_box, is_turned, has_grid, &
+    & has_cut_cells, body_shapes
 
   !> Shapes of lattices.
   character(8), parameter :: body_shapes(3) = [character(8) :: 'box', 'sphere', 'cylinder']
@@ -20,7 +21,7 @@ module pd_scene_groups_body
     real(wp) :: upper(3) = unset                 !! opposite corner [m]
     integer :: points(3) = 0                     !! points along each direction
     character(name_length) :: shape = ''         !! of `body_shapes`; '' = a box with `points`
-    real(wp) :: spacing = unset                  !! of a shape, instead of `points` [m]
+    real(wp) :: spacing = unset                  !! of a shape or surface, instead of `points` [m]
     real(wp) :: centre(3) = 0.0_wp               !! sphere; cylinder: the middle of its lower end
     real(wp) :: radius = unset                   !! sphere, cylinder [m]
     character(name_length) :: axis = 'z'         !! cylinder: 'x', 'y', 'z'
@@ -29,8 +30,10 @@ module pd_scene_groups_body
     real(wp) :: axis_2(3) = unset                !! and of the second ones, in 3D
     character(path_length) :: file = ''          !! cloud: columns x y z volume
     character(path_length) :: mesh = ''          !! mesh: .msh or .inp
+    character(path_length) :: surface = ''       !! closed facets that a lattice fills: .stl
+    character(name_length) :: fill = 'centre'    !! cells of it: 'centre' or 'volume'
     integer :: points_per_element = 1            !! 1: the centre; else Gauss points
-    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the mesh
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the mesh or surface
     character(name_length), allocatable :: material_set(:)   !! sets of the mesh ...
     character(name_length), allocatable :: material_name(:)  !! ... and the material of each
   contains
@@ -39,10 +42,10 @@ module pd_scene_groups_body
 
 contains
 
-  !> Whether a body is a lattice, neither a cloud nor a mesh.
+  !> Whether a body is a lattice that fills a box: no cloud, no mesh, no surface.
   elemental logical function is_lattice(body)
     type(body_group), intent(in) :: body  !! the group
-    is_lattice = body%file == '' .and. body%mesh == ''
+    is_lattice = body%file == '' .and. body%mesh == '' .and. body%surface == ''
   end function is_lattice
 
   !> Whether the rows of a lattice have directions of their own.
@@ -58,6 +61,18 @@ contains
       & .not. is_turned(body)
   end function is_box
 
+  !> Whether a body's points are whole cells of a lattice: of a box, or inside of a surface.
+  elemental logical function has_grid(body)
+    type(body_group), intent(in) :: body  !! the group
+    has_grid = body%file == '' .and. body%mesh == '' .and. .not. has_cut_cells(body)
+  end function has_grid
+
+  !> Whether a body's points are cells that a surface cuts, each with a volume of its own.
+  elemental logical function has_cut_cells(body) result(cut)
+    type(body_group), intent(in) :: body  !! the group
+    cut = body%surface /= '' .and. body%fill == 'volume'
+  end function has_cut_cells
+
   !> The keys of the group.
   subroutine visit(group, keys)
     class(body_group), intent(inout) :: group  !! its components are read or shown
@@ -70,18 +85,17 @@ contains
     call keys%key('name', group%name, 'name of the body', word=.true.)
     call keys%key('material', group%material, 'name of its material', default='the only material')
     call keys%key('lower', group%lower, 'm', 'lattice: lower corner of the box that the cells '// &
-      & 'fill', hidden=writes .and. round)
+      & 'fill; surface: a corner of some cell', hidden=writes .and. round)
     call keys%key('upper', group%upper, 'm', 'lattice: upper corner', hidden=writes .and. round)
     call keys%key('points', group%points, '', 'lattice: points along each direction, at the '// &
       & 'centres of cubic cells', at_least=1, hidden=writes .and. group%shape /= '')
     call keys%key('shape', group%shape, 'lattice: shape that it fills, with a spacing instead '// &
       & 'of points; in 2D a sphere is a disc', allowed=body_shapes)
     call keys%key('spacing', group%spacing, 'm', 'shape: distance of the points, of a sphere '// &
-      & 'and '// &
-      & 'across a cylinder with the centre at a corner of cells', above=0.0_wp)
+      & 'and across a cylinder with the centre at a corner of cells; surface: edge of the '// &
+      & 'lattice cells', above=0.0_wp)
     call keys%key('centre', group%centre, 'm', 'shape: centre of a sphere, or the middle of '// &
-      & 'the '// &
-      & 'lower end of a cylinder', hidden=writes .and. .not. round)
+      & 'the lower end of a cylinder', hidden=writes .and. .not. round)
     call keys%key('radius', group%radius, 'm', 'sphere, cylinder: radius', above=0.0_wp)
     call keys%key('axis', group%axis, 'cylinder: direction from its lower end to the upper one', &
       & allowed=axes, hidden=writes .and. group%shape /= 'cylinder')
@@ -95,11 +109,17 @@ contains
       & "columns x y z volume, '#' starts a comment")
     call keys%key('mesh', group%mesh, 'mesh instead of a lattice: a file of Gmsh (.msh, 2.2 or '// &
       & '4.1) or of Abaqus and CalculiX (.inp)')
+    call keys%key('surface', group%surface, 'lattice inside of closed facets: a STL file, as '// &
+      & 'text or binary')
+    call keys%key('fill', group%fill, 'surface: whole cells whose centres are inside; or all '// &
+      & 'cells with their volumes inside, on list families', &
+      & allowed=[character(6) :: 'centre', 'volume'], hidden=writes .and. group%surface == '')
     call keys%key('points_per_element', group%points_per_element, '', 'mesh: points of an '// &
       & 'element, 1 (its centre) or a number of Gauss points that its shape has', at_least=1, &
-      & hidden=group%mesh == '')
-    call keys%key('scale', group%scale, 'm', 'mesh: length of its unit, 1e-3 for millimetres', &
-      & above=0.0_wp, hidden=group%mesh == '')
+      & hidden=writes .and. group%mesh == '')
+    call keys%key('scale', group%scale, 'm', 'mesh, surface: length of its unit, 1e-3 for '// &
+      & 'millimetres', above=0.0_wp, &
+      & hidden=writes .and. group%mesh == '' .and. group%surface == '')
     call keys%list('material_set', group%material_set, 'mesh: names of sets that have another '// &
       & 'material than the body', [character(1) ::], as_written=.true.)
     call keys%list('material_name', group%material_name, 'mesh: the material of each '// &

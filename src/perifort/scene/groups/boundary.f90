@@ -46,8 +46,8 @@ contains
       & word=.true.)
     call keys%key('body', group%body, 'side: name of the body', default='all bodies together')
     call keys%key('side', group%side, 'x_min, x_max .. z_max: adds a layer as wide as the '// &
-      & 'horizon outside this side; BODY:NAME moves the points of a mesh within the horizon of '// &
-      & 'these facets')
+      & 'horizon outside this side; BODY:NAME moves the points of a mesh or surface within the '// &
+      & 'horizon of these facets')
     call settle_side(group%side)
     call keys%key('region', group%region, 'name of a region, instead of side')
     call keys%key('motion', group%motion, 'what the components are given for: each point, or '// &

@@ -1,14 +1,14 @@
 !> The group `&crack`: a crack that is there from the start.
 module pd_scene_groups_crack
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: unset
+  use pd_scene_format_given, only: path_length, unset
   use pd_scene_format_keys, only: keys_type
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
   private
   public :: crack_group
 
-  !> `&crack`: a segment or a chain of them (2D), a parallelogram or a disc (3D)
+  !> `&crack`: a segment or a chain of them (2D), a parallelogram, a disc or a surface (3D)
   type, extends(group_type) :: crack_group
     real(wp) :: from(3) = unset
     real(wp) :: to(3) = unset
@@ -19,6 +19,8 @@ module pd_scene_groups_crack
     real(wp) :: centre(3) = unset
     real(wp) :: normal(3) = unset
     real(wp) :: radius = unset
+    character(path_length) :: surface = ''       !! facets, .stl
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the surface
   contains
     procedure :: visit
   end type crack_group
@@ -40,6 +42,9 @@ contains
     call keys%key('centre', group%centre, 'm', '3D disc: centre')
     call keys%key('normal', group%normal, '-', '3D disc: normal, of any length')
     call keys%key('radius', group%radius, 'm', '3D disc: radius', above=0.0_wp)
+    call keys%key('surface', group%surface, '3D surface: a STL file, whose facets cut bonds')
+    call keys%key('scale', group%scale, 'm', 'surface: length of its unit, 1e-3 for '// &
+      & 'millimetres', above=0.0_wp, hidden=group%surface == '')
   end subroutine visit
 
 end module pd_scene_groups_crack

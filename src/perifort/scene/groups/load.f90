@@ -37,7 +37,7 @@ contains
 
     call keys%key('body', group%body, 'side: name of the body', default='the only body')
     call keys%key('side', group%side, 'x_min, x_max .. z_max: the outermost points at this '// &
-      & 'side; BODY:NAME: these facets of a mesh')
+      & 'side; BODY:NAME: these facets of a mesh or surface')
     call settle_side(group%side)
     call keys%key('region', group%region, 'name of a region, instead of side')
     call keys%key('pressure', group%pressure, 'Pa', 'side: pressure, positive pushes', &

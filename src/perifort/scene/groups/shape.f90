@@ -1,7 +1,7 @@
 !> Shapes: the groups `&remove` and `&keep`, and the keys that `&region` and `&no_fail` add.
 module pd_scene_groups_shape
   use pd_base_kinds, only: wp
-  use pd_scene_format_given, only: is_set, name_length, text_length, unset
+  use pd_scene_format_given, only: is_set, name_length, path_length, text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_write
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
@@ -26,6 +26,8 @@ module pd_scene_groups_shape
     real(wp) :: angle = unset                    !! cone: from side to side [degrees]
     character(name_length) :: region = ''        !! a region's points, too
     character(text_length) :: where = ''         !! an expression of x, y, z: inside if not 0
+    character(path_length) :: surface = ''       !! instead of a shape: closed facets, .stl
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the surface
   contains
     procedure :: visit => visit_cut
   end type shape_group
@@ -102,6 +104,10 @@ contains
       & above=0.0_wp, default='unbounded')
     call keys%key('angle', group%angle, 'degrees', 'cone: opening angle, from side to side', &
       & above=0.0_wp, below=180.0_wp)
+    call keys%key('surface', group%surface, 'closed facets instead of a shape (3D): a STL file')
+    call keys%key('scale', group%scale, 'm', 'surface: length of its unit, 1e-3 for '// &
+      & 'millimetres', above=0.0_wp, &
+      & hidden=keys%mode == mode_write .and. group%surface == '')
   end subroutine visit_shape
 
 end module pd_scene_groups_shape
