@@ -21,6 +21,7 @@ from ..results import Results
 from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing_of
 from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
 from .layout import FONT, Panel, Place, lay_out, write_caption
+from .rigid import draw_outlines, rigid_bodies
 from .units import Scale, number, scale_of, state_text, words
 
 Array = npt.NDArray[Any]
@@ -252,6 +253,7 @@ def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool | Ax
         _draw_cells(axes, [(part, positions[part.points], values[part.points])
                            for part in view.parts], colours, scale.factor)
         _label(axes, "xy", frame_of(view, output))
+        draw_outlines(axes, rigid_bodies(results, output, view.scale), (0, 1))
         if bar:
             add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)), bar)
     if title:
@@ -556,6 +558,7 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
     _draw_cells(axes, parts, colours, scale.factor)
     limits = cut_frame(view, output, clip)
     unit = _label(axes, "".join("xyz"[c] for c in shown), limits)
+    draw_outlines(axes, rigid_bodies(results, output, view.scale), shown, plane)
     plane = 0.0 if abs(plane) < 1e-6 * view.spacing else plane
     axes.set_title(f"cut at {'xyz'[clip.axis]} = {number(plane * unit.factor)} {unit.text}",
                    fontsize=FONT)
