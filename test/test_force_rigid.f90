@@ -544,6 +544,8 @@ contains
       & //line//steps, 'stl|sphere')
     call expect_fault(error, good_head//"&rigid name = 'plate' shape = 'sphere' centre = 0, 2 "// &
       & 'radius = 0.1 mass = 1 /'//line//steps, 'plate|body')
+    call expect_fault(error, good_head//round//" mass = 1 /"//line//"&probe name = 'ball' point = "// &
+      & '0, 0 /'//line//steps, 'ball|probe')
     call expect_fault(error, good_head//round//' mass = 1 /'//line//round//' mass = 1 /'//line// &
       & steps, 'ball|differ')
     call expect_fault(error, good_head//round//' mass = 1 /'//line// &

@@ -2,8 +2,11 @@
 !> force and moment of contact on it.
 module pd_output_measures_rigid
   use pd_base_kinds, only: wp
+  use pd_base_text, only: line => labelled_line, to_text
+  use pd_base_warnings, only: warnings_type
   use pd_motion_pose, only: rotation_of
   use pd_motion_rigid_body, only: kinetic_of, spin_now
+  use pd_motion_system, only: system_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
   use pd_output_results_types, only: column_type
   use pd_scene_content_types, only: scene_type
@@ -16,10 +19,14 @@ module pd_output_measures_rigid
   !> A rigid body.
   type, extends(measure_type) :: rigid_measure_type
     character(:), allocatable :: name
+    character(:), allocatable :: shape
     integer :: number = 0                !! of its group
+    logical :: touched = .false.         !! a &contact names it
   contains
     procedure :: columns => columns_of_rigid
     procedure :: row => row_of_rigid
+    procedure :: describe => describe_rigid
+    procedure :: warn => warn_of_rigid
   end type rigid_measure_type
 
 contains
@@ -29,11 +36,17 @@ contains
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(measure_list_type), intent(inout) :: measures   !! added to
     type(rigid_measure_type) :: measure
-    integer :: i
+    integer :: i, j
 
     do i = 1, size(scene%rigids)
       measure%name = trim(scene%rigids(i)%name)
+      measure%shape = trim(scene%rigids(i)%shape)
       measure%number = i
+      measure%touched = .false.
+      do j = 1, size(scene%contacts)
+        measure%touched = measure%touched .or. &
+          & any(scene%contacts(j)%between == scene%rigids(i)%name)
+      end do
       call measures%add(measure)
     end do
   end subroutine add_rigids
@@ -83,6 +96,31 @@ contains
       values(3*dim + 3*axes + 1) = sum(kinetic_of(rigid, now%system%time))
     end associate
   end subroutine row_of_rigid
+
+  !> Its shape and mass.
+  function describe_rigid(measure, system) result(text)
+    class(rigid_measure_type), intent(in) :: measure
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+
+    text = measure%name//': '//measure%shape
+    associate (mass => system%rigid_bodies(measure%number)%pose%mass)
+      if (mass > 0.0_wp) text = text//', '//to_text(mass, 6)//' kg'
+    end associate
+    text = line('rigid body', text)
+  end function describe_rigid
+
+  !> A rigid body that no contact names is passed through.
+  subroutine warn_of_rigid(measure, system, warnings)
+    class(rigid_measure_type), intent(in) :: measure
+    type(system_type), intent(in) :: system
+    type(warnings_type), intent(inout) :: warnings
+
+    associate (unused_system => system)
+    end associate
+    if (.not. measure%touched) call warnings%add('rigid '//to_text(measure%number), &
+      & 'no &contact names the rigid body '//measure%name//': bodies pass through it', tell=.false.)
+  end subroutine warn_of_rigid
 
   !> Axes about which a body can rotate: none, z, or all.
   pure integer function rotations(dim)

@@ -45,7 +45,8 @@ contains
           & "expected 'all' alone", source)
       end if
       if (allocated(error)) return
-      call check_known(contact%within, bodies(:size(scene%bodies)), 'body', 'contact', number, 'within', error, source)
+      call check_known(contact%within, bodies(:size(scene%bodies)), 'body', 'contact', number, &
+        & 'within', error, source)
       do i = 1, size(contact%between)
         if (allocated(error)) return
         if (contact%between(i) /= 'all') call check_known(contact%between(i), bodies, 'body', &

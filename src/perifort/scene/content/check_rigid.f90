@@ -43,6 +43,10 @@ contains
         call fault('name', "the name '"//trim(rigid%name)//"' is used by a &body", &
           & 'a &contact knows bodies and rigid bodies by their names')
       end if
+      if (.not. allocated(error) .and. (any(scene%boundaries%name == rigid%name) .or. &
+        & any(scene%probes%name == rigid%name))) call fault('name', "the name '"// &
+        & trim(rigid%name)//"' is used by a &boundary or &probe", &
+        & 'columns of the history begin with it')
       if (allocated(error)) return
       call check_vector(rigid%centre, d, 'centre', 'rigid', number, error, source)
       if (allocated(error)) return
