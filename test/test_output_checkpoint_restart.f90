@@ -614,7 +614,7 @@ contains
     call expect_same_results(error, 'whole', 'pieces', 6)
   end subroutine test_contact
 
-  !> A free disc that hits a plate in flight, between it and a wall that moves, cut after every step.
+  !> A free disc and a wall that is moved hit a plate from two sides, cut after every step.
   subroutine test_rigid(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene

@@ -1,6 +1,6 @@
-!> Surfaces of rigid bodies (doc/theory.md, 17): how far a place is from one, and along which normal,
-!> by the formula of the shape. A surface is where it is and moves as it does; what moves it is not
-!> known here.
+!> Surfaces of rigid bodies (doc/theory.md, 17): how far a place is from one, and along which
+!> normal, by the formula of the shape. A surface is where it is and moves as it does; what moves it
+!> is not known here.
 module pd_force_obstacle
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
@@ -25,7 +25,7 @@ module pd_force_obstacle
     real(wp) :: frame(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       & 0.0_wp, 1.0_wp], [3, 3])        !! its own axes as columns: a cylinder lies along the third,
                                         !! a half-space ends along it
-    real(wp) :: velocity(3) = 0.0_wp    !! of the centre, at the time of the points' velocities [m/s]
+    real(wp) :: velocity(3) = 0.0_wp    !! of the centre, when the points have theirs [m/s]
     real(wp) :: spin(3) = 0.0_wp        !! then [rad/s]
     real(wp) :: shift(3) = 0.0_wp       !! of the centre in the last step [m]
     real(wp) :: turn(3) = 0.0_wp        !! rotation in the last step, axis times angle [rad]
@@ -39,7 +39,7 @@ contains
   !> Signed distance of a place from the surface, negative within the body, and the normal there,
   !> out of the body: the gradient of the distance.
   pure subroutine find_gap(obstacle, y, gap, normal)
-    type(obstacle_type), intent(in) :: obstacle
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
     real(wp), intent(in) :: y(:)        !! the place, as many components as dimensions [m]
     real(wp), intent(out) :: gap        !! [m]
     real(wp), intent(out) :: normal(3)  !! unit vector
@@ -103,7 +103,7 @@ contains
 
   !> The velocity of the body's material at a place [m/s].
   pure function velocity_at(obstacle, y) result(v)
-    type(obstacle_type), intent(in) :: obstacle
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
     real(wp), intent(in) :: y(:)   !! the place, as many components as dimensions [m]
     real(wp) :: v(3), arm(3)
 
@@ -114,7 +114,7 @@ contains
 
   !> By how much the body's material at a place has moved in the last step [m].
   pure function shift_at(obstacle, y) result(shift)
-    type(obstacle_type), intent(in) :: obstacle
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
     real(wp), intent(in) :: y(:)   !! the place, as many components as dimensions [m]
     real(wp) :: shift(3), arm(3)
 
@@ -126,7 +126,7 @@ contains
   !> The area of the surface in 3D [m2], its length in 2D [m], its two ends in 1D [-], all with the
   !> body larger by `margin` on all sides; of a half-space huge.
   real(wp) function surface_of(obstacle, margin) result(surface)
-    type(obstacle_type), intent(in) :: obstacle
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
     real(wp), intent(in) :: margin   !! [m]
     real(wp) :: h(3)
 

@@ -41,7 +41,7 @@ module pd_force_term
                                                     !! velocity_verlet half a step before `time`;
                                                     !! 0 in static equilibrium
     type(obstacle_type), pointer :: obstacles(:) => null()
-                                                    !! surfaces of rigid bodies, none: not associated
+                                                    !! surfaces of rigid bodies
     real(wp) :: time = 0.0_wp                       !! of the displacements [s]
     integer :: step = 0                             !! complete steps (iterations) then
   end type term_view_type

@@ -181,18 +181,25 @@ contains
     end associate
   end function stiffness_of
 
-  !> Critical damping of a point against the body, per volume: 2 sqrt(K m) with the reduced mass m of
-  !> both [N s/m4].
+  !> Critical damping of a point against the body, per volume: 2 sqrt(K m) with the reduced mass m
+  !> of both [N s/m4].
   pure real(wp) function critical_damping(view, k, stiffness, per_mass) result(critical)
     type(term_view_type), intent(in) :: view
     integer, intent(in) :: k                !! slot
     real(wp), intent(in) :: stiffness       !! per volume [N/m4]
     real(wp), intent(in) :: per_mass        !! of the body [1/kg]
-    real(wp) :: density
 
-    density = view%materials(view%body%material(k))%density
-    critical = 2*sqrt(stiffness*density/(1 + density*view%body%volume(k)*per_mass))
+    associate (density => density_of(view, k))
+      critical = 2*sqrt(stiffness*density/(1 + density*view%body%volume(k)*per_mass))
+    end associate
   end function critical_damping
+
+  !> The density of a point [kg/m3].
+  pure real(wp) function density_of(view, k) result(density)
+    type(term_view_type), intent(in) :: view
+    integer, intent(in) :: k                !! slot
+    density = view%materials(view%body%material(k))%density
+  end function density_of
 
   !> Force and moment about its centre [N], [N m] that the points of all contacts exert on a rigid
   !> body.
@@ -295,20 +302,21 @@ contains
     type(term_view_type), intent(in) :: view    !! of the body
     real(wp), intent(inout), contiguous :: bound(:)
       !! (n_slots) bound of the stiffness, added to [N/m4]
+    real(wp) :: ratio
     integer :: i, k
 
     if (self%part == of_friction .or. size(self%slots) == 0) return
+    ratio = mass_ratio(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
-      bound(k) = bound(k) + 2*stiffness_of(self, view, k)*max(1.0_wp, mass_ratio(self, view, k))
+      bound(k) = bound(k) + 2*stiffness_of(self, view, k)*max(1.0_wp, ratio*density_of(view, k))
     end do
   end subroutine add_stiffness_bound
 
-  !> The mass of all points that may touch at once over what of the body they move, and turn [-].
-  real(wp) function mass_ratio(self, view, k) result(ratio)
+  !> The volume of all points that may touch at once over the mass that they move, and turn [m3/kg].
+  real(wp) function mass_ratio(self, view) result(ratio)
     type(touch_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
-    integer, intent(in) :: k   !! slot
     real(wp) :: least, arm
 
     ratio = 0.0_wp
@@ -318,8 +326,8 @@ contains
       arm = norm2(obstacle%half) + maxval(self%begins)
       ratio = crowded*surface_of(obstacle, maxval(self%begins))/least**(body%dim - 1)
       ratio = min(ratio, real(size(self%slots), wp))
-      ratio = ratio*view%materials(body%material(k))%density*maxval(body%volume(self%slots)) &
-        & *(obstacle%per_mass + arm**2*obstacle%per_inertia)
+      ratio = ratio*maxval(body%volume(self%slots))*(obstacle%per_mass &
+        & + arm**2*obstacle%per_inertia)
     end associate
   end function mass_ratio
 
@@ -329,16 +337,17 @@ contains
     type(term_view_type), intent(in) :: view    !! of the body
     real(wp), intent(inout), contiguous :: bound(:)
       !! (n_slots) bound of the damping, added to [N s/m4]
-    real(wp) :: part
+    real(wp) :: part, ratio
     integer :: i, k
 
     part = self%rule%damping
     if (self%part == of_friction) part = slope
     if (.not. part > 0.0_wp .or. size(self%slots) == 0) return
+    ratio = mass_ratio(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
       bound(k) = bound(k) + 2*part*critical_damping(view, k, stiffness_of(self, view, k), 0.0_wp) &
-        & *max(1.0_wp, mass_ratio(self, view, k))
+        & *max(1.0_wp, ratio*density_of(view, k))
     end do
   end subroutine add_damping_bound
 

@@ -305,8 +305,8 @@ contains
     where (system%held == 1) v = system%state%v
   end subroutine velocities_now
 
-  !> Kinetic energy of points and rigid bodies, and stored energy [J]: strain energy of the bonds and
-  !> what terms of the force store.
+  !> Kinetic energy of points and rigid bodies, and stored energy [J]: strain energy of the bonds
+  !> and what terms of the force store.
   !> `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
     type(system_type), intent(inout), target :: system

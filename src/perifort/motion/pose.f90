@@ -1,5 +1,5 @@
-!> A rigid body, of the points of a boundary (`motion = 'pin'`) or of a given shape (`&rigid`): where
-!> it is, how it is turned, and how it moves (doc/theory.md, 10 and 17).
+!> A rigid body, of the points of a boundary (`motion = 'pin'`) or of a given shape (`&rigid`):
+!> where it is, how it is turned, and how it moves (doc/theory.md, 10 and 17).
 module pd_motion_pose
   use pd_base_archive, only: archive_type
   use pd_base_eigen, only: solve_symmetric

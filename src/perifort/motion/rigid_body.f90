@@ -1,5 +1,5 @@
-!> A rigid body of a given shape (`&rigid`): what moves it and what it is to the points that touch it
-!> (doc/theory.md, 17). Its pose is that of pins.
+!> A rigid body of a given shape (`&rigid`): what moves it and what it is to the points that touch
+!> it (doc/theory.md, 17). Its pose is that of pins.
 module pd_motion_rigid_body
   use pd_base_archive, only: archive_type
   use pd_base_field, only: field_type, field_values
@@ -27,8 +27,8 @@ module pd_motion_rigid_body
 
   !> A rigid body. Vectors have three components whatever the dimension; those beyond it are 0.
   type :: rigid_body_type
-    type(pose_type) :: pose                  !! velocity and angular momentum are those of the middle
-                                             !! of a step between `move_body` and the next forces
+    type(pose_type) :: pose                  !! between `move_body` and the next forces its velocity
+                                             !! and momentum are those of the middle of the step
     logical :: free(3) = .true.              !! components of the centre that forces move
     integer :: turns = turns_freely
     type(course_type) :: place(3)            !! displacements of the others [m]

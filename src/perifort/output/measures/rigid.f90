@@ -1,5 +1,5 @@
-!> What the history has of a rigid body of a given shape: where it is, how it moves and turns, and the
-!> force and moment of contact on it.
+!> What the history has of a rigid body of a given shape: where it is, how it moves and turns, and
+!> the force and moment of contact on it.
 module pd_output_measures_rigid
   use pd_base_kinds, only: wp
   use pd_base_text, only: line => labelled_line, to_text

@@ -130,7 +130,8 @@ contains
       logical, intent(in) :: is_there
       character(*), intent(in) :: shapes(:)   !! that have it
 
-      if (allocated(error) .or. .not. is_there .or. any(shapes == scene%rigids(number)%shape)) return
+      if (allocated(error) .or. .not. is_there) return
+      if (any(shapes == scene%rigids(number)%shape)) return
       call fault(key, "'"//key//"' of a "//trim(scene%rigids(number)%shape), &
         & 'it has no such key')
     end subroutine leave

@@ -54,8 +54,8 @@ contains
     call keys%key('radius', group%radius, 'm', 'sphere, cylinder: radius', above=0.0_wp)
     call keys%key('length', group%length, 'm', 'cylinder: length', above=0.0_wp)
     call keys%key('edges', group%edges, 'm', 'box: lengths of its edges', default='none')
-    call keys%key('axis', group%axis, '', 'cylinder: direction of its axis; box in 3D: the axis '// &
-      & 'of its angle', default='0.0, 0.0, 1.0')
+    call keys%key('axis', group%axis, '', 'cylinder: direction of its axis; box in 3D: the '// &
+      & 'axis of its angle', default='0.0, 0.0, 1.0')
     call keys%key('angle', group%angle, 'degrees', 'box: by which it is turned about the axis')
     call keys%key('normal', group%normal, '', 'half_space: normal of its surface, out of it', &
       & default='none')
@@ -64,16 +64,15 @@ contains
     call keys%key('inertia', group%inertia, 'kg m2', 'moments of inertia about the axes of the '// &
       & 'shape, the last along that of a cylinder; in 2D three values, of which the last counts', &
       & default='those of the shape')
-    call keys%triple('velocity', group%velocity, 'm/s', 'velocity of the centre at the start, '// &
-      & 'where it is free', '0')
+    call keys%triple('velocity', group%velocity, 'm/s', 'velocity of the centre at the start', '0')
     call keys%triple('displacement', group%displacement, 'm', 'imposed displacement of the '// &
-      & 'centre, 0 to hold it; a number or an expression of t', 'free; half_space: 0', &
+      & 'centre (0 holds it, an expression of t moves it)', 'free; half_space: 0', &
       & group%displacement_text)
     call keys%key('rotation', group%rotation, 'whether it rotates by the moments on it, not at '// &
       & 'all, or with the angular velocity spin', allowed=rigid_rotations, &
       & default="'free'; half_space: 'held'")
-    call keys%triple('spin', group%spin, 'rad/s', 'angular velocity: at the start, or imposed '// &
-      & 'and then also an expression of t', '0', group%spin_text)
+    call keys%triple('spin', group%spin, 'rad/s', 'angular velocity at the start, or imposed '// &
+      & '(then also an expression of t)', '0', group%spin_text)
   end subroutine visit
 
 end module pd_scene_groups_rigid
