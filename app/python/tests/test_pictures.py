@@ -14,7 +14,7 @@ from perifort import pictures
 from perifort.pictures import cells, colours, units
 from perifort.pictures.fields import Clip, View, figure_of, names_of, values_of, worth_drawing
 from perifort.pictures.layout import Panel, lay_out
-from perifort.pictures.rigid import RigidBody
+from perifort.pictures.rigid import RigidBody, hull
 
 from .synthetic import lattice, run_history, write_results
 
@@ -63,6 +63,13 @@ class TestRigidBodies(unittest.TestCase):
                         rotation_z=np.pi / 2)
         np.testing.assert_allclose(rod.gap(np.array([[0.0, 3.0, 0.0], [4.0, 0.0, 3.0],
                                                      [1.5, 0.0, 0.0]])), [1.0, 4.0, 0.5])
+        for body in (ball, box, rod):
+            np.testing.assert_allclose(body.gap(body.rim()), 0.0, atol=1e-14)
+
+    def test_hull(self):
+        inside = np.array([[0.1, 0.2], [-0.3, 0.1], [0.0, 1.0], [0.5, 0.0]])
+        square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        np.testing.assert_allclose(hull(np.concatenate([inside, square])), square)
 
 
 class TestColours(unittest.TestCase):

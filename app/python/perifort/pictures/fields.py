@@ -21,7 +21,7 @@ from ..results import Results
 from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing_of
 from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
 from .layout import FONT, Panel, Place, lay_out, write_caption
-from .rigid import draw_outlines, rigid_bodies
+from .rigid import draw_outlines, draw_silhouettes, rigid_bodies
 from .units import Scale, number, scale_of, state_text, words
 
 Array = npt.NDArray[Any]
@@ -510,6 +510,7 @@ def draw_surface(axes: Axes, view: View, name: str, output: int, clip: Clip | No
         # Edges in the colour of the face close the hairlines between faces
         axes.add_collection(PolyCollection(flat[order], facecolors=rgba[order],
                                            edgecolors=rgba[order], linewidths=0.3, rasterized=True))
+    draw_silhouettes(axes, rigid_bodies(results, output, view.scale), camera.flat)
     limits = surface_frame(view, output, camera)
     axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
     axes.set_axis_off()

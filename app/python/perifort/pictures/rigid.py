@@ -1,7 +1,7 @@
 """Outlines of rigid bodies: where their signed distance is zero in the plane of a picture."""
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -88,12 +88,55 @@ class RigidBody:
         return np.asarray(outside + np.minimum(beyond.max(axis=-1), 0.0))
 
 
+    def rim(self) -> Array:
+        """Places (n, 3) on the surface whose convex hull is the body; of a half-space none."""
+        angle = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+        ring = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+        if self.shape == "sphere":
+            height = np.linspace(-1.0, 1.0, 33)[:, None, None]
+            own = self.radius * (np.sqrt(1 - height**2) * ring + height * np.eye(3)[2])
+        elif self.shape == "cylinder":
+            own = self.radius * ring + np.array([[[-0.5]], [[0.5]]]) * self.length * np.eye(3)[2]
+        elif self.shape == "box":
+            own = 0.5 * self.edges * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)
+        else:
+            own = np.zeros((0, 3))
+        return np.asarray(self.centre + own.reshape(-1, 3) @ self.frame.T)
+
+
+def hull(places: Array) -> Array:
+    """The corners (m, 2) of the convex hull of places (n, 2), in their order around it."""
+    def half(ordered: Array) -> list[Array]:
+        chain: list[Array] = []
+        for place in ordered:
+            while len(chain) > 1:
+                a, b = chain[-1] - chain[-2], place - chain[-1]
+                if a[0] * b[1] - a[1] * b[0] > 0.0:
+                    break
+                chain.pop()
+            chain.append(place)
+        return chain[:-1]
+
+    ordered = places[np.lexsort((places[:, 1], places[:, 0]))]
+    return np.array(half(ordered) + half(ordered[::-1]))
+
+
 def rigid_bodies(results: Results, output: int, scale: float = 1.0) -> list[RigidBody]:
     """All rigid bodies of a run as they are at an output."""
     if "&rigid" not in results.scene:
         return []
     return [RigidBody(results, group, output, scale)
             for group in Scene.parse(results.scene, check=False).all("rigid")]
+
+
+def draw_silhouettes(axes: Axes, bodies: Sequence[RigidBody],
+                     flat: Callable[[Array], Array]) -> None:
+    """The outlines of rigid bodies in a picture of bodies in 3D: `flat` is its projection."""
+    for body in bodies:
+        rim = body.rim()
+        if len(rim):
+            axes.fill(*hull(flat(rim)).T, facecolor=(0.5, 0.5, 0.5, 0.25), edgecolor="0.25",
+                      linewidth=0.8)
 
 
 def draw_outlines(axes: Axes, bodies: Sequence[RigidBody], shown: Sequence[int],
