@@ -155,11 +155,12 @@ def picture(case, results):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
     from plot import save
-    figure, axes = plt.subplots(1, 4, figsize=(15, 3.8))
+    figure, axes = plt.subplots(2, 2, figsize=(11, 9))
+    axes = axes.ravel()
     low = results.points[:, 2] == results.points[:, 2].min()
     for axis, output in zip(axes, (2, results.outputs - 1)):
-        y = 1e3 * (results.points + results.field("displacement", output))[low]
-        drawn = axis.scatter(y[:, 0], y[:, 1], c=results.field("damage", output)[low], s=1.2, marker="s",
+        y = 1e3 * results.points[low]
+        drawn = axis.scatter(y[:, 0], y[:, 1], c=results.field("damage", output)[low], s=4.5, marker="s",
                              cmap="magma_r", vmin=0, vmax=1, linewidths=0)
         axis.set(aspect="equal", xlim=(-40, 40), ylim=(-40, 40), xlabel="x [mm]", ylabel="y [mm]",
                  title=f"lower face after {1e6 * results.times[output]:.0f} us")
