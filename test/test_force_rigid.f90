@@ -354,7 +354,8 @@ contains
     do i = 1, 2
       diary = diary_type()
       call run(block//"&rigid name = 'light' "//trim(shapes(i))//' centre = 0.3e-3, 0.5e-3, '// &
-        & '3e-3 density = 20 velocity_z = -30 /'//line//"&contact between = 'block', 'light' /"//line// &
+        & '3e-3 density = 20 velocity_z = -30 /'//line// &
+        & "&contact between = 'block', 'light' /"//line// &
         & '&time duration = 1e-4 /', set_up, error, diary)
       if (allocated(error)) return
       p0 = [0.0_wp, 0.0_wp, -30*masses(i)]
