@@ -59,7 +59,7 @@ contains
     call keys%key('angle', group%angle, 'degrees', 'box: by which it is turned about the axis')
     call keys%key('normal', group%normal, '', 'half_space: normal of its surface, out of it', &
       & default='none')
-    call keys%key('mass', group%mass, 'kg', 'mass', above=0.0_wp)
+    call keys%key('mass', group%mass, 'kg', 'mass of the body', above=0.0_wp)
     call keys%key('density', group%density, 'kg/m3', 'instead of mass: density', above=0.0_wp)
     call keys%key('inertia', group%inertia, 'kg m2', 'moments of inertia about the axes of the '// &
       & 'shape, the last along that of a cylinder; in 2D three values, of which the last counts', &
