@@ -40,6 +40,7 @@ contains
       & new_unittest('conditions that are expressions of t', test_expressions), &
       & new_unittest('pins in motion and in equilibrium', test_pins), &
       & new_unittest('contact with friction', test_contact), &
+      & new_unittest('rigid bodies that spin and are moved', test_rigid), &
       & new_unittest('long: a relaxation with a growing crack', test_relaxation), &
       & new_unittest('long: growth by events is the same in pieces', test_events), &
       & new_unittest('relaxations with a change of method', test_ways_to_rest), &
@@ -612,6 +613,41 @@ contains
     call expect_true(error, pieces > 10, 'it is not cut')
     call expect_same_results(error, 'whole', 'pieces', 6)
   end subroutine test_contact
+
+  !> A free disc and a wall that is moved hit a plate from two sides, cut after every step.
+  subroutine test_rigid(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: pieces, i
+
+    call plate(scene)
+    deallocate (scene%cracks, scene%boundaries, scene%contacts, scene%initial, scene%rigids)
+    allocate (scene%cracks(0), scene%boundaries(0), scene%contacts(2), scene%initial(0), &
+      & scene%rigids(2))
+    scene%rigids%name = [character(4) :: 'disc', 'wall']
+    scene%rigids%shape = [character(10) :: 'sphere', 'half_space']
+    scene%rigids(1)%centre(:2) = [5.0_wp, 15.3_wp]*spacing
+    scene%rigids(1)%radius = 3*spacing
+    scene%rigids(1)%density = 3000.0_wp
+    scene%rigids(1)%velocity(:2) = [200.0_wp, -500.0_wp]
+    scene%rigids(1)%spin(3) = 1.0e5_wp
+    scene%rigids(2)%centre(:2) = 0.0_wp
+    scene%rigids(2)%normal(:2) = [0.0_wp, 1.0_wp]
+    scene%rigids(2)%displacement_text(2) = '20*t + 1e7*t^2'
+    do i = 1, 2
+      allocate (scene%contacts(i)%between(2))
+      scene%contacts(i)%between(:) = [character(4) :: 'box', scene%rigids(i)%name]
+      scene%contacts(i)%friction = 0.3_wp
+    end do
+    scene%contacts(2)%restitution = 0.7_wp
+    call run(scene, 'whole', fault, threads=2)
+    call accept(error, fault)
+    if (allocated(error)) return
+    call run_in_pieces(scene, 'pieces', 1, pieces, error)
+    call expect_true(error, pieces > 10, 'it is not cut')
+    call expect_same_results(error, 'whole', 'pieces', 6)
+  end subroutine test_rigid
 
   !> A plate that breaks beside a pin, and one that is bent about pins, cut after every iteration.
   subroutine test_pins(error)

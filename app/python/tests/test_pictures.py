@@ -14,6 +14,7 @@ from perifort import pictures
 from perifort.pictures import cells, colours, units
 from perifort.pictures.fields import Clip, View, figure_of, names_of, values_of, worth_drawing
 from perifort.pictures.layout import Panel, lay_out
+from perifort.pictures.rigid import RigidBody, hull
 
 from .synthetic import lattice, run_history, write_results
 
@@ -37,6 +38,38 @@ class TestUnits(unittest.TestCase):
     def test_values_that_are_missing(self):
         self.assertEqual(units.scale_of("Pa", [np.nan, 2e6, np.inf]).text, "MPa")
         self.assertEqual(units.scale_of("m", []).text, "m")
+
+
+class TestRigidBodies(unittest.TestCase):
+    def body(self, group, **history):
+        columns = {"time": np.array([0.0, 1.0])}
+        columns.update({f"r_{name}": np.array([0.0, value]) for name, value in history.items()})
+        results = mock.Mock(dimension=3, history=columns, times=[0.0, 1.0])
+        scene = perifort.Scene.parse(f"&rigid name = 'r' {group} /", check=False)
+        return RigidBody(results, scene.all("rigid")[0], 1, 2.0)
+
+    def test_distances(self):
+        ball = self.body("shape = 'sphere' centre = 1, 0, 0 radius = 2", displacement_x=0.5)
+        # Displacements are drawn twice as large
+        np.testing.assert_allclose(ball.gap(np.array([[2.0, 0.0, 0.0], [2.0, 3.0, 4.0]])),
+                                   [-2.0, 3.0])
+        wall = self.body("shape = 'half_space' centre = 0, 0, 1 normal = 0, 3, 4")
+        np.testing.assert_allclose(wall.gap(np.array([0.0, 3.0, 5.0])), 5.0)
+        box = self.body("shape = 'box' centre = 0, 0, 0 edges = 2, 4, 6 angle = 90")
+        np.testing.assert_allclose(box.gap(np.array([[5.0, 0.0, 0.0], [0.0, 5.0, 0.0],
+                                                     [5.0, 5.0, 3.0], [1.9, 0.0, 0.0]])),
+                                   [3.0, 4.0, 5.0, -0.1])
+        rod = self.body("shape = 'cylinder' centre = 0, 0, 0 axis = 1, 0, 0 radius = 1 length = 4",
+                        rotation_z=np.pi / 2)
+        np.testing.assert_allclose(rod.gap(np.array([[0.0, 3.0, 0.0], [4.0, 0.0, 3.0],
+                                                     [1.5, 0.0, 0.0]])), [1.0, 4.0, 0.5])
+        for body in (ball, box, rod):
+            np.testing.assert_allclose(body.gap(body.rim()), 0.0, atol=1e-14)
+
+    def test_hull(self):
+        inside = np.array([[0.1, 0.2], [-0.3, 0.1], [0.0, 1.0], [0.5, 0.0]])
+        square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        np.testing.assert_allclose(hull(np.concatenate([inside, square])), square)
 
 
 class TestColours(unittest.TestCase):

@@ -329,11 +329,15 @@ contains
   !> Where and when a value is not finite.
   function not_finite_text(body, slot, t) result(text)
     type(body_type), intent(in) :: body  !! the points
-    integer(i4), intent(in) :: slot      !! of the point
+    integer(i4), intent(in) :: slot      !! of the point; 0: it belongs to none
     real(wp), intent(in) :: t            !! time [s]
     character(:), allocatable :: text
     integer :: c
 
+    if (slot == 0) then
+      text = 'has no finite value at t = '//to_text(t)//' s'
+      return
+    end if
     text = 'has no finite value at point '//to_text(int(body%point(slot)))//' at ('
     do c = 1, body%dim
       if (c > 1) text = text//', '

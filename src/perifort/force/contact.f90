@@ -22,6 +22,7 @@ module pd_force_contact
   implicit none (type, external)
   private
   public :: contact_type, contact_rule_type, new_contact, of_normal_force, of_friction
+  public :: normal_force, slope
 
   !> What a term of contact is: pushing along the line between points, or friction across it.
   integer, parameter :: of_normal_force = 1, of_friction = 2
@@ -341,7 +342,7 @@ contains
 
   !> The force density by which two points push: never an attraction [N/m3].
   pure real(wp) function normal_force(rule, stiffness, overlap, speed, critical) result(push)
-    type(contact_rule_type), intent(in) :: rule
+    type(contact_rule_type), intent(in) :: rule  !! its restitution or damping
     real(wp), intent(in) :: stiffness   !! of the pair, per volume [N/m4]
     real(wp), intent(in) :: overlap     !! of both, positive [m]
     real(wp), intent(in) :: speed       !! at which they separate [m/s]

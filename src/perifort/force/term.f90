@@ -18,6 +18,7 @@ module pd_force_term
   use pd_body_body, only: body_type
   use pd_law_material, only: material_type
   use pd_family_family, only: family_type
+  use pd_force_obstacle, only: obstacle_type
   implicit none (type, external)
   private
   public :: force_term_type, term_list_type, term_view_type
@@ -39,6 +40,8 @@ module pd_force_term
                                                     !! integrator keeps them: forward_backward and
                                                     !! velocity_verlet half a step before `time`;
                                                     !! 0 in static equilibrium
+    type(obstacle_type), pointer :: obstacles(:) => null()
+                                                    !! surfaces of rigid bodies
     real(wp) :: time = 0.0_wp                       !! of the displacements [s]
     integer :: step = 0                             !! complete steps (iterations) then
   end type term_view_type
@@ -51,6 +54,7 @@ module pd_force_term
                                          !! energy; what others do not store counts as dissipated
     integer :: tangent = no_tangent      !! `no_tangent`, `has_tangent` or `no_stiffness`
     logical :: summed_apart = .false.    !! whoever holds it sums the work of its few points
+    logical :: has_partner = .false.     !! it acts between points and what is no point
   contains
     procedure(add_force_interface), deferred :: add_force
     procedure(add_energy_interface), deferred :: add_energy
@@ -61,6 +65,7 @@ module pd_force_term
     procedure :: add_tangent => no_change
     procedure :: begin => begin_nothing
     procedure :: advance => begin_nothing
+    procedure :: subtract_partner => no_partner
   end type force_term_type
 
   abstract interface
@@ -190,6 +195,17 @@ contains
 
     if (.not. associated(view%u)) call misused(self)
   end subroutine begin_nothing
+
+  !> Take from the displacements `moved` since the last instant [m], (n_slots, dim), those of what
+  !> the points push against, for a term that `has_partner`: the rest is what its force does work on
+  !> without the work on the partner. A term that has one has a procedure of its own.
+  subroutine no_partner(self, view, moved)
+    class(force_term_type), intent(in) :: self  !! the term
+    type(term_view_type), intent(in) :: view    !! the instant
+    real(wp), intent(inout) :: moved(:, :)      !! (n_slots, dim) [m]
+
+    if (size(moved) /= size(view%u) .or. self%has_partner) call misused(self)
+  end subroutine no_partner
 
   !> A call that contradicts what a term says of itself.
   subroutine misused(self)
@@ -373,7 +389,7 @@ contains
     type(term_view_type), intent(in) :: view        !! the instant
     real(wp), intent(inout) :: supplied             !! [J]
     real(wp), intent(inout) :: lost                 !! [J]
-    real(wp), allocatable :: force(:, :), density(:)
+    real(wp), allocatable :: force(:, :), density(:), moved(:, :)
     real(wp) :: work, stored
     integer :: i
 
@@ -392,7 +408,13 @@ contains
           stored = inner(view%body%order, density, view%body%volume)
         end if
         if (allocated(item%last_u)) then
-          density = sum((item%last_force + force)/2*(view%u - item%last_u), 2)
+          if (item%term%has_partner) then
+            moved = view%u - item%last_u
+            call item%term%subtract_partner(view, moved)
+            density = sum((item%last_force + force)/2*moved, 2)
+          else
+            density = sum((item%last_force + force)/2*(view%u - item%last_u), 2)
+          end if
           work = inner(view%body%order, density, view%body%volume)
           if (item%term%external) then
             supplied = supplied + work

@@ -11,6 +11,7 @@ module pd_motion_account
   use pd_motion_heating, only: apply_factors, apply_rate, is_timed
   use pd_motion_loads, only: acts_along, density_of, load_of, load_type, number_of_loads
   use pd_motion_pose, only: moments_about
+  use pd_motion_rigid_body, only: kinetic_of
   use pd_motion_system, only: add_loads, apply_to_held, find_loaded, inverse_density, system_type, &
     & view_of
   implicit none (type, external)
@@ -24,6 +25,7 @@ module pd_motion_account
   type :: energies_type
     real(wp) :: kinetic = 0.0_wp
     real(wp) :: strain = 0.0_wp
+    real(wp) :: rigid = 0.0_wp     !! the part of the kinetic energy that rigid bodies have
   end type energies_type
 
 contains
@@ -303,7 +305,8 @@ contains
     where (system%held == 1) v = system%state%v
   end subroutine velocities_now
 
-  !> Kinetic and stored energy [J]: strain energy of the bonds and what terms of the force store.
+  !> Kinetic energy of points and rigid bodies, and stored energy [J]: strain energy of the bonds
+  !> and what terms of the force store.
   !> `v` are the velocities at the instant of the displacements.
   subroutine energies_of(system, v, energies)
     type(system_type), intent(inout), target :: system
@@ -325,6 +328,10 @@ contains
       end do
     end do
     energies%kinetic = inner(system%body%order, mass, density)/2
+    do k = 1, size(system%rigid_bodies)
+      energies%rigid = energies%rigid + sum(kinetic_of(system%rigid_bodies(k), system%time))
+    end do
+    energies%kinetic = energies%kinetic + energies%rigid
   end subroutine energies_of
 
 end module pd_motion_account

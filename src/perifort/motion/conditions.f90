@@ -404,7 +404,8 @@ contains
     integer :: m
 
     do m = 1, size(motions)
-      if (allocated(motions(m)%pose)) call keep_pose(archive, to_text(m), motions(m)%pose)
+      if (allocated(motions(m)%pose)) call keep_pose(archive, &
+        & 'pin of boundary '//to_text(m), motions(m)%pose)
     end do
   end subroutine keep_poses
 
@@ -413,7 +414,7 @@ contains
     character(*), intent(in) :: group  !! name of the group, without `&`
     integer, intent(in) :: number      !! which group of this name
     character(*), intent(in) :: key    !! that has the expression
-    integer(i4), intent(in) :: slot    !! of the point
+    integer(i4), intent(in) :: slot    !! of the point; 0: it belongs to none
     real(wp), intent(in) :: t          !! time [s]
     type(condition_fault), allocatable, intent(inout) :: fault  !! the first one stays
 

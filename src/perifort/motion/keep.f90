@@ -9,6 +9,7 @@ module pd_motion_keep
   use pd_motion_conditions, only: keep_paths, keep_poses
   use pd_motion_heating, only: keep_heating
   use pd_motion_memory, only: keep_memory
+  use pd_motion_rigid_body, only: keep_body
   use pd_motion_system, only: system_type
   implicit none (type, external)
   private
@@ -55,6 +56,9 @@ contains
       & call keep_heating(archive, system%heating, system%model%expansion)
     call keep_paths(archive, system%motions)
     call keep_poses(archive, system%motions)
+    do m = 1, size(system%rigid_bodies)
+      call keep_body(archive, m, system%rigid_bodies(m), system%obstacles(m))
+    end do
     call system%terms%keep(archive)
     call keep_memory(archive, system%memory)
   end subroutine keep_system

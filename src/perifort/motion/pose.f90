@@ -1,5 +1,5 @@
-!> A boundary whose points move as one rigid body (`motion = 'pin'`): where it is, how it is turned,
-!> and how it moves (doc/theory.md, 10).
+!> A rigid body, of the points of a boundary (`motion = 'pin'`) or of a given shape (`&rigid`):
+!> where it is, how it is turned, and how it moves (doc/theory.md, 10 and 17).
 module pd_motion_pose
   use pd_base_archive, only: archive_type
   use pd_base_eigen, only: solve_symmetric
@@ -11,6 +11,7 @@ module pd_motion_pose
   private
   public :: pose_type, new_pose, arm_of, displacement_of, spin_of, spin_rate_of, rotation_of
   public :: fit_pose, moments_about, drift, keep_pose
+  public :: new_shape_pose, turn_on, turned_by, momentum_of, rotation_between
 
   !> Turns that a fit takes at most; each doubles the digits.
   integer, parameter :: most_turns = 60
@@ -71,11 +72,39 @@ contains
       & totals(6), totals(5), totals(3)], [3, 3])
   end subroutine new_pose
 
+  !> The rigid body of a shape without points, undisplaced and at rest.
+  pure subroutine new_shape_pose(dim, centre, mass, inertia, axes, pose)
+    integer, intent(in) :: dim             !! of the scene
+    real(wp), intent(in) :: centre(3)      !! of mass [m]
+    real(wp), intent(in) :: mass           !! [kg]
+    real(wp), intent(in) :: inertia(3)     !! principal moments; in 2D the third counts [kg m2]
+    real(wp), intent(in) :: axes(3, 3)     !! their axes as columns
+    type(pose_type), intent(out) :: pose
+    real(wp) :: spread
+    integer :: i, j
+
+    pose%dim = dim
+    pose%centre = centre
+    pose%mass = mass
+    if (dim == 2) then
+      pose%spread(1, 1) = inertia(3)/2
+      pose%spread(2, 2) = inertia(3)/2
+    else if (dim == 3) then
+      do i = 1, 3
+        spread = sum(inertia)/2 - inertia(i)
+        do j = 1, 3
+          pose%spread(:, j) = pose%spread(:, j) + spread*axes(:, i)*axes(j, i)
+        end do
+      end do
+    end if
+    allocate (pose%arms(3, 0), pose%masses(0))
+  end subroutine new_shape_pose
+
   !> What turning has added to an arm: (R - 1) r, without differences of large numbers [m].
   pure function turned_by(turn, r) result(change)
     real(wp), intent(in) :: turn(4)  !! unit quaternion
     real(wp), intent(in) :: r(3)     !! undeformed arm [m]
-    real(wp) :: change(3), across(3)
+    real(wp) :: change(3), across(3) !! [m]
 
     across = cross(turn(2:), r)
     change = 2*(turn(1)*across + cross(turn(2:), across))
@@ -150,10 +179,36 @@ contains
     spin = back + turned_by(turn, back)
   end function per_inertia
 
+  !> The angular momentum about the centre that an angular velocity makes [kg m2/s].
+  pure function momentum_of(pose, spin) result(momentum)
+    type(pose_type), intent(in) :: pose
+    real(wp), intent(in) :: spin(3)    !! [rad/s]
+    real(wp) :: momentum(3), back(3), trace
+
+    momentum = 0.0_wp
+    if (pose%dim == 1) return
+    trace = pose%spread(1, 1) + pose%spread(2, 2) + pose%spread(3, 3)
+    back = spin + turned_by([pose%turn(1), -pose%turn(2:)], spin)
+    back = trace*back - matmul(pose%spread, back)
+    momentum = back + turned_by(pose%turn, back)
+  end function momentum_of
+
+  !> The rotation that brings one turn to another, as a vector: its axis times its angle [rad], of
+  !> at most half a turn.
+  pure function rotation_between(from, to) result(rotation)
+    real(wp), intent(in) :: from(4), to(4)  !! unit quaternions
+    real(wp) :: rotation(3), part, length
+
+    part = dot_product(from, to)
+    rotation = from(1)*to(2:) - to(1)*from(2:) - cross(to(2:), from(2:))
+    length = norm2(rotation)
+    if (length > 0.0_wp) rotation = rotation/length*2*atan2(sign(length, part), abs(part))
+  end function rotation_between
+
   !> Turn on by `angle` [rad] about its direction.
   pure subroutine turn_on(angle, turn)
-    real(wp), intent(in) :: angle(3)
-    real(wp), intent(inout) :: turn(4)
+    real(wp), intent(in) :: angle(3)    !! axis times angle [rad]
+    real(wp), intent(inout) :: turn(4)  !! unit quaternion
     real(wp) :: half, by(4)
 
     half = norm2(angle)/2
@@ -242,14 +297,14 @@ contains
   end subroutine drift
 
   !> Keep where the body is and how it moves, or put it back.
-  subroutine keep_pose(archive, number, pose)
+  subroutine keep_pose(archive, name, pose)
     class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
-    character(*), intent(in) :: number             !! of the boundary
+    character(*), intent(in) :: name               !! what is kept
     type(pose_type), intent(inout) :: pose         !! set where the archive reads
     real(wp), allocatable :: values(:)
 
     values = [pose%place, pose%turn, pose%velocity, pose%momentum, pose%force, pose%torque]
-    call archive%keep('pin of boundary '//number, values)
+    call archive%keep(name, values)
     pose%place = values(1:3)
     pose%turn = values(4:7)
     pose%velocity = values(8:10)

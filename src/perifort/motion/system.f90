@@ -11,6 +11,7 @@ module pd_motion_system
   use pd_force_generic_pass, only: renew_pulls
   use pd_force_forces, only: internal_force, whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of, p_of
+  use pd_force_obstacle, only: obstacle_type
   use pd_force_reference, only: point_dilatation, point_force
   use pd_force_term, only: term_list_type, term_view_type
   use pd_force_workspace, only: workspace_type
@@ -21,6 +22,7 @@ module pd_motion_system
   use pd_motion_heating, only: heating_type, heat, heating_fault
   use pd_motion_memory, only: memory_type
   use pd_motion_pose, only: fit_pose, moments_about, new_pose
+  use pd_motion_rigid_body, only: rigid_body_type
   use pd_motion_energy_watch, only: watch_type
   implicit none (type, external)
   private
@@ -46,6 +48,8 @@ module pd_motion_system
     type(state_type) :: state
     type(motion_type), allocatable :: motions(:)
     type(term_list_type) :: terms               !! what acts beside the bonds: loads first
+    type(rigid_body_type), allocatable :: rigid_bodies(:)  !! of given shapes
+    type(obstacle_type), allocatable :: obstacles(:)       !! their surfaces, as the terms see them
     type(heating_type) :: heating               !! temperature changes that vary in time
     integer(i1), allocatable :: held(:, :)      !! 1 where a component is constrained (n_slots, dim)
     integer(i1), allocatable :: strained(:)     !! marks of the last pass
@@ -92,6 +96,8 @@ contains
 
     n = system%body%n_slots
     if (.not. allocated(system%motions)) allocate (system%motions(0))
+    if (.not. allocated(system%rigid_bodies)) allocate (system%rigid_bodies(0))
+    if (.not. allocated(system%obstacles)) allocate (system%obstacles(0))
     allocate (system%state%force(n, system%body%dim), source=0.0_wp)
     allocate (system%state%p(merge(n, 0, system%model%dilatation)), source=0.0_wp)
     allocate (system%strained(merge(n, 0, system%model%breaking)), source=0_i1)
@@ -122,6 +128,7 @@ contains
     view%u => system%state%u
     if (present(u)) view%u => u
     view%v => system%state%v
+    if (allocated(system%obstacles)) view%obstacles => system%obstacles
     view%time = t
     view%step = max(0, system%memory%step)
   end subroutine view_of

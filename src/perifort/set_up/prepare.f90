@@ -38,6 +38,7 @@ module pd_set_up_prepare
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
   use pd_set_up_plan, only: plan_type, make_plan
+  use pd_set_up_rigid_bodies, only: check_within, rigid_bodies_of_scene
   use pd_set_up_toughness_toughness, only: set_critical_by_lattice
   implicit none (type, external)
   private
@@ -188,12 +189,15 @@ contains
 
       call timer%start('time step')
       system%break_late = scene%time%breaking == 'after_forces'
+      call rigid_bodies_of_scene(scene, system)
       call start_system(system)
       if (allocated(system%fault)) then
         call explain_condition(system, status_input, error)
         call place_fault(error, scene, 'scene', 1, '')
         return
       end if
+      call check_within(scene, system, error)
+      if (allocated(error)) return
       call make_plan(scene, system, set_up%plan, error)
       if (allocated(error)) return
       call check_bounds(scene, system, set_up%plan, error)

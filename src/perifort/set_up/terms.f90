@@ -14,6 +14,7 @@ module pd_set_up_terms
   use pd_motion_curve, only: constant_curve, ramp
   use pd_scene_content_types, only: is_set, scene_type
   use pd_set_up_loads, only: volume_of
+  use pd_set_up_rigid_bodies, only: add_touches
   implicit none (type, external)
   private
   public :: gravity_of_scene, add_springs_of_scene, add_dashpots_of_scene, leave_uncorrected
@@ -110,7 +111,8 @@ contains
   end function share
 
   !> On which side of a `&contact` each body is: bodies of different sides are never bonded; 0 where
-  !> it is not named. With 'all' every body is of one side.
+  !> it is not named. With 'all' every body is of one side; a body that is named beside a rigid one
+  !> alone meets no other, and is of none.
   function sides_of_contact(scene, number) result(side)
     type(scene_type), intent(in) :: scene  !! a checked scene
     integer, intent(in) :: number          !! of the `&contact`
@@ -128,6 +130,7 @@ contains
           side(b) = findloc(contact%between, scene%bodies(b)%name, dim=1)
         end if
       end do
+      if (size(contact%between) > 1 .and. count(side > 0) < 2) side = 0
     end associate
   end function sides_of_contact
 
@@ -154,6 +157,8 @@ contains
         if (is_set(group%restitution)) rule%returned = group%restitution**2
         rule%damping = 0.0_wp
         if (is_set(group%damping)) rule%damping = group%damping
+        if (size(scene%rigids) > 0) call add_touches(scene, i, body, delta, rule, terms)
+        if (all(rule%side == 0)) cycle
         call new_contact(body, delta, rule, of_normal_force, contact)
         call terms%add(contact)
         if (.not. rule%friction > 0.0_wp) cycle

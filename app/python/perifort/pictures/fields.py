@@ -22,6 +22,7 @@ from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing
 from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
 from .elements import cut_of, outer_faces, polygons
 from .layout import FONT, Panel, Place, lay_out, write_caption
+from .rigid import draw_outlines, draw_silhouettes, rigid_bodies
 from .units import Scale, number, scale_of, state_text, words
 
 Array = npt.NDArray[Any]
@@ -267,6 +268,7 @@ def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool | Ax
         _draw_cells(axes, [(part, positions[part.points], values[part.points])
                            for part in view.parts if part.mesh is None], colours, scale.factor)
         _label(axes, "xy", frame_of(view, output))
+        draw_outlines(axes, rigid_bodies(results, output, view.scale), (0, 1))
         if bar:
             add_bar(axes, colours, scale.factor, scale.label(label_of(results, name)), bar)
     if title:
@@ -540,6 +542,7 @@ def draw_surface(axes: Axes, view: View, name: str, output: int, clip: Clip | No
         # Edges in the colour of the face close the hairlines between faces
         axes.add_collection(PolyCollection(flat[order], facecolors=rgba[order],
                                            edgecolors=rgba[order], linewidths=0.3, rasterized=True))
+    draw_silhouettes(axes, rigid_bodies(results, output, view.scale), camera.flat)
     limits = surface_frame(view, output, camera)
     axes.set(xlim=limits[0], ylim=limits[1], aspect="equal")
     axes.set_axis_off()
@@ -593,6 +596,7 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
     _draw_cells(axes, parts, colours, scale.factor)
     limits = cut_frame(view, output, clip)
     unit = _label(axes, "".join("xyz"[c] for c in shown), limits)
+    draw_outlines(axes, rigid_bodies(results, output, view.scale), shown, plane)
     plane = 0.0 if abs(plane) < 1e-6 * view.spacing else plane
     axes.set_title(f"cut at {'xyz'[clip.axis]} = {number(plane * unit.factor)} {unit.text}",
                    fontsize=FONT)

@@ -13,6 +13,7 @@ module pd_motion_explicit_integrators
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_pins, only: gather_pins, move_pins
+  use pd_motion_rigid_bodies, only: gather_rigid_bodies, move_rigid_bodies
   use pd_motion_watch_fault, only: explain_fault, faulty_slot, points_at_once, stays_within
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_energy_watch, only: watch_type
@@ -79,6 +80,7 @@ contains
         instant%kick = 0.0_wp
         if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
         call gather_pins(system, instant%time, instant%kick)
+        call gather_rigid_bodies(system, instant%time, instant%kick)
         call account(system, instant%time)
         call system%watch%supplied(system%external_work)
         call observer%observe(system, instant, error)
@@ -90,6 +92,7 @@ contains
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, squares, sound)
         call move_pins(system, instant%time, dt)
+        call move_rigid_bodies(system, instant%time, dt)
       else
         call advance(system, integrator, instant%time, dt, start)
         sound = faulty_slot(system, system%state%v, dt, squares) == 0

@@ -7,6 +7,7 @@ module pd_output_measures_table
   use pd_output_measures_j_integral, only: add_j_integrals
   use pd_output_measures_measure, only: measure_list_type
   use pd_output_measures_probe, only: add_probes
+  use pd_output_measures_rigid, only: add_rigids
   use pd_output_measures_section, only: add_sections
   use pd_output_measures_tip, only: add_tips
   use pd_scene_content_types, only: scene_type
@@ -24,6 +25,7 @@ contains
 
     allocate (measures%items(0))
     call add_contacts(scene, measures)
+    call add_rigids(scene, measures)
     call add_fragments(scene, measures)
     call add_boundaries(scene, measures)
     call add_probes(scene, table, measures)

@@ -8,6 +8,7 @@ module pd_scene_content_check
   use pd_scene_content_check_contact, only: check_contact
   use pd_scene_content_check_bodies, only: check_body, check_shape, check_side, &
     & check_material, check_crack
+  use pd_scene_content_check_rigid, only: check_rigid
   use pd_scene_content_check_measures, only: check_measures
   use pd_scene_content_defaults, only: fill_defaults
   use pd_scene_content_expressions, only: at_the_start, check_definitions, check_expression
@@ -100,6 +101,10 @@ contains
     end do
     do i = 1, size(scene%loads)
       call check_load(scene, i, error, source)
+      if (allocated(error)) return
+    end do
+    do i = 1, size(scene%rigids)
+      call check_rigid(scene, i, error, source)
       if (allocated(error)) return
     end do
     do i = 1, size(scene%contacts)

@@ -21,8 +21,9 @@ contains
 
     associate (contact => scene%contacts(number))
       if (.not. allocated(contact%between)) allocate (contact%between(0))
-      allocate (bodies(size(scene%bodies)))
-      bodies(:) = scene%bodies%name
+      allocate (bodies(size(scene%bodies) + size(scene%rigids)))
+      bodies(:size(scene%bodies)) = scene%bodies%name
+      bodies(size(scene%bodies) + 1:) = scene%rigids%name
       if (scene%time%method == 'relaxation') then
         call rule_fault(error, 'contact', number, '', '&contact is not for relaxation', &
           & "contact begins and ends, so that the forces have no tangent: use &time method = "// &
@@ -44,13 +45,38 @@ contains
           & "expected 'all' alone", source)
       end if
       if (allocated(error)) return
-      call check_known(contact%within, bodies, 'body', 'contact', number, 'within', error, source)
+      call check_known(contact%within, bodies(:size(scene%bodies)), 'body', 'contact', number, &
+        & 'within', error, source)
       do i = 1, size(contact%between)
         if (allocated(error)) return
         if (contact%between(i) /= 'all') call check_known(contact%between(i), bodies, 'body', &
           & 'contact', number, 'between', error, source)
       end do
+      if (allocated(error)) return
+      call check_rigid_ones()
     end associate
+
+  contains
+
+    !> One rigid body at most, and a body that touches it.
+    subroutine check_rigid_ones()
+      character(:), allocatable :: first
+      integer :: i, rigid
+
+      rigid = 0
+      first = ''
+      do i = 1, size(scene%contacts(number)%between)
+        associate (name => scene%contacts(number)%between(i))
+          if (all(scene%rigids%name /= name)) cycle
+          rigid = rigid + 1
+          if (rigid == 1) first = trim(name)
+          if (rigid == 2) call rule_fault(error, 'contact', number, 'between', "'"//first// &
+            & "' and '"//trim(name)//"' are both rigid", 'rigid bodies do not touch each '// &
+            & 'other: write a group for each with the bodies that touch it', source)
+        end associate
+        if (allocated(error)) return
+      end do
+    end subroutine check_rigid_ones
   end subroutine check_contact
 
 end module pd_scene_content_check_contact

@@ -8,7 +8,7 @@ module pd_scene_content_groups
     & shape_group, region_group, no_fail_group, material_group, horizon_group, crack_group, &
     & initial_group, boundary_group, load_group, time_group, relaxation_group, output_group, &
     & probe_group, tip_group, section_group, line_group, j_integral_group, study_group, &
-    & side_group, contact_group, group_table
+    & side_group, contact_group, rigid_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -59,6 +59,8 @@ contains
       & 'region. Components not named stay free.', repeated, boundary_group(), all=boundaries)
     call table%add('load', 'A force on the outermost points of a side of a body, or on a '// &
       & 'region.', repeated, load_group(), all=loads)
+    call table%add('rigid', 'A rigid body of a given shape, without points, that bodies touch '// &
+      & 'by a &contact which names it.', repeated, rigid_group(), all=rigids)
     call table%add('contact', 'Bodies that touch and pieces that come together again: points '// &
       & 'that share no intact bond push apart.', repeated, contact_group(), all=contacts)
     call table%add('time', 'How the state moves: explicit steps in time, or relaxation to '// &
@@ -242,6 +244,16 @@ contains
     if (.not. allocated(scene%loads)) allocate (scene%loads(0))
     groups => scene%loads
   end subroutine loads
+
+  subroutine rigids(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%rigids)) deallocate (scene%rigids)
+    if (present(room)) allocate (scene%rigids(room))
+    if (.not. allocated(scene%rigids)) allocate (scene%rigids(0))
+    groups => scene%rigids
+  end subroutine rigids
 
   subroutine contacts(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

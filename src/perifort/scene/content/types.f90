@@ -26,6 +26,7 @@ module pd_scene_content_types
   use pd_scene_groups_output, only: output_group
   use pd_scene_groups_probe, only: probe_group
   use pd_scene_groups_relaxation, only: relaxation_group
+  use pd_scene_groups_rigid, only: rigid_group
   use pd_scene_groups_section, only: section_group
   use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
   use pd_scene_groups_side, only: side_group
@@ -38,8 +39,7 @@ module pd_scene_content_types
     & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
     & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
     & section_group, line_group, j_integral_group, side_group, study_group, contact_group, &
-    & name_length, &
-    & path_length, text_length, unset, is_set, is_given
+    & rigid_group, name_length, path_length, text_length, unset, is_set, is_given
   public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned
   public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
 
@@ -95,6 +95,7 @@ module pd_scene_content_types
     type(initial_group), allocatable :: initial(:)
     type(boundary_group), allocatable :: boundaries(:)
     type(load_group), allocatable :: loads(:)
+    type(rigid_group), allocatable :: rigids(:)
     type(contact_group), allocatable :: contacts(:)
     type(time_group) :: time
     type(relaxation_group) :: relaxation

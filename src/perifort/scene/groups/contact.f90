@@ -30,13 +30,15 @@ contains
     character(name_length) :: no_names(0)
 
     call keys%list('between', group%between, 'names of bodies that are never bonded with each '// &
-      & 'other and touch, or ''all'' for all bodies and their pieces', no_names)
+      & 'other and touch, one of which may be rigid, or ''all'' for all bodies and their pieces', &
+      & no_names)
     call keys%key('within', group%within, 'instead of between: name of a body whose pieces '// &
       & 'touch each other')
     call keys%key('stiffness', group%stiffness, '', 'stiffness of a pair over that of a bond', &
       & above=0.0_wp)
-    call keys%key('distance', group%distance, 'm', 'distance of points below which they push', &
-      & above=0.0_wp, default='0.9 of the smaller spacing')
+    call keys%key('distance', group%distance, 'm', 'distance of points below which they push; '// &
+      & 'with a rigid body that of points from its surface', above=0.0_wp, &
+      & default='0.9 of the smaller spacing; from a surface 0.5')
     call keys%key('friction', group%friction, '', 'Coulomb''s coefficient of friction', &
       & at_least=0.0_wp)
     call keys%key('restitution', group%restitution, '', 'speed after an impact over that '// &

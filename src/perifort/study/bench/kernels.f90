@@ -150,8 +150,8 @@ contains
     scene%horizon%family = kernel%family
     allocate (scene%kept(0), scene%removed(0), scene%regions(0), scene%sides(0), scene%cracks(0), &
       & scene%no_fail(0), scene%initial(0), scene%boundaries(0), scene%loads(0), &
-      & scene%contacts(0), scene%probes(0), scene%sections(0), scene%lines(0), scene%tips(0), &
-      & scene%j_integrals(0), scene%output%fields(0))
+      & scene%contacts(0), scene%rigids(0), scene%probes(0), scene%sections(0), scene%lines(0), &
+      & scene%tips(0), scene%j_integrals(0), scene%output%fields(0))
     scene%time%steps = 1
   end subroutine standard_scene
 

@@ -316,7 +316,7 @@ contains
     if (instant%kick > 0.0_wp) v = v + kick
     if (observer%half_steps) call energies_of(system, kick, of_kick)
     call energies_of(system, v, energies)
-    energies%kinetic = energies%kinetic - of_kick%kinetic
+    energies%kinetic = energies%kinetic - (of_kick%kinetic - of_kick%rigid)
     if (observer%n == 0) allocate (observer%step(0), observer%energy(0))
     observer%n = observer%n + 1
     observer%step = [observer%step, real(instant%step, wp)]

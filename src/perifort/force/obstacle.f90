@@ -1,0 +1,151 @@
+!> Surfaces of rigid bodies (doc/theory.md, 17): how far a place is from one, and along which
+!> normal, by the formula of the shape. A surface is where it is and moves as it does; what moves it
+!> is not known here.
+module pd_force_obstacle
+  use pd_base_error, only: internal_fault
+  use pd_base_kinds, only: wp
+  use pd_base_numbers, only: pi
+  use pd_base_vectors, only: cross
+  implicit none (type, external)
+  private
+  public :: obstacle_type, a_sphere, a_cylinder, a_box, a_half_space
+  public :: find_gap, velocity_at, shift_at, surface_of
+
+  !> Shapes.
+  integer, parameter :: a_sphere = 1, a_cylinder = 2, a_box = 3, a_half_space = 4
+
+  !> The surface of a rigid body. Vectors have three components whatever the dimension; those beyond
+  !> it are 0.
+  type :: obstacle_type
+    integer :: shape = a_sphere
+    integer :: dim = 3
+    real(wp) :: half(3) = 0.0_wp        !! sphere: the radius; cylinder: radius, radius, half its
+                                        !! length; box: half its edges [m]
+    real(wp) :: centre(3) = 0.0_wp      !! of the body; of a half-space a point of its surface [m]
+    real(wp) :: frame(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
+      & 0.0_wp, 1.0_wp], [3, 3])        !! its own axes as columns: a cylinder lies along the third,
+                                        !! a half-space ends along it
+    real(wp) :: velocity(3) = 0.0_wp    !! of the centre, when the points have theirs [m/s]
+    real(wp) :: spin(3) = 0.0_wp        !! then [rad/s]
+    real(wp) :: shift(3) = 0.0_wp       !! of the centre in the last step [m]
+    real(wp) :: turn(3) = 0.0_wp        !! rotation in the last step, axis times angle [rad]
+    real(wp) :: per_mass = 0.0_wp       !! 1/mass, 0 where no force moves it [1/kg]
+    real(wp) :: per_inertia = 0.0_wp    !! 1/least moment of inertia, 0 where none turns it
+                                        !! [1/(kg m2)]
+  end type obstacle_type
+
+contains
+
+  !> Signed distance of a place from the surface, negative within the body, and the normal there,
+  !> out of the body: the gradient of the distance.
+  pure subroutine find_gap(obstacle, y, gap, normal)
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
+    real(wp), intent(in) :: y(:)        !! the place, as many components as dimensions [m]
+    real(wp), intent(out) :: gap        !! [m]
+    real(wp), intent(out) :: normal(3)  !! unit vector
+    real(wp) :: r(3), own(3)
+
+    r = -obstacle%centre
+    r(:size(y)) = r(:size(y)) + y
+    own = matmul(r, obstacle%frame)
+    select case (obstacle%shape)
+    case (a_sphere)
+      gap = norm2(own)
+      ! in the centre any direction is as good
+      normal = [1.0_wp, 0.0_wp, 0.0_wp]
+      if (gap > 0.0_wp) normal = own/gap
+      gap = gap - obstacle%half(1)
+    case (a_cylinder)
+      call beside_cylinder(obstacle%half, own, gap, normal)
+    case (a_box)
+      call beside_box(obstacle%half, obstacle%dim, own, gap, normal)
+    case default
+      gap = own(3)
+      normal = [0.0_wp, 0.0_wp, 1.0_wp]
+    end select
+    normal = matmul(obstacle%frame, normal)
+  end subroutine find_gap
+
+  !> A box about the origin: within it the nearest face counts, beside an edge the edge.
+  pure subroutine beside_box(half, dim, r, gap, normal)
+    real(wp), intent(in) :: half(3), r(3)
+    integer, intent(in) :: dim
+    real(wp), intent(out) :: gap, normal(3)
+    real(wp) :: beyond(3)
+    integer :: c
+
+    beyond = 0.0_wp
+    beyond(:dim) = max(abs(r(:dim)) - half(:dim), 0.0_wp)
+    gap = norm2(beyond)
+    if (gap > 0.0_wp) then
+      normal = sign(beyond/gap, r)
+    else
+      c = maxloc(abs(r(:dim)) - half(:dim), dim=1)
+      gap = abs(r(c)) - half(c)
+      normal = 0.0_wp
+      normal(c) = sign(1.0_wp, r(c))
+    end if
+  end subroutine beside_box
+
+  !> A cylinder about the third axis: in the plane of the axis and the place it is a box.
+  pure subroutine beside_cylinder(half, r, gap, normal)
+    real(wp), intent(in) :: half(3), r(3)
+    real(wp), intent(out) :: gap, normal(3)
+    real(wp) :: radius, out(3), flat(3)
+
+    radius = norm2(r(:2))
+    out = [1.0_wp, 0.0_wp, 0.0_wp]
+    if (radius > 0.0_wp) out(:2) = r(:2)/radius
+    call beside_box([half(1), half(3), 0.0_wp], 2, [radius, r(3), 0.0_wp], gap, flat)
+    normal = flat(1)*out
+    normal(3) = flat(2)
+  end subroutine beside_cylinder
+
+  !> The velocity of the body's material at a place [m/s].
+  pure function velocity_at(obstacle, y) result(v)
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
+    real(wp), intent(in) :: y(:)   !! the place, as many components as dimensions [m]
+    real(wp) :: v(3), arm(3)
+
+    arm = -obstacle%centre
+    arm(:size(y)) = arm(:size(y)) + y
+    v = obstacle%velocity + cross(obstacle%spin, arm)
+  end function velocity_at
+
+  !> By how much the body's material at a place has moved in the last step [m].
+  pure function shift_at(obstacle, y) result(shift)
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
+    real(wp), intent(in) :: y(:)   !! the place, as many components as dimensions [m]
+    real(wp) :: shift(3), arm(3)
+
+    arm = -obstacle%centre
+    arm(:size(y)) = arm(:size(y)) + y
+    shift = obstacle%shift + cross(obstacle%turn, arm)
+  end function shift_at
+
+  !> The area of the surface in 3D [m2], its length in 2D [m], its two ends in 1D [-], all with the
+  !> body larger by `margin` on all sides; of a half-space huge.
+  real(wp) function surface_of(obstacle, margin) result(surface)
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
+    real(wp), intent(in) :: margin   !! [m]
+    real(wp) :: h(3)
+
+    surface = 2.0_wp
+    h = obstacle%half + margin
+    select case (obstacle%shape)
+    case (a_sphere)
+      if (obstacle%dim == 3) surface = 4*pi*h(1)**2
+      if (obstacle%dim == 2) surface = 2*pi*h(1)
+    case (a_cylinder)
+      surface = 2*pi*h(1)**2 + 4*pi*h(1)*h(3)
+    case (a_box)
+      if (obstacle%dim == 3) surface = 8*(h(1)*h(2) + h(2)*h(3) + h(3)*h(1))
+      if (obstacle%dim == 2) surface = 4*(h(1) + h(2))
+    case (a_half_space)
+      surface = sqrt(huge(surface))
+    case default
+      call internal_fault('a rigid body of no known shape')
+    end select
+  end function surface_of
+
+end module pd_force_obstacle
