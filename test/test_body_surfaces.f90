@@ -756,7 +756,7 @@ contains
     call refuse("&scene dimension = 3 /"//lf//"&body surface = 'none.stl' spacing = 1 /"//lf// &
       & steel, "cannot find the file 'none.stl'")
     call refuse("&scene dimension = 3 /"//lf//"&body lower = 0, 0, 0 upper = 1, 1, 1 points = "// &
-      & '2, 2, 2 spacing = 0.5 /'//lf//steel, "'spacing' of a body without a surface")
+      & '2, 2, 2 spacing = 0.5 /'//lf//steel, "a body without a shape has no key 'spacing'")
     call refuse(scene_with("spacing = 1 fill = 'volume'", &
       & "&boundary side = 'x_min' displacement_x = 0 /"), 'has no rows and gets no layers')
     call refuse(scene_with('spacing = 1', "&load region = 'part:cube' force_x = 1 /"), &

@@ -293,7 +293,8 @@ contains
       else if (body%file /= '' .or. body%mesh /= '' .or. body%shape /= '' .or. &
         & any(is_set(body%upper)) .or. any(body%points /= 0)) then
         call rule_fault(error, 'body', number, 'surface', 'a body is a box, another shape, a '// &
-          & 'surface, a cloud or a mesh, not several of them', "give 'surface' and 'spacing' alone", source)
+          & 'surface, a cloud or a mesh, not several of them', &
+          & "give 'surface' and 'spacing' alone", source)
       else if (allocated(body%material_set) .or. allocated(body%material_name) .or. &
         & body%points_per_element /= 1) then
         call rule_fault(error, 'body', number, 'surface', 'keys of a mesh beside a surface', &

@@ -31,8 +31,8 @@ contains
       & 'assumptions that come with it.', once, header_type(), one=header)
     call table%add('define', 'A name for a number, to be used in expressions.', repeated, &
       & define_group(), all=definitions)
-    call table%add('body', 'Material points: a lattice that fills a box, a sphere, a cylinder or '// &
-      & 'a surface, a mesh, or a cloud read from a file.', repeated, body_group(), all=bodies)
+    call table%add('body', 'Material points: a lattice that fills a box, a sphere, a cylinder '// &
+      & 'or a surface, a mesh, or a cloud read from a file.', repeated, body_group(), all=bodies)
     call table%add('keep', 'What stays of the bodies: points that lie inside of none of these '// &
       & 'groups are left out. `&remove` comes after it.', repeated, shape_group(), all=kept)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
