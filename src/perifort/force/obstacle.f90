@@ -19,8 +19,8 @@ module pd_force_obstacle
   type :: obstacle_type
     integer :: shape = a_sphere
     integer :: dim = 3
-    real(wp) :: half(3) = 0.0_wp        !! sphere: the radius; cylinder: radius, radius, half its
-                                        !! length; box: half its edges [m]
+    real(wp) :: half(3) = 0.0_wp        !! the radius of a sphere; of a cylinder radius, radius,
+                                        !! half its length; of a box half its edges [m]
     real(wp) :: centre(3) = 0.0_wp      !! of the body; of a half-space a point of its surface [m]
     real(wp) :: frame(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       & 0.0_wp, 1.0_wp], [3, 3])        !! its own axes as columns: a cylinder lies along the third,
