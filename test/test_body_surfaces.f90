@@ -759,6 +759,9 @@ contains
       & '2, 2, 2 spacing = 0.5 /'//lf//steel, "a body without a shape has no key 'spacing'")
     call refuse(scene_with("spacing = 1 fill = 'volume'", &
       & "&boundary side = 'x_min' displacement_x = 0 /"), 'has no rows and gets no layers')
+    call refuse(scene_with("spacing = 0.2 fill = 'volume'", &
+      & "&horizon surface_correction = 'consistent' /"), &
+      & "surface_correction = 'consistent' does not serve cells that a surface cuts")
     call refuse(scene_with('spacing = 1', "&load region = 'part:cube' force_x = 1 /"), &
       & 'names facets of a surface, not points')
     call refuse(scene_with('spacing = 1', "&load side = 'part:cub' pressure = 1 /"), &

@@ -6,7 +6,7 @@ module pd_set_up_consistent_rules
   use pd_law_material, only: material_type
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_content_types, only: is_set, scene_type
+  use pd_scene_content_types, only: has_cut_cells, is_set, scene_type
   use pd_set_up_consistent_weights, only: consistent_weights, solution_type
   implicit none (type, external)
   private
@@ -27,6 +27,11 @@ contains
     do i = 1, size(scene%bodies)
       if (scene%bodies(i)%mesh /= '') then
         call refuse('body', i, 'mesh', 'a mesh', 'its areas make no weights for uneven points')
+        return
+      end if
+      if (has_cut_cells(scene%bodies(i))) then
+        call refuse('body', i, 'fill', 'cells that a surface cuts', &
+          & "their surface areas are not those of whole cells; fill = 'centre' has whole cells")
         return
       end if
       if (scene%bodies(i)%file == '') cycle
