@@ -6,7 +6,7 @@ module meshes
     & shape_functions, shape_numbered, shape_of, shape_type
   implicit none (type, external)
   private
-  public :: sample_type, block_sample, gmsh_text, abaqus_text, number_text
+  public :: sample_type, block_sample, gmsh_text, abaqus_text, number_text, write_file
 
   !> A mesh with its groups: 1 is the whole block, 2 and 3 its ends along x.
   type :: sample_type
@@ -18,6 +18,18 @@ module meshes
   character(5), parameter :: names(3) = ['BLOCK', 'LEFT ', 'RIGHT']
 
 contains
+
+  !> Write a file in build/ as it is.
+  subroutine write_file(name, text)
+    character(*), intent(in) :: name   !! of the file
+    character(*), intent(in) :: text   !! all its bytes
+    integer :: unit
+
+    open (newunit=unit, file='build/'//name, access='stream', form='unformatted', &
+      & status='replace')
+    write (unit) text
+    close (unit)
+  end subroutine write_file
 
   !> A block [0, lengths] of `counts` cells, cut into elements of a shape.
   subroutine block_sample(number, counts, lengths, sample)

@@ -14,7 +14,8 @@ module test_body_meshes
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: diary_type, expect, expect_true
   use comparisons, only: expect_close
-  use meshes, only: abaqus_text, block_sample, gmsh_text, number_text, sample_type
+  use meshes, only: abaqus_text, block_sample, gmsh_text, number_text, sample_type, &
+    & write_file
   use test_scene_expect, only: expect_parts
   implicit none (type, external)
   private
@@ -46,17 +47,6 @@ contains
       & new_unittest('what is refused when a scene is read', test_refused), &
       & new_unittest('what is refused when a mesh is read', test_refused_later)]
   end subroutine collect_body_meshes
-
-  !> Write a file as it is.
-  subroutine write_file(name, text)
-    character(*), intent(in) :: name, text
-    integer :: unit
-
-    open (newunit=unit, file='build/'//name, access='stream', form='unformatted', &
-      & status='replace')
-    write (unit) text
-    close (unit)
-  end subroutine write_file
 
   !> Read a scene that stands in build/ and build it; `fault` is what stops it.
   subroutine build(text, set_up, fault)

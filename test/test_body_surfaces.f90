@@ -15,6 +15,7 @@ module test_body_surfaces
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: prepare, set_up_type
+  use meshes, only: write_file
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: expect, expect_true
   use comparisons, only: expect_close
@@ -54,17 +55,6 @@ contains
       & new_unittest('what is refused when a scene is read or built', test_refused), &
       & new_unittest('mutants neither crash nor hang', test_mutants)]
   end subroutine collect_body_surfaces
-
-  !> Write a file as it is.
-  subroutine write_file(name, text)
-    character(*), intent(in) :: name, text
-    integer :: unit
-
-    open (newunit=unit, file='build/'//name, access='stream', form='unformatted', &
-      & status='replace')
-    write (unit) text
-    close (unit)
-  end subroutine write_file
 
   !> The scene of a body in build/part.stl with these keys, and more groups.
   function scene_with(keys, more) result(text)

@@ -1,18 +1,16 @@
 !> Contact of points: against impacts of bars, closed forms of rigid blocks, and a sum over all
 !> pairs.
 module test_force_contact
-  use omp_lib, only: omp_set_num_threads
-  use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp
   use pd_force_contact, only: contact_rule_type, contact_type, new_contact, of_normal_force
   use pd_force_term, only: term_view_type
-  use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_system, only: view_of
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: set_up_type
   use comparisons, only: expect_close, max_abs
-  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: diary_type, expect, expect_true, noise, ready, ready_alone
+  use runs, only: run
+  use testdrive, only: error_type, new_unittest, unittest_type
+  use bodies, only: diary_type, expect, expect_true, noise, ready_alone
   use test_scene_expect, only: expect_fault, expect_scene, good_head, line
   implicit none (type, external)
   private
@@ -34,31 +32,6 @@ contains
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('what is refused', test_refused)]
   end subroutine collect_force_contact
-
-  !> Run the scene of a text to its end.
-  subroutine run(text, set_up, error, diary, threads)
-    character(*), intent(in) :: text
-    type(set_up_type), intent(out) :: set_up
-    type(error_type), allocatable, intent(inout) :: error
-    type(diary_type), intent(out), optional :: diary
-    integer, intent(in), optional :: threads
-    type(scene_type) :: scene
-    type(diary_type) :: own
-    type(fault_type), allocatable :: fault
-
-    call expect_scene(error, text, scene)
-    if (present(threads)) then
-      call omp_set_num_threads(threads)
-      call ready(scene, set_up, error)
-    else
-      call ready_alone(scene, set_up, error)
-    end if
-    if (allocated(error)) return
-    call run_explicit(set_up%system, trim(scene%time%integrator), set_up%plan%step, &
-      & set_up%plan%steps, own, fault)
-    if (allocated(fault)) call test_failed(error, fault%message)
-    if (present(diary)) diary = own
-  end subroutine run
 
   !> Momentum of a body along a component [kg m/s].
   real(wp) function momentum(set_up, body, c) result(p)

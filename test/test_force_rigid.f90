@@ -7,13 +7,13 @@ module test_force_rigid
   use pd_base_vectors, only: cross
   use pd_force_obstacle, only: a_box, a_cylinder, a_half_space, a_sphere, find_gap, obstacle_type
   use pd_motion_account, only: velocities_now
-  use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_pose, only: rotation_of, spin_of
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: prepare, set_up_type
   use comparisons, only: expect_close, max_abs
+  use runs, only: run
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: diary_type, expect, expect_true, noise, ready, ready_alone, rotation_matrix
+  use bodies, only: diary_type, expect, expect_true, noise, rotation_matrix
   use test_scene_expect, only: expect_fault, expect_parts, expect_scene, good_head, line
   implicit none (type, external)
   private
@@ -52,33 +52,6 @@ contains
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('what is refused', test_refused)]
   end subroutine collect_force_rigid
-
-  !> Run the scene of a text to its end.
-  subroutine run(text, set_up, error, diary, threads)
-    character(*), intent(in) :: text
-    type(set_up_type), intent(out) :: set_up
-    type(error_type), allocatable, intent(inout) :: error
-    type(diary_type), intent(inout), optional :: diary
-    integer, intent(in), optional :: threads
-    type(scene_type) :: scene
-    type(diary_type) :: own
-    type(fault_type), allocatable :: fault
-
-    call expect_scene(error, text, scene)
-    if (present(threads)) then
-      call omp_set_num_threads(threads)
-      call ready(scene, set_up, error)
-    else
-      call ready_alone(scene, set_up, error)
-    end if
-    if (allocated(error)) return
-    own%every = 10
-    if (present(diary)) own = diary
-    call run_explicit(set_up%system, trim(scene%time%integrator), set_up%plan%step, &
-      & set_up%plan%steps, own, fault)
-    if (allocated(fault)) call test_failed(error, fault%message)
-    if (present(diary)) diary = own
-  end subroutine run
 
   !> Energy at the end of a diary less what was supplied [J].
   real(wp) function balance(diary) result(energy)

@@ -61,6 +61,13 @@ contains
     call ready_alone(scene, set_up, error)
   end subroutine make_of
 
+  !> 1 for every component of a field: nothing is held.
+  pure function everywhere(field) result(one)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: one(size(field, 1), size(field, 2))
+    one = 1.0_wp
+  end function everywhere
+
   !> Hat functions sum to every linear field, to rounding: each function is given the field's value
   !> at its node.
   subroutine test_linear(error)
@@ -69,6 +76,7 @@ contains
     type(coarse_type) :: coarse
     real(wp), allocatable :: field(:, :), nodes(:), weight(:), where_node(:, :)
     real(wp) :: at(2)
+    real(wp) :: largest
     integer :: e, a, i, k, c, n
 
     call make('40, 40', '', set_up, error)
@@ -103,7 +111,7 @@ contains
         end do
       end do
       allocate (field(body%n_slots, 2), source=0.0_wp)
-      call add_slow(coarse, nodes, 1.0_wp, field)
+      call add_slow(coarse, nodes, 1.0_wp, everywhere(field), field, largest)
       do c = 1, 2
         call expect_close(error, pack(field(:, c), body%point > 0), pack(c &
           & + 0.3_wp*body%x(:, 1) - c*0.7_wp*body%x(:, 2), body%point > 0), 1.0e-13_wp, &
@@ -119,6 +127,7 @@ contains
     type(set_up_type) :: set_up
     type(coarse_type) :: coarse
     real(wp), allocatable :: field(:, :), combination(:, :), amounts(:), forces(:)
+    real(wp) :: largest
     integer :: i, state
 
     call make('45, 45', '&crack from = 0.2, 0.5 to = 0.8, 0.45 /'//line//cantilever, set_up, error)
@@ -136,7 +145,7 @@ contains
         amounts(i) = noise(state)
       end do
       call restrict_to(coarse, body%volume, field, forces)
-      call add_slow(coarse, amounts, 1.0_wp, combination)
+      call add_slow(coarse, amounts, 1.0_wp, everywhere(field), combination, largest)
       call expect(error, dot_product(amounts, forces), sum(field*combination &
         & *spread(body%volume, 2, 2)), 1.0e-13_wp*sum(body%volume), 'inner products')
     end associate
@@ -179,6 +188,7 @@ contains
     type(set_up_type) :: set_up
     type(coarse_type) :: coarse
     real(wp), allocatable :: field(:, :)
+    real(wp) :: largest
     integer :: i
 
     call make('40, 40', "&boundary side = 'x_min' displacement_x = 0 /"//line// &
@@ -187,7 +197,9 @@ contains
     call make_coarse(set_up%system, coarse)
     associate (body => set_up%system%body)
       allocate (field(body%n_slots, 2), source=0.0_wp)
-      call add_slow(coarse, [(1 + mod(i, 7)/7.0_wp, i=1, coarse%n)], 1.0_wp, field)
+      call add_slow(coarse, [(1 + mod(i, 7)/7.0_wp, i=1, coarse%n)], 1.0_wp, everywhere(field), &
+        & field, largest)
+      call expect(error, largest, maxval(abs(field)), 0.0_wp, 'largest component')
       call expect_close(error, pack(field, set_up%system%held == 1), 0.0_wp, 0.0_wp, &
         & 'held components')
       call expect_true(error, any(abs(pack(field(:, 1), set_up%system%held(:, 2) == 1)) &

@@ -93,8 +93,7 @@ contains
       body%parts(i)%first = findloc(int(body%body), body%parts(i)%body, dim=1)
     end do
     ! of a mesh counts the median; the scene has one horizon
-    if (.not. all(of_mesh(scene, body))) spacing = max(spacing, maxval(body%spacing, &
-      & mask=.not. of_mesh(scene, body)))
+    spacing = max(spacing, maxval(body%spacing, mask=.not. of_mesh(scene, body)))
     delta = horizon_of(scene, spacing)
     body%delta = delta
     call check_family_size(scene, body, delta, minval(body%spacing), error)
@@ -204,7 +203,10 @@ contains
     type(scene_type), intent(in) :: scene
     type(body_type), intent(in) :: body
     logical, allocatable :: mask(:)
-    mask = scene%bodies(body%body)%mesh /= ''
+    logical :: meshed(size(scene%bodies))
+
+    meshed = scene%bodies%mesh /= ''
+    mask = meshed(body%body)
   end function of_mesh
 
   !> delta [m]: the length given, or the ratio times the largest spacing.

@@ -17,7 +17,7 @@ module pd_force_contact
   use pd_body_body, only: body_type
   use pd_family_cells, only: cells_type, neighbours_of, sort_into_cells
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
-  use pd_force_term, only: force_term_type, no_tangent, term_view_type
+  use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
   use pd_law_material, only: material_type
   implicit none (type, external)
   private
@@ -387,13 +387,6 @@ contains
       c = times(view%body%dim)*m%bulk_modulus*m%d
     end associate
   end function constant_of
-
-  !> The density of a point [kg/m3].
-  pure real(wp) function density_of(view, k) result(density)
-    type(term_view_type), intent(in) :: view
-    integer, intent(in) :: k
-    density = view%materials(view%body%material(k))%density
-  end function density_of
 
   !> A point may touch a few others at once, with the stiffness of the largest of them; their
   !> displacements move it as its own does.

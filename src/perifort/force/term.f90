@@ -21,7 +21,7 @@ module pd_force_term
   use pd_force_obstacle, only: obstacle_type
   implicit none (type, external)
   private
-  public :: force_term_type, term_list_type, term_view_type
+  public :: force_term_type, term_list_type, term_view_type, density_of
   public :: no_tangent, has_tangent, no_stiffness
 
   !> How the force of a term depends on displacements: somehow, and the term can't say how; with the
@@ -157,6 +157,13 @@ module pd_force_term
   end type term_list_type
 
 contains
+
+  !> The density of a point [kg/m3].
+  pure real(wp) function density_of(view, k) result(density)
+    type(term_view_type), intent(in) :: view   !! of the body
+    integer, intent(in) :: k                   !! slot
+    density = view%materials(view%body%material(k))%density
+  end function density_of
 
   ! ---------------------------------------------------------------- a term, if it says no more
 

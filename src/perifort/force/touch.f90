@@ -14,7 +14,7 @@ module pd_force_touch
   use pd_body_body, only: body_type
   use pd_force_contact, only: contact_rule_type, normal_force, of_friction, of_normal_force, slope
   use pd_force_obstacle, only: find_gap, shift_at, surface_of, velocity_at
-  use pd_force_term, only: force_term_type, no_tangent, term_list_type, term_view_type
+  use pd_force_term, only: density_of, force_term_type, no_tangent, term_list_type, term_view_type
   implicit none (type, external)
   private
   public :: touch_type, new_touch, loads_on, points_within
@@ -193,13 +193,6 @@ contains
       critical = 2*sqrt(stiffness*density/(1 + density*view%body%volume(k)*per_mass))
     end associate
   end function critical_damping
-
-  !> The density of a point [kg/m3].
-  pure real(wp) function density_of(view, k) result(density)
-    type(term_view_type), intent(in) :: view
-    integer, intent(in) :: k                !! slot
-    density = view%materials(view%body%material(k))%density
-  end function density_of
 
   !> Force and moment about its centre [N], [N m] that the points of all contacts exert on a rigid
   !> body.

@@ -14,6 +14,8 @@ module pd_motion_coarse
   !> A pivot below this part of the diagonal is a motion without stiffness, which is left out.
   real(wp), parameter :: no_stiffness = 1.0e-9_wp
 
+  integer, parameter :: most_corners = 8  !! of a cell
+
   type :: coarse_type
     integer :: dim = 0
     integer :: n = 0                    !! unknowns; 0: there is no coarse part
@@ -21,7 +23,7 @@ module pd_motion_coarse
     ! points by parts of a cell of the grid
     integer(i4), allocatable :: start(:)   !! first place of each part in `slots` (parts + 1)
     integer(i4), allocatable :: slots(:)   !! of the points, part by part
-    real(wp), allocatable :: place(:, :)   !! within the cell, 0 to 1 (dim, points) [-]
+    real(wp), allocatable :: place(:, :)   !! within the cell, 0 to 1 (3, points) [-]
     integer(i4), allocatable :: unknown(:, :, :)
       !! of each component, corner of the cell, and part (dim, 2**dim, parts); 0: none
     integer(i4), allocatable :: slot_of(:)  !! a slot of each unknown's part (n)
@@ -33,48 +35,48 @@ module pd_motion_coarse
 
 contains
 
-  !> The values of the functions of a cell's corners at a place in the cell.
-  pure function corner_values(dim, place) result(values)
-    integer, intent(in) :: dim          !! 1, 2 or 3
-    real(wp), intent(in) :: place(dim)  !! 0 to 1 [-]
-    real(wp) :: values(2**dim)
-    integer :: c, n
+  !> The values of the functions of a cell's eight corners at a place in the cell: products of 1 - x
+  !> or x for each axis. In 1D and 2D the place is 0 along the other axes, and so are the values of
+  !> the corners there. Always eight, so that they are one vector of the processor.
+  pure function corner_values(place) result(values)
+    real(wp), intent(in) :: place(3)    !! 0 to 1 [-]
+    real(wp) :: values(most_corners)
+    real(wp), parameter :: at_0(most_corners, 3) = reshape([1, 0, 1, 0, 1, 0, 1, 0, &
+      & 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0]*1.0_wp, [most_corners, 3])
+    real(wp), parameter :: slope(most_corners, 3) = 1 - 2*at_0
 
-    values(1) = 1.0_wp
-    do c = 1, dim
-      n = 2**(c - 1)
-      values(n + 1:2*n) = values(:n)*place(c)
-      values(:n) = values(:n)*(1 - place(c))
-    end do
+    values = (at_0(:, 1) + slope(:, 1)*place(1))*(at_0(:, 2) + slope(:, 2)*place(2)) &
+      & *(at_0(:, 3) + slope(:, 3)*place(3))
   end function corner_values
 
   !> The sums over the points of volume, field and each function: for a force density the forces
   !> that act on the unknowns.
   subroutine restrict_to(coarse, volume, field, amounts)
     type(coarse_type), intent(in) :: coarse
-    real(wp), intent(in) :: volume(:)         !! (n_slots) [m3]
-    real(wp), intent(in) :: field(:, :)       !! (n_slots, dim)
-    real(wp), intent(out) :: amounts(:)       !! (n) in units of the field times m3
+    real(wp), intent(in), contiguous :: volume(:)    !! (n_slots) [m3]
+    real(wp), intent(in), contiguous :: field(:, :)  !! (n_slots, dim)
+    real(wp), intent(out) :: amounts(:)              !! (n) in units of the field times m3
     real(wp), allocatable :: of_part(:, :, :)
-    real(wp) :: values(2**coarse%dim)
+    real(wp) :: sums(most_corners)
     integer :: e, i, k, c, a
 
-    allocate (of_part(2**coarse%dim, coarse%dim, size(coarse%start) - 1))
+    allocate (of_part(most_corners, coarse%dim, size(coarse%start) - 1))
     !$omp parallel do schedule(static) default(none) shared(coarse, volume, field, of_part) &
-    !$omp private(e, i, k, c, values)
+    !$omp private(e, i, k, c, sums)
     do e = 1, size(of_part, 3)
-      of_part(:, :, e) = 0.0_wp
-      do i = coarse%start(e), coarse%start(e + 1) - 1
-        k = coarse%slots(i)
-        values = volume(k)*corner_values(coarse%dim, coarse%place(:, i))
-        do c = 1, coarse%dim
-          of_part(:, c, e) = of_part(:, c, e) + values*field(k, c)
+      ! the values are made again for each component, so that the sums are one register
+      do c = 1, size(of_part, 2)
+        sums = 0.0_wp
+        do i = coarse%start(e), coarse%start(e + 1) - 1
+          k = coarse%slots(i)
+          sums = sums + (volume(k)*field(k, c))*corner_values(coarse%place(:, i))
         end do
+        of_part(:, c, e) = sums
       end do
     end do
     amounts = 0.0_wp
     do e = 1, size(of_part, 3)
-      do a = 1, size(of_part, 1)
+      do a = 1, size(coarse%unknown, 2)
         do c = 1, coarse%dim
           i = coarse%unknown(c, a, e)
           if (i > 0) amounts(i) = amounts(i) + of_part(a, c, e)
@@ -83,35 +85,34 @@ contains
     end do
   end subroutine restrict_to
 
-  !> Add `factor` times the combination of the functions to a field, at all points.
-  subroutine add_slow(coarse, amounts, factor, field, where_positive)
+  !> Add `factor` times the combination of the functions to a field, where `allowed` is positive.
+  subroutine add_slow(coarse, amounts, factor, allowed, field, largest)
     type(coarse_type), intent(in) :: coarse
     real(wp), intent(in) :: amounts(:)         !! (n) of each function
     real(wp), intent(in) :: factor             !! [-]
-    real(wp), intent(inout) :: field(:, :)     !! (n_slots, dim)
-    real(wp), intent(in), optional :: where_positive(:, :)
+    real(wp), intent(in), contiguous :: allowed(:, :)
       !! (n_slots, dim) components that are not > 0 stay as they are
-    real(wp) :: values(2**coarse%dim), corners(2**coarse%dim, coarse%dim), moved
+    real(wp), intent(inout), contiguous :: field(:, :)  !! (n_slots, dim)
+    real(wp), intent(out) :: largest           !! absolute value of the field at the points then
+    real(wp) :: values(most_corners), corners(most_corners, 3)
     integer :: e, i, k, c, a
 
+    largest = 0.0_wp
     !$omp parallel do schedule(static) default(none) shared(coarse, amounts, factor, field, &
-    !$omp where_positive) private(e, i, k, c, a, values, corners, moved)
+    !$omp allowed) private(e, i, k, c, a, values, corners) reduction(max:largest)
     do e = 1, size(coarse%start) - 1
       corners = 0.0_wp
-      do a = 1, 2**coarse%dim
+      do a = 1, size(coarse%unknown, 2)
         do c = 1, coarse%dim
           if (coarse%unknown(c, a, e) > 0) corners(a, c) = factor*amounts(coarse%unknown(c, a, e))
         end do
       end do
       do i = coarse%start(e), coarse%start(e + 1) - 1
         k = coarse%slots(i)
-        values = corner_values(coarse%dim, coarse%place(:, i))
-        do c = 1, coarse%dim
-          moved = dot_product(values, corners(:, c))
-          if (present(where_positive)) then
-            if (.not. where_positive(k, c) > 0.0_wp) cycle
-          end if
-          field(k, c) = field(k, c) + moved
+        values = corner_values(coarse%place(:, i))
+        do c = 1, size(field, 2)
+          if (allowed(k, c) > 0.0_wp) field(k, c) = field(k, c) + sum(values*corners(:, c))
+          largest = max(largest, abs(field(k, c)))
         end do
       end do
     end do

@@ -8,7 +8,7 @@ module pd_body_mesh_cursor
   use pd_scene_format_values, only: largest_real, parse_real
   implicit none (type, external)
   private
-  public :: cursor_type, read_plain_real
+  public :: cursor_type, read_plain_real, shown
 
   integer, parameter :: longest_shown = 40  !! characters of a word that a message shows
 
@@ -272,7 +272,7 @@ contains
 
   !> A word as a message shows it.
   pure function shown(word) result(text)
-    character(*), intent(in) :: word
+    character(*), intent(in) :: word   !! any characters of a file
     character(:), allocatable :: text
 
     text = printable(word(:min(len(word), longest_shown)))

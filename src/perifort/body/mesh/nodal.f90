@@ -2,6 +2,7 @@
 module pd_body_mesh_nodal
   use pd_base_eigen, only: eigenvectors
   use pd_base_kinds, only: wp, i4, i8
+  use pd_body_mesh_around, only: around_type, elements_at_nodes, points_of, widen
   use pd_body_mesh_part, only: part_type
   implicit none (type, external)
   private
@@ -48,24 +49,27 @@ contains
     real(wp), intent(in) :: volume(:)            !! (points of the part) [m3]
     type(sums_type), intent(out) :: mean         !! (nodes) with the numbers of points in the part
     type(sums_type), intent(out) :: linear       !! (nodes)
-    integer(i8), allocatable :: first(:)
-    integer(i4), allocatable :: around(:), elements(:), points(:)
+    type(around_type) :: around
+    integer(i4), allocatable :: elements(:), points(:)
+    integer, allocatable :: mark(:)
     real(wp), allocatable :: weight(:)
     integer :: i, ring
     logical :: complete
 
-    call elements_around(part, first, around)
+    call elements_at_nodes(part, around)
+    allocate (mark(part%mesh%n_elements), source=0)
     call begin(mean, size(nodes))
     call begin(linear, size(nodes))
     do i = 1, size(nodes)
-      elements = around(first(nodes(i)):first(nodes(i) + 1) - 1)
+      elements = around%element(around%first(nodes(i)):around%first(nodes(i) + 1) - 1)
+      mark(elements) = i
       points = points_of(part, elements)
       weight = volume(points)/sum(volume(points))
       call put(mean, i, points, weight)
       do ring = 1, most_rings
         call fit(x(points, :), volume(points), part%mesh%x(:part%dim, nodes(i)), weight, complete)
         if (complete .or. ring == most_rings) exit
-        elements = with_neighbours(part, first, around, elements)
+        call widen(part, around, i, mark, elements)
         points = points_of(part, elements)
       end do
       call put(linear, i, points, weight)
@@ -133,91 +137,6 @@ contains
       weight(p) = weight(p)*(1 + dot_product(slope, x(p, :) - centre))
     end do
   end subroutine fit
-
-  !> The elements with points around each node.
-  pure subroutine elements_around(part, first, around)
-    type(part_type), intent(in) :: part
-    integer(i8), allocatable, intent(out) :: first(:)   !! (nodes + 1)
-    integer(i4), allocatable, intent(out) :: around(:)
-    integer(i8), allocatable :: at(:)
-    integer(i4), allocatable :: nodes(:)
-    integer :: e, i
-
-    allocate (first(part%mesh%n_nodes + 1), source=0_i8)
-    do e = 1, part%mesh%n_elements
-      if (part%points(2, e) == 0_i4) cycle
-      nodes = part%mesh%nodes_of(e)
-      first(nodes + 1) = first(nodes + 1) + 1_i8
-    end do
-    first(1) = 1_i8
-    do i = 2, size(first)
-      first(i) = first(i) + first(i - 1)
-    end do
-    allocate (around(first(size(first)) - 1))
-    at = first
-    do e = 1, part%mesh%n_elements
-      if (part%points(2, e) == 0_i4) cycle
-      nodes = part%mesh%nodes_of(e)
-      around(at(nodes)) = int(e, i4)
-      at(nodes) = at(nodes) + 1_i8
-    end do
-  end subroutine elements_around
-
-  !> Elements with all that share a node with one of them, in ascending order.
-  pure function with_neighbours(part, first, around, elements) result(more)
-    type(part_type), intent(in) :: part
-    integer(i8), intent(in) :: first(:)
-    integer(i4), intent(in) :: around(:), elements(:)
-    integer(i4), allocatable :: more(:)
-    integer(i4), allocatable :: nodes(:), near(:)
-    integer(i4) :: one
-    integer :: e, i, j, n
-
-    allocate (more(0))
-    do e = 1, size(elements)
-      nodes = part%mesh%nodes_of(int(elements(e)))
-      do i = 1, size(nodes)
-        near = around(first(nodes(i)):first(nodes(i) + 1) - 1)
-        more = [more, near]
-      end do
-    end do
-    do i = 2, size(more)
-      one = more(i)
-      j = i - 1
-      do while (j > 0)
-        if (more(j) <= one) exit
-        more(j + 1) = more(j)
-        j = j - 1
-      end do
-      more(j + 1) = one
-    end do
-    n = 0
-    do i = 1, size(more)
-      if (n > 0) then
-        if (more(n) == more(i)) cycle
-      end if
-      n = n + 1
-      more(n) = more(i)
-    end do
-    more = more(:n)
-  end function with_neighbours
-
-  !> The points of some elements.
-  pure function points_of(part, elements) result(points)
-    type(part_type), intent(in) :: part
-    integer(i4), intent(in) :: elements(:)
-    integer(i4), allocatable :: points(:)
-    integer :: e, p, n
-
-    allocate (points(sum(int(part%points(2, elements) - part%points(1, elements)) + 1)))
-    n = 0
-    do e = 1, size(elements)
-      do p = part%points(1, elements(e)), part%points(2, elements(e))
-        n = n + 1
-        points(n) = int(p, i4)
-      end do
-    end do
-  end function points_of
 
   !> Begin `n` sums.
   pure subroutine begin(sums, n)

@@ -3,6 +3,7 @@
 !> On a closed surface each edge runs as often in one direction as in the other.
 module pd_body_surface_edges
   use pd_base_error, only: error_type
+  use pd_base_joining, only: each_alone, settle_groups, unite
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text
@@ -121,51 +122,36 @@ contains
     type(surface_type), intent(in) :: surface
     integer(i4), intent(in) :: ends(:, :)      !! (2, edges) vertices of each open edge
     type(edges_type), intent(inout) :: edges
-    integer(i4), allocatable :: root(:), box(:)
-    integer :: e, a, b, n, i
+    integer(i4), allocatable :: lowest(:), box(:)
+    integer :: e, n, i
 
     allocate (edges%holes(6, 0))
     if (size(ends, 2) == 0) return
-    allocate (root(surface%n_vertices), box(surface%n_vertices))
-    root = [(int(i, i4), i=1, surface%n_vertices)]
+    allocate (box(surface%n_vertices), source=0_i4)
+    lowest = each_alone(surface%n_vertices)
     do e = 1, size(ends, 2)
-      a = top(int(ends(1, e)))
-      b = top(int(ends(2, e)))
-      root(max(a, b)) = int(min(a, b), i4)
+      call unite(lowest, ends(1, e), ends(2, e))
     end do
-    box = 0_i4
+    call settle_groups(lowest)
     n = 0
     do e = 1, size(ends, 2)
-      a = top(int(ends(1, e)))
-      if (box(a) > 0_i4) cycle
-      n = n + 1
-      box(a) = int(n, i4)
+      associate (first => lowest(ends(1, e)))
+        if (box(first) > 0_i4) cycle
+        n = n + 1
+        box(first) = int(n, i4)
+      end associate
     end do
     deallocate (edges%holes)
     allocate (edges%holes(6, n))
     edges%holes(:3, :) = huge(1.0_wp)
     edges%holes(4:, :) = -huge(1.0_wp)
     do e = 1, size(ends, 2)
-      n = box(top(int(ends(1, e))))
+      n = box(lowest(ends(1, e)))
       do i = 1, 2
         edges%holes(:3, n) = min(edges%holes(:3, n), surface%x(:, ends(i, e)))
         edges%holes(4:, n) = max(edges%holes(4:, n), surface%x(:, ends(i, e)))
       end do
     end do
-
-  contains
-
-    !> The first vertex of a vertex's chain so far.
-    integer function top(vertex)
-      integer, intent(in) :: vertex
-
-      top = vertex
-      do while (root(top) /= top)
-        root(top) = root(root(top))
-        top = root(top)
-      end do
-    end function top
-
   end subroutine find_holes
 
 end module pd_body_surface_edges

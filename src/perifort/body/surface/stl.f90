@@ -4,7 +4,7 @@ module pd_body_surface_stl
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, sp, i4, i8
   use pd_base_text, only: lower_case, printable, to_text
-  use pd_body_mesh_cursor, only: cursor_type, read_plain_real
+  use pd_body_mesh_cursor, only: cursor_type, read_plain_real, shown
   use pd_body_surface_surface, only: add_facet, finish_surface, surface_fault, surface_type
   use pd_scene_format_file, only: read_text_file
   use pd_scene_format_given, only: name_length
@@ -16,7 +16,6 @@ module pd_body_surface_stl
   integer, parameter :: header = 84        !! bytes of a binary file before its facets
   integer, parameter :: facet_bytes = 50   !! of one facet
   integer, parameter :: most_facets = 500000000  !! numbers of edges have 32 bits
-  integer, parameter :: longest_shown = 40 !! characters of a word that a message shows
 
 contains
 
@@ -390,14 +389,5 @@ contains
     if (word(1:1) == '-') value = -value
     plain = abs(value) <= largest_real
   end subroutine quick_real
-
-  !> A word as a message shows it.
-  pure function shown(word) result(text)
-    character(*), intent(in) :: word
-    character(:), allocatable :: text
-
-    text = printable(word(:min(len(word), longest_shown)))
-    if (len(word) > longest_shown) text = text//'..'
-  end function shown
 
 end module pd_body_surface_stl

@@ -180,7 +180,7 @@ contains
     end do
     next = coarse%start
     allocate (coarse%slots(coarse%start(n + 1) - 1))
-    allocate (coarse%place(coarse%dim, size(coarse%slots)), source=0.0_wp)
+    allocate (coarse%place(3, size(coarse%slots)), source=0.0_wp)
     do k = 1, size(part)
       if (cell(k) == 0) cycle
       coarse%slots(next(part(k))) = int(k, i4)
@@ -397,7 +397,7 @@ contains
         if (dim == 1) shear = 0.0_wp
         if (dim == 1) lame = stiff*material%youngs_modulus
       end associate
-      gradient = corner_gradients(grid, dim, coarse%place(:, i))
+      gradient = corner_gradients(grid, dim, coarse%place(:dim, i))
       do b = 1, size(gradient, 2)
         do a = 1, size(gradient, 2)
           associate (g => gradient(:, a), h => gradient(:, b))

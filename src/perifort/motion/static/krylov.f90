@@ -94,16 +94,21 @@ contains
     type(krylov_type), intent(inout) :: krylov
     real(wp), intent(inout) :: largest
     real(wp), allocatable :: field(:, :)
+    real(wp) :: of_field
+    integer :: m
 
     if (.not. allocated(krylov%slow)) return
-    call add_slow(system%memory%coarse, krylov%slow, factor, krylov%direction, krylov%inverse)
-    if (size(krylov%of_pins) > 0) then
-      allocate (field(size(krylov%mass, 1), size(krylov%mass, 2)), source=0.0_wp)
-      call add_slow(system%memory%coarse, krylov%slow, 1.0_wp, field)
-      call add_drive(system, krylov%frames, krylov%origin, drive_pins(system, krylov%frames, &
-        & krylov%origin, field*krylov%mass), factor, krylov%direction)
-    end if
-    largest = largest_over(system%body%order, krylov%direction)
+    call add_slow(system%memory%coarse, krylov%slow, factor, krylov%inverse, krylov%direction, &
+      & largest)
+    if (size(krylov%of_pins) == 0) return
+    allocate (field(size(krylov%mass, 1), size(krylov%mass, 2)), source=0.0_wp)
+    call add_slow(system%memory%coarse, krylov%slow, 1.0_wp, krylov%mass, field, of_field)
+    call add_drive(system, krylov%frames, krylov%origin, drive_pins(system, krylov%frames, &
+      & krylov%origin, field*krylov%mass), factor, krylov%direction)
+    do m = 1, size(krylov%frames)
+      if (krylov%frames(m)%number > 0) largest = max(largest, &
+        & maxval(abs(krylov%direction(system%motions(m)%slots, :))))
+    end do
   end subroutine add_slow_answer
 
   !> The residual from the system's forces and the loads at `t`, and its sums.

@@ -6,9 +6,10 @@ module pd_scene_content_check
   use pd_base_text, only: to_text
   use pd_scene_content_check_actions, only: check_initial, check_boundary, check_load
   use pd_scene_content_check_contact, only: check_contact
-  use pd_scene_content_check_bodies, only: check_body, check_shape, check_side, &
-    & check_material, check_crack
+  use pd_scene_content_check_bodies, only: check_body
+  use pd_scene_content_check_materials, only: check_material
   use pd_scene_content_check_rigid, only: check_rigid
+  use pd_scene_content_check_shapes, only: check_crack, check_shape, check_side
   use pd_scene_content_check_measures, only: check_measures
   use pd_scene_content_defaults, only: fill_defaults
   use pd_scene_content_expressions, only: at_the_start, check_definitions, check_expression

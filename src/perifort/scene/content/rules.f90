@@ -7,14 +7,15 @@ module pd_scene_content_rules
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: join, lower_case, nearest_name, newline, to_text
   use pd_scene_content_change, only: scan_scene
+  use pd_scene_format_file, only: resolve_path
   use pd_scene_format_find, only: find_entry, find_section, given
   use pd_scene_format_source, only: source_type, source_fault
   use pd_scene_content_types, only: scene_type, is_set, name_length
   implicit none (type, external)
   private
   public :: rule_fault, scene_fault, place_fault, given, check_known, check_unique, &
-    & check_region, check_mesh_name, &
-    & check_components, check_vector, check_finite_box, find_section, find_entry
+    & check_region, check_mesh_name, check_components, check_vector, check_finite_box, check_file, &
+    & find_section, find_entry
 
 contains
 
@@ -310,5 +311,28 @@ contains
     text = to_text(n)//' value'
     if (n > 1) text = text//'s'
   end function counted
+
+  !> A file that a group names must be there. An error is set if it is not.
+  subroutine check_file(name, scene_file, group, number, error, source, key)
+    character(*), intent(in) :: name                     !! of the file, as the scene says it
+    character(:), allocatable, intent(in) :: scene_file
+      !! path of the scene file, whose folder is looked in first; may be unallocated
+    character(*), intent(in) :: group                    !! name of the group that names the file
+    integer, intent(in) :: number                        !! which group of this name
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source    !! the scanned file, for places
+    character(*), intent(in), optional :: key            !! that names it; absent: `file`
+    character(:), allocatable :: path, at
+    logical :: exists
+
+    at = 'file'
+    if (present(key)) at = key
+    path = trim(name)
+    if (allocated(scene_file)) path = resolve_path(trim(name), scene_file)
+    inquire (file=path, exist=exists)
+    if (.not. exists) call rule_fault(error, group, number, at, "cannot find the file '"// &
+      & trim(name)//"'", "looked for '"//path//"', then for that name in the working directory", &
+      & source)
+  end subroutine check_file
 
 end module pd_scene_content_rules
