@@ -62,8 +62,9 @@ def small(text, largest):
         return match[1] + ", ".join(map(str, counts))
 
     text = re.sub(r"^(\s*points\s*=\s*)([\d, ]+)", fewer, text, flags=re.M)
-    # The lattice of a surface has a spacing instead of counts
-    text = re.sub(r"^(\s*spacing\s*=\s*)\S+", r"\g<1>4e-3", text, flags=re.M)
+    # The lattice of a shape or a surface has a spacing instead of counts
+    text = re.sub(r"^(\s*spacing\s*=\s*)(\S+)", lambda m: m[1] + f"{4 * float(m[2]):g}", text,
+                  flags=re.M)
     # Larger cells need a larger horizon
     text = re.sub(r"^(\s*)length\s*=.*$", r"\1ratio = 3.015", text, flags=re.M)
     text = re.sub(r"^(\s*steps\s*=\s*)(\d+)", lambda m: m[1] + str(min(int(m[2]), 20)), text,

@@ -5,8 +5,8 @@ module pd_scene_content_check_actions
   use pd_base_text, only: join, nearest_name, to_text
   use pd_scene_content_expressions, only: at_the_start, check_expression, &
     & check_vector_expressions, in_no_force
-  use pd_scene_content_rules, only: rule_fault, check_file, check_known, check_region, check_mesh_name, &
-    & check_components, check_vector
+  use pd_scene_content_rules, only: rule_fault, check_file, check_known, check_region, &
+    & check_mesh_name, check_components, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_course, only: ramp_of, sides
   use pd_scene_content_types, only: adds_layer, has_cut_cells, load_group, scene_type, is_given, &
