@@ -1,10 +1,11 @@
 !> Runs the tests: all of them, one suite, or one test.
 !>
-!>     perifort-test [--short] [--except=SUITE,SUITE] [SUITE [TEST]]
+!>     perifort-test [--short] [--except=SUITE,SUITE] [--share=FOLDER] [SUITE [TEST]]
 !>
-!> `--short` leaves out the tests whose name begins with `long`, `--except` whole suites. The last
-!> line is always `N passed, N failed`; the exit status is 1 if a test failed, 2 if there is no such
-!> test or suite.
+!> `--short` leaves out the tests whose name begins with `long`, `--except` whole suites. With
+!> `--share` several of these programs divide the suites among them: each takes the next one of
+!> which FOLDER has no file yet, and makes that file. The last line is always `N passed, N failed`;
+!> the exit status is 1 if a test failed, 2 if there is no such test or suite.
 program main
   use, intrinsic :: iso_fortran_env, only: output_unit, int64, real64
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
@@ -91,7 +92,9 @@ program main
   use test_output_results_files, only: collect_output_results_files
   use test_output_results_layout, only: collect_output_results_layout
   use test_output_report_overview, only: collect_output_report_overview
+  use test_output_checkpoint_parts, only: collect_output_checkpoint_parts
   use test_output_checkpoint_restart, only: collect_output_checkpoint_restart
+  use test_output_checkpoint_static, only: collect_output_checkpoint_static
   use test_output_results_results, only: collect_output_results_results
   use test_output_results_xdmf, only: collect_output_results_xdmf
   use test_ranks, only: collect_ranks
@@ -126,12 +129,14 @@ program main
   use test_warnings, only: collect_warnings
   implicit none (type, external)
 
-  type(testsuite_type) :: suites(120)
+  type(testsuite_type) :: suites(200)
   integer :: known = 0, passed = 0, failed = 0, skipped = 0
   integer :: i
-  logical :: short, left_out(120) = .false.
-  character(:), allocatable :: suite_name, test_name, except
+  logical :: short, left_out(200) = .false.
+  character(:), allocatable :: suite_name, test_name, except, share
 
+  ! those that take the longest begin first, for programs that share the suites
+  call register('output_checkpoint_static', collect_output_checkpoint_static)
   call register('base_clock', collect_base_clock)
   call register('base_checksum', collect_base_checksum)
   call register('base_expression', collect_base_expression)
@@ -214,6 +219,7 @@ program main
   call register('output_results_layout', collect_output_results_layout)
   call register('output_report_overview', collect_output_report_overview)
   call register('output_checkpoint_restart', collect_output_checkpoint_restart)
+  call register('output_checkpoint_parts', collect_output_checkpoint_parts)
   call register('output_results_results', collect_output_results_results)
   call register('output_results_xdmf', collect_output_results_xdmf)
   call register('ranks', collect_ranks)
@@ -257,7 +263,11 @@ program main
     end if
   else
     do i = 1, known
-      if (.not. left_out(i)) call run_suite(suites(i))
+      if (left_out(i)) cycle
+      if (len(share) > 0) then
+        if (.not. taken(suites(i)%name)) cycle
+      end if
+      call run_suite(suites(i))
     end do
   end if
 
@@ -282,6 +292,7 @@ contains
     suite_name = ''
     test_name = ''
     except = ''
+    share = ''
     do at = 1, command_argument_count()
       call get_command_argument(at, length=length)
       if (allocated(word)) deallocate (word)
@@ -291,6 +302,8 @@ contains
         short = .true.
       else if (index(word, '--except=') == 1) then
         except = word(len('--except=') + 1:)
+      else if (index(word, '--share=') == 1) then
+        share = word(len('--share=') + 1:)
       else if (len(suite_name) == 0) then
         suite_name = word
       else
@@ -298,6 +311,17 @@ contains
       end if
     end do
   end subroutine read_arguments
+
+  !> Whether no other program had taken this suite.
+  logical function taken(name)
+    character(*), intent(in) :: name
+    integer :: unit, io
+
+    ! of several programs that do this at once, one alone makes the file
+    open (newunit=unit, file=share//'/'//name, status='new', action='write', iostat=io)
+    taken = io == 0
+    if (taken) close (unit)
+  end function taken
 
   !> Of a name that there is; another one ends the program.
   integer function suite_number(name) result(number)

@@ -41,7 +41,8 @@ contains
       & new_unittest('a wrong condition has a place', test_bounds), &
       & new_unittest('warnings are counted and kept', test_warnings), &
       & new_unittest('inaccurate dissipated energy causes a warning', test_dissipation), &
-      & new_unittest('a body unstable before any load causes a warning', test_unstable_body), &
+      & new_unittest('long: a body unstable before any load causes a warning', &
+      & test_unstable_body), &
       & new_unittest('rotations are reported for the projected dilatation', test_rotation), &
       & new_unittest('results cannot leave their folder', test_inside), &
       & new_unittest('an impossible scene leaves no files', test_impossible), &

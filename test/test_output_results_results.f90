@@ -1,5 +1,6 @@
 !> Results written by the public interface and read back through HDF5 and as text.
 module test_output_results_results
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t
   use pd_base_error, only: failure_type => error_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_text, only: to_text
@@ -15,6 +16,16 @@ module test_output_results_results
 
   character(*), parameter :: here = 'build/test_output_results_results'
 
+  interface
+    !> How many identifiers of a kind HDF5 has given out and not got back.
+    integer(c_int) function h5_members(kind, number) bind(c, name='H5Inmembers')
+      import :: c_int, c_int64_t
+      implicit none (type, external)
+      integer(c_int), value :: kind
+      integer(c_int64_t), intent(out) :: number
+    end function h5_members
+  end interface
+
 contains
 
   subroutine collect_output_results_results(testsuite)
@@ -28,6 +39,7 @@ contains
       & new_unittest('less_than_planned', less_than_planned), &
       & new_unittest('no_output_at_all', no_output_at_all), &
       & new_unittest('rows_without_output', rows_without_output), &
+      & new_unittest('nothing_stays_open', nothing_stays_open), &
       & new_unittest('refuses_to_overwrite', refuses_to_overwrite), &
       & new_unittest('old_results_live_until_the_first_output', old_results_live), &
       & new_unittest('overwrite_removes_other_formats', overwrite_removes_other_formats), &
@@ -296,6 +308,38 @@ contains
     if (allocated(error)) return
     call check_file(error, 'rows', 4, 0, 1)
   end subroutine rows_without_output
+
+  !> Results that are written and read leave no file, group, type, space, set or attribute open:
+  !> otherwise thousands of runs in one program would become slower and slower.
+  subroutine nothing_stays_open(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: kinds = 6   ! H5I_FILE to H5I_ATTR
+    integer(c_int64_t) :: before(kinds), after(kinds)
+    integer :: i
+
+    call whole(error, 'open', 4, 2, 2, 1, 2)
+    if (allocated(error)) return
+    call count_open(before)
+    do i = 1, 3
+      call whole(error, 'open', 4, 2, 2, 1, 2)
+      if (allocated(error)) return
+    end do
+    call count_open(after)
+    call check(error, all(after == before), 'identifiers of HDF5 stay open')
+    if (allocated(error)) return
+    call check(error, all(after([1, 2, 5, 6]) == 0), 'a file, a group or a set is open')
+
+  contains
+
+    subroutine count_open(number)
+      integer(c_int64_t), intent(out) :: number(kinds)
+      integer :: kind
+
+      do kind = 1, kinds
+        if (h5_members(int(kind, c_int), number(kind)) < 0) number(kind) = 0
+      end do
+    end subroutine count_open
+  end subroutine nothing_stays_open
 
   subroutine refuses_to_overwrite(error)
     type(error_type), allocatable, intent(out) :: error

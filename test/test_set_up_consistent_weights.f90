@@ -37,13 +37,14 @@ contains
       & new_unittest('the weights of an independent program', test_independent), &
       & new_unittest('points that look alike have the same weights in bodies of any size', &
       & test_alike), &
-      & new_unittest('uniform strains are in equilibrium with classical tractions', &
+      & new_unittest('long: uniform strains are in equilibrium with classical tractions', &
       & test_uniform), &
       & new_unittest('a rotated strip of points without a lattice', test_clouds), &
       & new_unittest('loads on sides strain a body uniformly', test_loads), &
       & new_unittest('held layers strain a body uniformly', test_layers), &
       & new_unittest('long: the error in bending is of second order', test_bending), &
-      & new_unittest('forces have no resultant and follow from the energy', test_conservation), &
+      & new_unittest('long: forces have no resultant and follow from the energy', &
+      & test_conservation), &
       & new_unittest('an explicit run keeps its energy; the step beside that by energy', &
       & test_explicit), &
       & new_unittest('what consistent weights do not serve is refused', test_refused)]

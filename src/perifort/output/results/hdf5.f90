@@ -81,11 +81,14 @@ module pd_output_results_hdf5
 contains
 
   !> Start the library: silent (its errors become `error_type`), and without locks on files, so that
-  !> a file can be read while it is written. Further calls do nothing.
+  !> a file can be read while it is written. Further calls do nothing: with each, h5open_f would make
+  !> HDF5's Fortran types anew and keep the old ones, and closing a file searches all types.
   subroutine start_hdf5(error)
     type(error_type), allocatable, intent(out) :: error
+    logical, save :: started = .false.
     integer :: status
 
+    if (started) return
     call set_environment('HDF5_USE_FILE_LOCKING', 'FALSE')
     ! all files are closed here; what the library does at the program's end, after a full disk,
     ! is to try again what failed, and to crash
@@ -93,6 +96,7 @@ contains
     call h5open_f(status)
     if (status == 0) call h5eset_auto_f(0, status)
     if (status /= 0) call fail(error, 'the HDF5 library does not start')
+    started = status == 0
   end subroutine start_hdf5
 
   !> The version of the HDF5 library, such as 1.10.8.
