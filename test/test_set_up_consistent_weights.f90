@@ -4,6 +4,7 @@ module test_set_up_consistent_weights
   use pd_base_kinds, only: wp, i1
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: allocate_points, body_type
+  use pd_body_meshes, only: surface_areas
   use pd_family_areas, only: area_vectors
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_linear, volume_rule_type
@@ -12,11 +13,14 @@ module test_set_up_consistent_weights
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use pd_law_material, only: material_type, new_material
   use pd_motion_system, only: system_type
+  use pd_motion_static_relaxation, only: run_relaxation
+  use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
   use pd_set_up_consistent_weights, only: solution_type, weights_of_areas
   use pd_set_up_move, only: move
   use pd_set_up_prepare, only: prepare, set_up_type
   use comparisons, only: expect_close, max_abs
+  use meshes, only: block_sample, gmsh_text, number_text, sample_type, write_file
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: at_point, box_scene, diary_type, expect, expect_true, noise, ready, &
     & ready_alone, rotation_matrix, text_of, youngs_modulus
@@ -25,6 +29,7 @@ module test_set_up_consistent_weights
   public :: collect_set_up_consistent_weights
 
   real(wp), parameter :: spacing = 1.0e-2_wp
+  character(*), parameter :: lf = new_line('a')
   real(wp), parameter :: zeta = 1.0e-11_wp  !! strain: its square is below what is compared
   real(wp), parameter :: tension = zeta*youngs_modulus  !! of loads [Pa]
 
@@ -40,6 +45,10 @@ contains
       & new_unittest('long: uniform strains are in equilibrium with classical tractions', &
       & test_uniform), &
       & new_unittest('a rotated strip of points without a lattice', test_clouds), &
+      & new_unittest('meshes of every shape in the plane', test_meshes), &
+      & new_unittest('a pulled mesh is strained uniformly', test_pulled_mesh), &
+      & new_unittest('what consistent weights do not serve of meshes is refused', &
+      & test_refused_meshes), &
       & new_unittest('loads on sides strain a body uniformly', test_loads), &
       & new_unittest('held layers strain a body uniformly', test_layers), &
       & new_unittest('long: the error in bending is of second order', test_bending), &
@@ -233,13 +242,20 @@ contains
     type(error_type), allocatable, intent(inout) :: error
     real(wp), allocatable :: of_lambda(:, :), of_mu(:, :), p(:), energy(:)
     integer(i1), allocatable :: strained(:)
+    type(fault_type), allocatable :: fault
     integer :: alone, x, y
 
     allocate (p(merge(system%body%n_slots, 0, system%model%dilatation)), source=0.0_wp)
     allocate (energy(system%body%n_slots), strained(0))
     associate (body => system%body, m => system%model%materials)
-      call area_vectors(body, system%family, lame_of(m, body%dim), of_lambda, alone)
-      call area_vectors(body, system%family, shear_of(m, body%dim), of_mu, alone)
+      if (size(body%parts) > 0) then
+        call surface_areas(body, of_mu, fault)
+        of_lambda = maxval(lame_of(m, body%dim))*of_mu
+        of_mu = maxval(shear_of(m, body%dim))*of_mu
+      else
+        call area_vectors(body, system%family, lame_of(m, body%dim), of_lambda, alone)
+        call area_vectors(body, system%family, shear_of(m, body%dim), of_mu, alone)
+      end if
     end associate
     do x = 1, system%body%dim
       do y = x, system%body%dim
@@ -298,6 +314,153 @@ contains
     end subroutine one_strain
 
   end subroutine strain_all
+
+  !> A mesh of 8 by 6 cells of a shape, warped so that no two elements are alike and quadratic ones
+  !> are curved, as build/consistent.msh; and the text of a scene with it.
+  subroutine put_mesh(number, points, poissons_ratio, text)
+    integer, intent(in) :: number     !! of the shape
+    integer, intent(in) :: points     !! of an element
+    character(*), intent(in) :: poissons_ratio
+    character(:), allocatable, intent(out) :: text
+    type(sample_type) :: sample
+    integer :: i, cells(3)
+
+    cells = merge([12, 10, 1], [7, 6, 1], points == 1)
+    call block_sample(number, cells, [0.08_wp, 0.06_wp, 1.0_wp], sample)
+    do i = 1, sample%n_nodes
+      associate (x => sample%x(:, i))
+        x(:2) = x(:2) + [0.003_wp*sin(80*x(2)), 0.002_wp*sin(70*x(1) + 1)]
+      end associate
+    end do
+    call write_file('consistent.msh', gmsh_text(sample, 4, .true., .false.))
+    text = '&scene dimension = 2 thickness = 0.01 /'//lf//"&body name = 'part' mesh = "// &
+      & "'consistent.msh' points_per_element = "//number_text(points)//' /'//lf// &
+      & '&material youngs_modulus = 2e11 density = 7800 poissons_ratio = '//poissons_ratio//' /' &
+      & //lf//"&horizon surface_correction = 'consistent' /"//lf// &
+      & "&time method = 'relaxation' /"//lf
+  end subroutine put_mesh
+
+  !> Read a scene that stands in build/ and make it ready; `fault` is what stops it.
+  subroutine ready_of_text(text, set_up, fault)
+    character(*), intent(in) :: text
+    type(set_up_type), intent(out) :: set_up
+    type(fault_type), allocatable, intent(out) :: fault
+    type(scene_type) :: scene
+
+    call read_scene_text(text, 'build/consistent.nml', scene, fault)
+    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+  end subroutine ready_of_text
+
+  !> Every uniform strain on warped meshes, with one point for each element and with several.
+  !> Triangles with one point, whose diagonals are all alike, have no weights that leave the body
+  !> stable, and are refused.
+  subroutine test_meshes(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: several(4:8) = [3, 6, 4, 9, 4]
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+    integer :: s, r
+
+    ! triangles of 3 and 6 nodes, quadrilaterals of 4, 8 and 9
+    do s = 4, 8
+      do r = 1, 2
+        call put_mesh(s, merge(1, several(s), r == 1), '0.4', text)
+        call ready_of_text(text, set_up, fault)
+        if (s < 6 .and. r == 1) then
+          call expect_true(error, allocated(fault), 'not refused')
+          if (allocated(error)) return
+          call expect_true(error, index(fault%message, 'makes this body unstable') > 0, &
+            & fault%message)
+          if (allocated(error)) return
+          cycle
+        end if
+        if (allocated(fault)) then
+          call test_failed(error, 'shape '//text_of(real(s, wp))//': '//fault%message)
+          return
+        end if
+        call strain_all(set_up%system, 'shape '//text_of(real(s, wp)), error)
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_meshes
+
+  !> Pressure on the ends of a straight mesh strains it by sigma/E along and -nu sigma/E across, to
+  !> the square of the strain of 5e-8; what is held is a point.
+  subroutine test_pulled_mesh(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: stress = 1.0e4_wp, modulus = 2.0e11_wp, nu = 0.3_wp
+    type(set_up_type) :: set_up
+    type(diary_type) :: diary
+    type(fault_type), allocatable :: fault
+    type(sample_type) :: sample
+    real(wp), allocatable :: u(:, :), x(:, :), expected(:, :)
+    real(wp) :: turn
+
+    call block_sample(6, [12, 10, 1], [0.12_wp, 0.1_wp, 1.0_wp], sample)
+    call write_file('consistent.msh', gmsh_text(sample, 4, .true., .false.))
+    call ready_of_text('&scene dimension = 2 thickness = 0.01 /'//lf// &
+      & "&body name = 'part' mesh = 'consistent.msh' /"//lf// &
+      & '&material youngs_modulus = 2e11 density = 7800 poissons_ratio = 0.3 /'//lf// &
+      & "&horizon surface_correction = 'consistent' /"//lf// &
+      & "&load side = 'part:LEFT' pressure = -1e4 /"//lf// &
+      & "&load side = 'part:RIGHT' pressure = -1e4 /"//lf// &
+      & "&time method = 'relaxation' /"//lf//'&relaxation tolerance = 1e-11 /'//lf, set_up, fault)
+    if (.not. allocated(fault)) call run_relaxation(set_up%system, set_up%plan%relaxation, diary, &
+      & fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    associate (body => set_up%system%body)
+      x = body%x(body%slot, :)
+      u = set_up%system%state%u(body%slot, :)
+    end associate
+    ! without what a rigid motion adds
+    x = x - spread(sum(x, dim=1)/size(x, 1), 1, size(x, 1))
+    u = u - spread(sum(u, dim=1)/size(u, 1), 1, size(u, 1))
+    turn = sum(x(:, 1)*u(:, 2) - x(:, 2)*u(:, 1))
+    expected = x
+    expected(:, 1) = stress/modulus*x(:, 1)
+    expected(:, 2) = -nu*stress/modulus*x(:, 2)
+    turn = (turn - sum(x(:, 1)*expected(:, 2) - x(:, 2)*expected(:, 1)))/sum(x**2)
+    expected(:, 1) = expected(:, 1) - turn*x(:, 2)
+    expected(:, 2) = expected(:, 2) + turn*x(:, 1)
+    call expect_close(error, u, expected, 1.0e-6_wp*max_abs(expected), 'displacements')
+  end subroutine test_pulled_mesh
+
+  !> Each refusal of a mesh names its reason.
+  subroutine test_refused_meshes(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+
+    call put_mesh(6, 1, '0.3', text)
+    call refuse(text//'&body lower = 0.2, 0 upper = 0.26, 0.06 points = 6, 6 /'//lf, &
+      & 'a mesh beside other bodies')
+    ! two squares that touch and share no node
+    call write_file('consistent.msh', '$MeshFormat'//lf//'2.2 0 8'//lf//'$EndMeshFormat'//lf// &
+      & '$Nodes'//lf//'8'//lf//'1 0 0 0'//lf//'2 1 0 0'//lf//'3 1 1 0'//lf//'4 0 1 0'//lf// &
+      & '5 1 0 0'//lf//'6 2 0 0'//lf//'7 2 1 0'//lf//'8 1 1 0'//lf//'$EndNodes'//lf//'$Elements' &
+      & //lf//'2'//lf//'1 3 2 0 0 1 2 3 4'//lf//'2 3 2 0 0 5 6 7 8'//lf//'$EndElements'//lf)
+    call refuse(text, 'a mesh in pieces')
+
+  contains
+
+    subroutine refuse(scene, words)
+      character(*), intent(in) :: scene, words
+
+      if (allocated(error)) return
+      call ready_of_text(scene, set_up, fault)
+      if (.not. allocated(fault)) then
+        call test_failed(error, 'not refused: '//words)
+      else if (index(fault%message, words) == 0) then
+        call test_failed(error, fault%message)
+      end if
+    end subroutine refuse
+
+  end subroutine test_refused_meshes
 
   !> Lame's first constant of the dimension, from kappa; in 1D E takes the part of 2 mu.
   pure function lame_of(m, dim) result(lame)

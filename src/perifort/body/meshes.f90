@@ -9,9 +9,9 @@ module pd_body_meshes
   use pd_body_mesh_geometry, only: mesh_points
   use pd_body_mesh_near, only: points_near
   use pd_body_mesh_part, only: count_pieces, count_twins, facets_named, facets_type, find_faces, &
-    & part_type, points_named
+    & outer_facets, part_type, points_named
   use pd_body_mesh_read, only: read_mesh
-  use pd_body_mesh_shares, only: share_areas
+  use pd_body_mesh_shares, only: balance_areas, share_areas
   use pd_body_surfaces, only: facets_of_side, near_side, side_areas, skin_named
   use pd_scene_content_rules, only: place_fault
   use pd_scene_content_types, only: scene_type
@@ -19,7 +19,7 @@ module pd_body_meshes
   implicit none (type, external)
   private
   public :: mesh_body, keep_part, material_number, names_set, set_mask, facet_mask, facet_areas, &
-    & check_set, place_set_fault
+    & balance_surface, surface_areas, check_set, place_set_fault
 
 contains
 
@@ -314,5 +314,34 @@ contains
       area = all_areas(points)
     end associate
   end subroutine facet_areas
+
+  !> Give the surface areas of a body that is one mesh the moments that weights of bonds need. An
+  !> error if that cannot be.
+  subroutine balance_surface(body, error)
+    type(body_type), intent(inout) :: body  !! arranged in slots, with one part
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: x(:, :), volume(:)
+
+    x = positions_of(body, body%parts(1))
+    volume = body%volume(body%slot(:body%n_points))
+    call balance_areas(body%parts(1), x, volume, error)
+  end subroutine balance_surface
+
+  !> The outward areas of the points of a body that is one mesh (n_slots, dim) [m2; m x thickness;
+  !> cross section]. An error if a facet has no points behind it that could share its area.
+  subroutine surface_areas(body, area, error)
+    type(body_type), intent(in) :: body                 !! arranged in slots, with one part
+    real(wp), allocatable, intent(out) :: area(:, :)    !! (n_slots, dim)
+    type(error_type), allocatable, intent(out) :: error
+    type(facets_type) :: facets
+    real(wp), allocatable :: vector(:, :), of_points(:)
+
+    call outer_facets(body%parts(1), facets)
+    call share_areas(body%parts(1), positions_of(body, body%parts(1)), facets, vector, of_points, &
+      & error)
+    if (allocated(error)) return
+    allocate (area(body%n_slots, body%dim), source=0.0_wp)
+    area(body%slot(:body%n_points), :) = vector
+  end subroutine surface_areas
 
 end module pd_body_meshes

@@ -63,6 +63,13 @@ contains
       return
     end if
     if (may_be_unstable(system)) call lowest_eigenvalue(system, plan%lowest)
+    if (system%model%consistent .and. plan%lowest < 0.0_wp) then
+      call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
+        & "surface_correction = 'consistent' makes this body unstable: its stiffness has an "// &
+        & 'eigenvalue of '//to_text(plan%lowest, 2)//' of the largest one', &
+        & "use more elements across its thinnest part, or surface_correction = 'energy'")
+      return
+    end if
     call add_terms(system, bound, rows, stiffness, damping)
     if (plan%relaxes) then
       call plan_relaxation(scene, system, bound, rows, plan%relaxation)

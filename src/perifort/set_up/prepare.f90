@@ -29,7 +29,7 @@ module pd_set_up_prepare
   use pd_scene_content_types, only: scene_type
   use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
-  use pd_set_up_consistent_rules, only: check_consistent, weigh_bonds
+  use pd_set_up_consistent_rules, only: check_consistent, prepare_surface, weigh_bonds
   use pd_set_up_conditions, only: motions_of_scene, heating_of_scene, in_no_fail_zones
   use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
@@ -126,6 +126,8 @@ contains
       call check_laws(scene, system, error)
       if (allocated(error)) return
       call check_consistent(scene, system, error)
+      if (allocated(error)) return
+      call prepare_surface(scene, system%body, error)
       if (allocated(error)) return
       call motions_of_scene(scene, system%body, system%motions, error)
       if (allocated(error)) return

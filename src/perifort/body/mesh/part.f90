@@ -10,6 +10,7 @@ module pd_body_mesh_part
   use pd_body_mesh_geometry, only: face_geometry, table_of, table_type
   use pd_body_mesh_mesh, only: all_shapes, element_text, fault_of_file, mesh_type, nodes_key, &
     & set_of_elements, set_of_faces, set_of_nodes, sorted
+  use pd_body_mesh_moments, only: moments_type
   use pd_body_mesh_quadrature, only: fine_rule, rule_type
   implicit none (type, external)
   private
@@ -34,6 +35,7 @@ module pd_body_mesh_part
     integer(i4), allocatable :: points(:, :) !! (2, elements) first and last point; 1, 0: none
     type(face_type), allocatable :: faces(:)
     type(lookup_type) :: face_numbers
+    type(moments_type), allocatable :: moments  !! of its surface areas, if they were balanced
   end type part_type
 
   !> Some faces of a part.

@@ -11,10 +11,12 @@ module pd_body_mesh_shares
   use pd_base_text, only: to_text
   use pd_body_mesh_around, only: around_type, elements_at_nodes, points_of, widen
   use pd_body_mesh_mesh, only: fault_of_file
-  use pd_body_mesh_part, only: facets_type, part_type
+  use pd_body_mesh_moments, only: fields_at, moments_type, number_of_fields, solve_moments, &
+    & vector_at
+  use pd_body_mesh_part, only: facets_type, outer_facets, part_type
   implicit none (type, external)
   private
-  public :: share_areas, fit
+  public :: share_areas, balance_areas, fit
 
   integer, parameter :: most_rings = 4          !! of elements around a facet
   real(wp), parameter :: good = 3.0_wp          !! sum of |weights| that needs no wider ring
@@ -32,44 +34,168 @@ contains
     real(wp), allocatable, intent(out) :: area(:)        !! (n_points) [m2]
     type(error_type), allocatable, intent(out) :: error
     type(around_type) :: around
-    integer(i4), allocatable :: elements(:), best_points(:), points(:)
-    real(wp), allocatable :: weights(:), best(:)
+    integer(i4), allocatable :: points(:)
+    real(wp), allocatable :: weights(:), change(:, :)
     integer, allocatable :: mark(:)
-    integer :: f, ring, c
-    real(wp) :: least
-    logical :: found
+    integer :: f, c, i
 
     allocate (vector(part%n_points, part%dim), area(part%n_points), source=0.0_wp)
     allocate (mark(part%mesh%n_elements), source=0)
     call elements_at_nodes(part, around)
     do f = 1, facets%n
-      least = worst
-      found = .false.
-      elements = [part%faces(facets%face(f))%element(1)]
-      mark(elements) = f
-      do ring = 1, most_rings
-        call widen(part, around, f, mark, elements)
-        points = points_of(part, elements)
-        call fit(x(points, :), facets%centre(:part%dim, f), weights, found)
-        if (.not. found) cycle
-        if (sum(abs(weights)) >= least) cycle
-        least = sum(abs(weights))
-        best = weights
-        best_points = points
-        if (least <= good) exit
-      end do
-      if (least >= worst) then
-        call fault_of_file(part%mesh, 'the surface at '//place_text(facets%centre(:part%dim, f)) &
-          & //' m has no points behind it that could share its load', error, &
-          & 'the body is one element thick there: use more, or a lower dimension')
-        return
+      call weigh_facet(part, x, facets, f, around, mark, points, weights, error)
+      if (allocated(error)) return
+      if (allocated(part%moments)) then
+        allocate (change(size(points), 1))
+        do i = 1, size(points)
+          change(i, 1) = dot_product(vector_at(part%moments, x(points(i), :)), &
+            & facets%vector(:part%dim, f))
+        end do
+        call keep_sums(x(points, :), part%moments%linear, change)
+        weights = weights + change(:, 1)
+        deallocate (change)
       end if
       do c = 1, part%dim
-        vector(best_points, c) = vector(best_points, c) + best*facets%vector(c, f)
+        vector(points, c) = vector(points, c) + weights*facets%vector(c, f)
       end do
-      area(best_points) = area(best_points) + best*facets%area(f)
+      area(points) = area(points) + weights*facets%area(f)
     end do
   end subroutine share_areas
+
+  !> Find the small change of all facets' weights with which the points' areas have the moments that
+  !> weights of bonds need (`pd_body_mesh_moments`): the least one that keeps the sums and, on flat
+  !> facets, the centres of a facet's weights. `share_areas` takes it in from then on. An error if
+  !> there is none.
+  subroutine balance_areas(part, x, volume, error)
+    type(part_type), intent(inout) :: part   !! with its faces; gets `moments`
+    real(wp), intent(in) :: x(:, :)          !! (n_points, dim) its points [m]
+    real(wp), intent(in) :: volume(:)        !! (n_points) [m3]
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: flat = 1.0e-9_wp  !! error of linear moments of flat facets [-]
+    type(around_type) :: around
+    type(facets_type) :: facets
+    type(moments_type) :: moments
+    integer(i4), allocatable :: points(:)
+    real(wp), allocatable :: weights(:), matrix(:, :), right(:), w(:, :), divergence(:)
+    real(wp), allocatable :: of_facet(:, :)
+    integer, allocatable :: mark(:)
+    integer :: f, i, n, pass
+
+    if (allocated(part%moments)) deallocate (part%moments)
+    n = number_of_fields(part%dim)
+    moments%origin(:part%dim) = (minval(x, dim=1) + maxval(x, dim=1))/2
+    moments%scale = max(maxval(maxval(x, dim=1) - minval(x, dim=1))/2, tiny(1.0_wp))
+    allocate (w(part%dim, n), divergence(n), right(n), moments%multiplier(n))
+    allocate (matrix(n, n), mark(part%mesh%n_elements))
+    call outer_facets(part, facets)
+    call elements_at_nodes(part, around)
+    do pass = 1, 2
+      right = 0.0_wp
+      do i = 1, part%n_points
+        call fields_at((x(i, :) - moments%origin(:part%dim))/moments%scale, w, divergence)
+        right = right + volume(i)/moments%scale*divergence
+      end do
+      matrix = 0.0_wp
+      mark = 0
+      do f = 1, facets%n
+        call weigh_facet(part, x, facets, f, around, mark, points, weights, error)
+        if (allocated(error)) return
+        allocate (of_facet(size(points), n))
+        do i = 1, size(points)
+          call fields_at((x(points(i), :) - moments%origin(:part%dim))/moments%scale, w, divergence)
+          of_facet(i, :) = matmul(facets%vector(:part%dim, f), w)
+        end do
+        right = right - matmul(weights, of_facet)
+        call keep_sums(x(points, :), moments%linear, of_facet)
+        matrix = matrix + matmul(transpose(of_facet), of_facet)
+        deallocate (of_facet)
+      end do
+      ! curved facets have other linear moments than their centres: these may change then, too
+      associate (linear => right(:part%dim*(part%dim + 1)))
+        if (maxval(abs(linear)) <= flat*sum(volume)/moments%scale) exit
+      end associate
+      moments%linear = .false.
+    end do
+    call solve_moments(matrix, right, moments%multiplier)
+    if (maxval(abs(matmul(matrix, moments%multiplier) - right)) &
+      & > 1.0e-9_wp*sum(volume)/moments%scale) then
+      call fault_of_file(part%mesh, 'no surface areas of the points of this mesh have the '// &
+        & "moments that surface_correction = 'consistent' needs", error, &
+        & "use more elements, or surface_correction = 'energy'")
+      return
+    end if
+    part%moments = moments
+  end subroutine balance_areas
+
+  !> The points that share a facet's area, and their weights.
+  subroutine weigh_facet(part, x, facets, f, around, mark, points, weights, error)
+    type(part_type), intent(in) :: part
+    real(wp), intent(in) :: x(:, :)
+    type(facets_type), intent(in) :: facets
+    integer, intent(in) :: f                            !! facet
+    type(around_type), intent(in) :: around
+    integer, intent(inout) :: mark(:)                   !! (elements) other numbers than f before
+    integer(i4), allocatable, intent(out) :: points(:)
+    real(wp), allocatable, intent(out) :: weights(:)    !! (points) [-]
+    type(error_type), allocatable, intent(out) :: error
+    integer(i4), allocatable :: elements(:), near(:)
+    real(wp), allocatable :: tried(:)
+    real(wp) :: least
+    integer :: ring
+    logical :: found
+
+    least = worst
+    elements = [part%faces(facets%face(f))%element(1)]
+    mark(elements) = f
+    do ring = 1, most_rings
+      call widen(part, around, f, mark, elements)
+      near = points_of(part, elements)
+      call fit(x(near, :), facets%centre(:part%dim, f), tried, found)
+      if (.not. found) cycle
+      if (sum(abs(tried)) >= least) cycle
+      least = sum(abs(tried))
+      weights = tried
+      points = near
+      if (least <= good) exit
+    end do
+    if (least < worst) return
+    call fault_of_file(part%mesh, 'the surface at '//place_text(facets%centre(:part%dim, f)) &
+      & //' m has no points behind it that could share its load', error, &
+      & 'the body is one element thick there: use more, or a lower dimension')
+  end subroutine weigh_facet
+
+  !> Take from each column of `values` its sum and, with `linear`, its first moments: the part that
+  !> is a linear function of the places.
+  pure subroutine keep_sums(x, linear, values)
+    real(wp), intent(in) :: x(:, :)            !! (points, dim) [m]
+    logical, intent(in) :: linear
+    real(wp), intent(inout) :: values(:, :)    !! (points, columns)
+    real(wp), parameter :: follows = 1.0e-10_wp
+    real(wp) :: base(size(x, 1), size(x, 2) + 1), length, before
+    integer :: i, j, n, again
+
+    base(:, 1) = 1.0_wp
+    base(:, 2:) = x - spread(sum(x, dim=1)/size(x, 1), 1, size(x, 1))
+    n = merge(size(base, 2), 1, linear)
+    ! Gram and Schmidt, each twice against rounding
+    do i = 1, n
+      before = norm2(base(:, i))
+      do again = 1, 2
+        do j = 1, i - 1
+          base(:, i) = base(:, i) - dot_product(base(:, j), base(:, i))*base(:, j)
+        end do
+      end do
+      length = norm2(base(:, i))
+      base(:, i) = merge(base(:, i)/max(length, tiny(1.0_wp)), 0.0_wp, length > follows*before)
+    end do
+    do again = 1, 2
+      do i = 1, n
+        do j = 1, size(values, 2)
+          values(:, j) = values(:, j) - dot_product(base(:, i), values(:, j))*base(:, i)
+        end do
+      end do
+    end do
+  end subroutine keep_sums
 
   !> `(1, 2)`
   function place_text(x) result(text)

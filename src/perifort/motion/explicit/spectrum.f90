@@ -192,12 +192,14 @@ contains
   end subroutine stiffened_frequency
 
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
-  !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0.
+  !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0;
+  !> and with consistent weights on a mesh, some of which are far below 0.
   pure logical function may_be_unstable(system)
     type(system_type), intent(in) :: system  !! with its model
-    may_be_unstable = system%model%dilatation .and. system%model%surface .and. &
+    may_be_unstable = (system%model%consistent .and. size(system%body%parts) > 0) .or. &
+      & (system%model%dilatation .and. system%model%surface .and. &
       & any(system%model%materials%a < 0.0_wp .and. &
-      & system%model%materials%poissons_ratio < suspicious_ratio)
+      & system%model%materials%poissons_ratio < suspicious_ratio))
   end function may_be_unstable
 
   !> The lowest eigenvalue of the undeformed, unheated body's stiffness, its constrained components

@@ -29,6 +29,11 @@ module pd_set_up_consistent_conditions
     integer(i8), allocatable :: first(:)    !! (unknowns + 1) first entry of each unknown
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
+    ! where each class is a point, each unknown a bond with two ends, and n n, and n over |xi|:
+    real(wp), allocatable :: x(:, :)        !! (dim, points) positions [m]
+    real(wp), allocatable :: strain(:)      !! (points) what makes a gradient multipliers of n n
+    real(wp), allocatable :: shift(:)       !! (points) what makes a vector multipliers of n/|xi|
+    real(wp) :: spacing = 0.0_wp            !! mean of the points [m]
   end type conditions_type
 
 contains
@@ -117,7 +122,35 @@ contains
       conditions%right(row + 1:, c) = -area(k, :)*body%spacing(k)/body%volume(k)
     end do
     call turn(conditions)
+    if (all(conditions%first(2:) - conditions%first(:conditions%unknowns) == 2_i8)) &
+      & call note_points(body, materials, a, groups, conditions)
   end subroutine dilatation_conditions
+
+  !> Note what multipliers of smooth fields depend on: with w V/(t spacing) for the force and
+  !> a V/t times the symmetric gradient of w for theta, a bond gets as good as nothing.
+  subroutine note_points(body, materials, a, groups, conditions)
+    type(body_type), intent(in) :: body
+    type(material_type), intent(in) :: materials(:)
+    real(wp), intent(in) :: a(:)
+    type(groups_type), intent(in) :: groups
+    type(conditions_type), intent(inout) :: conditions
+    integer :: c, k
+
+    allocate (conditions%x(body%dim, conditions%classes))
+    allocate (conditions%strain(conditions%classes), conditions%shift(conditions%classes))
+    do c = 1, conditions%classes
+      k = int(groups%first(c))
+      conditions%x(:, c) = body%x(k, :)
+      associate (part => body%volume(k)/materials(body%material(k))%t)
+        conditions%strain(c) = part*a(body%material(k))
+        conditions%shift(c) = part/body%spacing(k)
+      end associate
+      conditions%spacing = conditions%spacing + body%spacing(k)/conditions%classes
+    end do
+    ! their size is of no account; so pivots and diagonals are of the order of 1
+    conditions%strain = conditions%strain/maxval(conditions%shift)
+    conditions%shift = conditions%shift/maxval(conditions%shift)
+  end subroutine note_points
 
   !> Room for the conditions of all classes.
   subroutine begin(dim, cubic, groups, conditions)

@@ -3,26 +3,32 @@
 !> Minimise sum (G - 1)^2 under B G = r and low <= G: G - 1 = max(low - 1, B^T z), and the
 !> multipliers z are the zero of r - B G(z), which is the gradient of a concave function of z.
 !> Newton's method finds it: each step solves a system with the weights that are not at the bound,
-!> by conjugate gradients with the blocks of the classes as preconditioner. Without a bound one step
-!> is enough.
+!> by conjugate gradients with the blocks of the classes as preconditioner, and grids of splines
+!> where each bond has a weight of its own (`pd_set_up_consistent_levels`). Without a bound one step
+!> is enough, or some against the rounding of many iterations.
 module pd_set_up_consistent_least_change
   use pd_base_kinds, only: wp, i8
   use pd_set_up_consistent_conditions, only: block_of, conditions_type, spread_over, sums_of
+  use pd_set_up_consistent_levels, only: add_levels, level_type, new_levels
   implicit none (type, external)
   private
   public :: least_change, unbounded
 
   real(wp), parameter :: unbounded = -1.0e30_wp  !! the bound that is none
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
+  real(wp), parameter :: uneven = 1.0e-10_wp        !! of those of points that all differ [-]
+  real(wp), parameter :: much = 1.0e3_wp            !! growth of an error that is rounding
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
   integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
+  real(wp), parameter :: part_of_step = 1.0e-6_wp   !! of the error that a step with grids leaves
 
 contains
 
-  !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12; otherwise no weights above
+  !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12, or
+  !> 1e-10 where each bond has a weight of its own; otherwise no weights above
   !> the bound do, or none were found.
   subroutine least_change(conditions, low, G, residual, iterations, found)
     type(conditions_type), intent(in) :: conditions
@@ -33,7 +39,8 @@ contains
     logical, intent(out) :: found
     real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :)
     logical, allocatable :: free(:)
-    real(wp) :: value, before, slope, length, history(most_newton)
+    type(level_type), allocatable :: levels(:)
+    real(wp) :: value, before, slope, length, history(most_newton), allowed
     integer :: newton, halving
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
@@ -43,10 +50,17 @@ contains
     end associate
     iterations = 0
     found = .false.
+    if (allocated(conditions%x)) then
+      call new_levels(conditions, levels)
+      allowed = uneven
+    else
+      allowed = tolerance
+      allocate (levels(0))
+    end if
     call weigh(conditions, low, z, t, G, r, before)
     do newton = 1, most_newton
       residual = maxval(abs(r))
-      found = residual <= tolerance
+      found = residual <= allowed
       if (found) return
       ! without a solution the multipliers grow and the error stays
       history(newton) = residual
@@ -55,7 +69,7 @@ contains
       end if
       if (low > unbounded .and. iterations > most_of_bound) return
       free = t + 1 > low
-      call solve(conditions, free, r, step, iterations)
+      call solve(conditions, levels, free, r, step, iterations)
       slope = sum(r*step)
       length = 1.0_wp
       do halving = 1, 30
@@ -69,7 +83,7 @@ contains
       before = value
     end do
     residual = maxval(abs(r))
-    found = residual <= tolerance
+    found = residual <= allowed
   end subroutine least_change
 
   !> Weights of multipliers z, what the conditions miss, and the function that is minimised in z.
@@ -92,14 +106,16 @@ contains
 
   !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
   !> and r in its range but for what the bound cuts off.
-  subroutine solve(conditions, free, r, step, iterations)
+  subroutine solve(conditions, levels, free, r, step, iterations)
     type(conditions_type), intent(in) :: conditions
+    type(level_type), intent(in) :: levels(:)
     logical, intent(in) :: free(:)
     real(wp), intent(in) :: r(:, :)
     real(wp), intent(inout) :: step(:, :)
     integer, intent(inout) :: iterations
     real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
-    real(wp) :: rho, rho_before, curvature, target
+    real(wp), allocatable :: best(:, :)
+    real(wp) :: rho, rho_before, curvature, target, least
     integer :: i
 
     call factorize(conditions, free, factor)
@@ -112,8 +128,11 @@ contains
     ! of a bounded solve the free unknowns change from step to step
     target = 0.02_wp*tolerance
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
+    if (size(levels) > 0) target = max(0.3_wp*tolerance, part_of_step*maxval(abs(r)))
+    least = huge(1.0_wp)
     do i = 1, merge(most_iterations, most_bounded, all(free))
       call precondition(factor, rest, w)
+      call add_levels(conditions, levels, rest, w)
       rho = sum(rest*w)
       if (.not. rho > 0.0_wp) exit
       p = w + merge(rho/rho_before, 0.0_wp, i > 1)*p
@@ -127,6 +146,15 @@ contains
       rho_before = rho
       iterations = iterations + 1
       if (maxval(abs(rest)) <= target) exit
+      if (size(levels) == 0) cycle
+      ! what rounding leaves outside of the matrix's range would grow without end
+      if (maxval(abs(rest)) > much*least) then
+        step = best
+        exit
+      end if
+      if (maxval(abs(rest)) >= least) cycle
+      least = maxval(abs(rest))
+      best = step
     end do
   end subroutine solve
 

@@ -3,6 +3,9 @@ module pd_set_up_consistent_rules
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
+  use pd_body_mesh_part, only: count_pieces, count_twins
+  use pd_body_meshes, only: balance_surface
   use pd_law_material, only: material_type
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
@@ -10,7 +13,7 @@ module pd_set_up_consistent_rules
   use pd_set_up_consistent_weights, only: consistent_weights, solution_type
   implicit none (type, external)
   private
-  public :: check_consistent, weigh_bonds
+  public :: check_consistent, prepare_surface, weigh_bonds
 
   real(wp), parameter :: same = 1.0e-12_wp  !! part of a modulus that may differ
 
@@ -26,8 +29,18 @@ contains
     if (scene%horizon%surface_correction /= 'consistent') return
     do i = 1, size(scene%bodies)
       if (scene%bodies(i)%mesh /= '') then
-        call refuse('body', i, 'mesh', 'a mesh', 'its areas make no weights for uneven points')
-        return
+        if (size(scene%bodies) > 1) then
+          call refuse('body', i, 'mesh', 'a mesh beside other bodies', &
+            & 'the surface between bodies that touch is not known')
+          return
+        end if
+        if (count_pieces(system%body%parts(1)) > 1 .or. &
+          & count_twins(system%body%parts(1), minval(system%body%spacing, &
+          & mask=system%body%point > 0)) > 0) then
+          call refuse('body', i, 'mesh', 'a mesh in pieces, or with nodes that lie on others', &
+            & 'points on both sides are bonded across a surface')
+          return
+        end if
       end if
       if (has_cut_cells(scene%bodies(i))) then
         call refuse('body', i, 'fill', 'cells that a surface cuts', &
@@ -84,6 +97,18 @@ contains
     end subroutine refuse
 
   end subroutine check_consistent
+
+  !> Prepare the surface areas that loads and weights take: those of a mesh are balanced. An error
+  !> is set if that cannot be.
+  subroutine prepare_surface(scene, body, error)
+    type(scene_type), intent(in) :: scene    !! a checked scene
+    type(body_type), intent(inout) :: body   !! arranged in slots
+    type(error_type), allocatable, intent(out) :: error
+
+    if (scene%horizon%surface_correction /= 'consistent' .or. size(body%parts) == 0) return
+    call balance_surface(body, error)
+    call place_fault(error, scene, 'body', 1, 'mesh')
+  end subroutine prepare_surface
 
   !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
   !> can break have weights that are not positive.

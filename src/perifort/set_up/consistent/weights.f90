@@ -5,6 +5,7 @@ module pd_set_up_consistent_weights
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
+  use pd_body_meshes, only: surface_areas
   use pd_family_areas, only: area_vectors
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
@@ -35,10 +36,12 @@ module pd_set_up_consistent_weights
 
 contains
 
-  !> Weights of the bonds of lattices. An error is set if a point has no second one behind it, or if
-  !> no weights fulfil the conditions.
+  !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced. An error is
+  !> set if a point of a lattice has no second one behind it, or if no weights fulfil the
+  !> conditions.
   subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error)
-    type(body_type), intent(in) :: body              !! all on lattices, in the family's slots
+    type(body_type), intent(in) :: body
+      !! all on lattices, or one mesh, in the family's slots
     class(family_type), intent(in) :: family         !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
     type(bond_weights_type), intent(out) :: weights
@@ -48,6 +51,18 @@ contains
     real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :)
     integer :: alone
 
+    if (size(body%parts) > 0) then
+      ! all materials have one stiffness
+      call surface_areas(body, of_stretch, error)
+      if (allocated(error)) return
+      associate (a => a_of(materials), mu => mu_of(materials, body%dim))
+        of_dilatation = a(1)*of_stretch
+        of_stretch = mu(1)*of_stretch
+      end associate
+      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .true., .false., &
+        & weights, stretch, dilatation, error)
+      return
+    end if
     call area_vectors(body, family, mu_of(materials, body%dim), of_stretch, alone)
     if (alone > 0) then
       call fail(error, "surface_correction = 'consistent' needs a second point behind each "// &
