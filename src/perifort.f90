@@ -23,8 +23,8 @@ module perifort
   use pd_motion_system, only: system_type
   use pd_motion_view, only: damage_of, displacements_of, find_energies, force_densities_of, &
     & number_of_points, point_near, positions_of, velocities_of, volumes_of
-  use pd_force_term, only: force_term_type, term_list_type, term_view_type, has_tangent, &
-    & no_stiffness, no_tangent
+  use pd_force_term, only: force_term_type, term_view_type, has_tangent, no_stiffness, no_tangent
+  use pd_force_terms, only: term_list_type
   use pd_law_law, only: bond_law_type, law_bonds_type, parameter_type
   use pd_law_laws, only: all_laws, law_table_type
   use pd_law_weighted, only: weighted_law_type

@@ -52,6 +52,7 @@ program main
   use test_force_breaking, only: collect_force_breaking
   use test_force_contact, only: collect_force_contact
   use test_force_rigid, only: collect_force_rigid
+  use test_force_search, only: collect_force_search
   use test_force_contract, only: collect_force_contract
   use test_force_frame, only: collect_force_frame
   use test_force_term, only: collect_force_term
@@ -178,6 +179,7 @@ program main
   call register('force_breaking', collect_force_breaking)
   call register('force_contact', collect_force_contact)
   call register('force_rigid', collect_force_rigid)
+  call register('force_search', collect_force_search)
   call register('force_contract', collect_force_contract)
   call register('force_frame', collect_force_frame)
   call register('force_term', collect_force_term)

@@ -7,8 +7,8 @@ module test_force_term
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
   use pd_base_kinds, only: wp
   use pd_base_snapshot, only: snapshot_type
-  use pd_force_term, only: force_term_type, term_list_type, term_view_type, has_tangent, &
-    & no_stiffness
+  use pd_force_term, only: force_term_type, term_view_type, has_tangent, no_stiffness
+  use pd_force_terms, only: term_list_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_keep, only: keep_system
   use pd_motion_observer, only: instant_type, observer_type

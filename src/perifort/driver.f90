@@ -4,7 +4,7 @@ module pd_driver
   use pd_base_error, only: error_type
   use pd_base_interrupt, only: handlers_type, let_writes_fail, put_back_handlers, &
     & signal_handlers, watch_for_interrupt
-  use pd_force_term, only: term_list_type
+  use pd_force_terms, only: term_list_type
   use pd_motion_observer, only: observer_type
   use pd_output_report_begin, only: run_options_type
   use pd_output_report_pair, only: pair_type

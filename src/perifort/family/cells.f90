@@ -4,7 +4,7 @@ module pd_family_cells
   implicit none (type, external)
   private
   public :: cells_type, sort_into_cells, neighbours_of, joins_labels, brute_force_neighbours, &
-    & cell_of, cells_around
+    & cell_of, cells_around, rows_around
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
   type :: cells_type
@@ -150,6 +150,29 @@ contains
     end do
     !$omp end parallel
   end function joins_labels
+
+  !> The cells around a cell and itself, as ranges of places in `order`: those along x stand one after
+  !> another.
+  pure subroutine rows_around(cells, cell, rows, number)
+    type(cells_type), intent(in) :: cells      !! as `sort_into_cells` made them
+    integer, intent(in) :: cell                !! from 1, as in `cell` of these
+    integer, intent(out) :: rows(2, 9)         !! first and last place of each row
+    integer, intent(out) :: number             !! of rows
+    integer :: i(3), low(3), high(3), cy, cz, at
+
+    i = [mod(cell - 1, cells%count(1)), mod((cell - 1)/cells%count(1), cells%count(2)), &
+      & (cell - 1)/(cells%count(1)*cells%count(2))]
+    low = max(i - 1, 0)
+    high = min(i + 1, cells%count - 1)
+    number = 0
+    do cz = low(3), high(3)
+      do cy = low(2), high(2)
+        at = 1 + cells%count(1)*(cy + cells%count(2)*cz)
+        number = number + 1
+        rows(:, number) = [integer :: cells%first(at + low(1)), cells%first(at + high(1) + 1) - 1]
+      end do
+    end do
+  end subroutine rows_around
 
   !> Search the cells around point `k`: the number of its neighbours, and as many of them as
   !> `found` has room for.

@@ -6,17 +6,19 @@
 !> by e^2; or a dashpot acts along the line. Friction acts across it.
 !>
 !> Pairs are searched in cells whose reach is D and a skin; the pairs are kept until some point has
-!> moved by half the skin, so that none is missed. What a point sums up is in the order of the
-!> others' numbers, and pairs farther apart than D add nothing: so the bits do not depend on when
-!> the search was, nor on the number of threads.
+!> moved by half the skin, so that none is missed: two points that were farther apart than D and the
+!> skin are then still farther apart than D. What a point sums up is in the order of the others'
+!> numbers, and pairs farther apart than D add nothing: so the bits do not depend on when the search
+!> was, nor on the number of threads.
 module pd_force_contact
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i4
-  use pd_base_order, only: ascending_order
   use pd_body_body, only: body_type
-  use pd_family_cells, only: cells_type, neighbours_of, sort_into_cells
-  use pd_family_family, only: allocate_bonds, bonds_type, family_type
+  use pd_family_family, only: allocate_bonds, bonds_type
+  use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
+    & remember_places
+  use pd_force_pairs, only: pairs_type, search_pairs
   use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
   use pd_law_material, only: material_type
   implicit none (type, external)
@@ -27,7 +29,7 @@ module pd_force_contact
   !> What a term of contact is: pushing along the line between points, or friction across it.
   integer, parameter :: of_normal_force = 1, of_friction = 2
 
-  real(wp), parameter :: skin_between = 0.3_wp   !! of the smaller spacing, of bodies apart
+  real(wp), parameter :: skin_between = 0.5_wp   !! of the smaller spacing, of bodies apart
   real(wp), parameter :: skin_within = 0.09_wp   !! where bonded neighbours would be candidates
   real(wp), parameter :: usual_distance = 0.9_wp !! of the smaller spacing
   real(wp), parameter :: slope = 0.5_wp
@@ -35,6 +37,9 @@ module pd_force_contact
   !> Contacts that a point may have at once, by dimension, for the bound of the stiffness.
   integer, parameter :: most_contacts(3) = [2, 4, 8]
   integer, parameter :: at_once = 128            !! points of a chunk of a thread
+  integer, parameter :: worth_threads = 1000     !! points that are near others
+  !> Half of the skin may be used up but for rounding.
+  real(wp), parameter :: but_rounding = 1 - 1.0e-6_wp
 
   !> What a `&contact` says.
   type :: contact_rule_type
@@ -47,13 +52,6 @@ module pd_force_contact
     real(wp) :: damping = 0.0_wp           !! over the critical one [-]
   end type contact_rule_type
 
-  !> Pairs that are near.
-  type :: pairs_type
-    integer, allocatable :: start(:)        !! (points + 1) first near one of each point
-    integer(i4), allocatable :: other(:)    !! slots, in the order of points
-    real(wp), allocatable :: u(:, :)        !! (point, dim) displacements at the search [m]
-  end type pairs_type
-
   !> Contact as a term.
   type, extends(force_term_type) :: contact_type
     integer :: part = of_normal_force
@@ -64,14 +62,18 @@ module pd_force_contact
     real(wp), allocatable :: begun(:, :)     !! (n_slots, dim) where points were at the start [m]
     real(wp) :: skin = 0.0_wp                !! [m]
     real(wp) :: delta = 1.0_wp               !! horizon [m]
-    type(pairs_type) :: pairs                !! as last searched
+    logical :: follows = .false.             !! it stands behind the term of the normal force of
+                                             !! the same rule, and takes what that has found
+    type(movement_type) :: movement          !! since the last search
+    type(pairs_type) :: pairs                !! then
   contains
     procedure :: add_force
     procedure :: add_energy
     procedure :: add_stiffness_bound
     procedure :: add_damping_bound
     procedure :: begin
-    procedure :: advance
+    procedure :: search
+    procedure :: acting
     procedure :: keep
     procedure :: describe
   end type contact_type
@@ -97,6 +99,7 @@ contains
     contact%part = part
     contact%rule = rule
     contact%delta = delta
+    contact%acts_on_few = .true.
     contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
     contact%side = rule%side(body%body(contact%slots))
     least = minval(body%spacing(contact%slots))
@@ -104,6 +107,7 @@ contains
     contact%reach = [((usual_distance*body%spacing(contact%slots(i)) + contact%skin)/2, i=1, &
       & size(contact%slots))]
     if (rule%distance > 0.0_wp) contact%reach = (rule%distance + contact%skin)/2
+    call new_movement(body, contact%slots, contact%movement)
   end subroutine new_contact
 
   !> Where points are at the start: pairs that are nearer then push from that distance on.
@@ -112,126 +116,66 @@ contains
     type(term_view_type), intent(in) :: view    !! the start
 
     self%begun = view%body%x + view%u
-    call search(self, view, self%pairs)
   end subroutine begin
 
-  !> Search anew in time.
-  subroutine advance(self, view)
+  !> Search anew if points may have come near: one of them has moved by half the skin.
+  subroutine search(self, view, before)
     class(contact_type), intent(inout) :: self  !! the contact
     type(term_view_type), intent(in) :: view    !! the instant
+    class(force_term_type), intent(in), optional :: before
+      !! the term that stands before it in a list, which has searched
 
-    if (moved(self, self%pairs, view) > self%skin/4) call search(self, view, self%pairs)
-  end subroutine advance
-
-  !> How far a point has moved since a search [m].
-  real(wp) function moved(self, pairs, view) result(most)
-    class(contact_type), intent(in) :: self
-    type(pairs_type), intent(in) :: pairs
-    type(term_view_type), intent(in) :: view
-    real(wp) :: square
-    integer :: i, c, k
-
-    most = 0.0_wp
-    if (.not. allocated(pairs%u)) call internal_fault('contact has not begun')
-    !$omp parallel do schedule(static) default(none) shared(self, pairs, view) &
-    !$omp private(i, c, k, square) reduction(max:most)
-    do i = 1, size(self%slots)
-      k = self%slots(i)
-      square = 0.0_wp
-      do c = 1, size(view%u, 2)
-        square = square + (view%u(k, c) - pairs%u(i, c))**2
-      end do
-      most = max(most, square)
-    end do
-    most = sqrt(most)
-  end function moved
-
-  !> Find the pairs that are near: closer than both their reaches.
-  subroutine search(self, view, pairs)
-    class(contact_type), intent(in) :: self
-    type(term_view_type), intent(in) :: view
-    type(pairs_type), intent(inout) :: pairs
-    type(cells_type) :: cells
-    real(wp), allocatable :: y(:, :), low(:), high(:)
-    logical, allocatable :: here(:)
-    integer, allocatable :: index_of(:)
-    integer :: i, c, n, m, dim
-
-    dim = size(view%u, 2)
-    n = size(self%slots)
-    allocate (y(n, dim))
-    pairs%u = view%u(self%slots, :)
-    do c = 1, dim
-      y(:, c) = view%body%x(self%slots, c) + pairs%u(:, c)
-    end do
-    if (allocated(pairs%start)) deallocate (pairs%start, pairs%other)
-    allocate (pairs%start(n + 1), source=1)
-    allocate (pairs%other(0))
-    if (n == 0) return
-    ! of bodies apart, only those points that are near another's
-    allocate (here(n), source=.true.)
-    if (.not. self%rule%pieces) then
-      allocate (low(dim), high(dim))
-      do m = 1, maxval(self%side)
-        if (count(self%side == m) == 0) cycle
-        do c = 1, dim
-          low(c) = minval(y(:, c), mask=self%side == m) - 2*maxval(self%reach)
-          high(c) = maxval(y(:, c), mask=self%side == m) + 2*maxval(self%reach)
-        end do
-        ! with two sides a point must be in the box of the other
-        if (maxval(self%side) > 2) exit
-        do i = 1, n
-          if (self%side(i) /= m) here(i) = all(y(i, :) >= low .and. y(i, :) <= high)
-        end do
-      end do
+    if (self%follows .and. present(before)) then
+      select type (before)
+      type is (contact_type)
+        if (self%movement%searches /= before%movement%searches) then
+          self%pairs = before%pairs
+          self%movement%searches = before%movement%searches
+        end if
+      class default
+        call internal_fault('friction follows no contact')
+      end select
+    else if (.not. still_holds(self, view)) then
+      call find_pairs(self, view, self%pairs)
+      call remember_places(self%movement, view%u)
     end if
-    index_of = pack([(i, i=1, n)], here)
-    if (size(index_of) == 0) return
-    call sort_into_cells(y(index_of, :), 2*maxval(self%reach), cells)
-    call collect()
-
-  contains
-
-    !> All pairs, point by point; twice, first to count.
-    subroutine collect()
-      integer, allocatable :: counted(:)
-      integer(i4), allocatable :: found(:), near(:)
-      real(wp), allocatable :: place(:, :), reach(:)
-      integer(i4) :: number
-      integer :: pass, p, i, filled
-
-      place = y(index_of, :)
-      reach = self%reach(index_of)
-      allocate (counted(n), source=0)
-      do pass = 1, 2
-        !$omp parallel default(none) shared(self, pairs, cells, place, reach, index_of, pass, &
-        !$omp counted) private(found, number, p, i, near, filled)
-        !$omp do schedule(dynamic, at_once)
-        do p = 1, size(index_of)
-          i = index_of(p)
-          if (pass == 2 .and. counted(i) == 0) cycle
-          call neighbours_of(place, reach, cells, p, number, found)
-          near = index_of(found(:number))
-          if (.not. self%rule%pieces) near = pack(near, self%side(near) /= self%side(i))
-          filled = size(near)
-          if (pass == 1) then
-            counted(i) = filled
-          else
-            ! points stand in their order, so that their numbers ascend with their places here
-            near = near(ascending_order(near))
-            pairs%other(pairs%start(i):pairs%start(i) + filled - 1) = self%slots(near)
-          end if
-        end do
-        !$omp end parallel
-        if (pass == 2) exit
-        do i = 1, n
-          pairs%start(i + 1) = pairs%start(i) + counted(i)
-        end do
-        deallocate (pairs%other)
-        allocate (pairs%other(pairs%start(n + 1) - 1))
-      end do
-    end subroutine collect
+    call note_instant(self%movement, view)
   end subroutine search
+
+  !> Whether no pair is near that the last search has not found.
+  logical function still_holds(self, view) result(holds)
+    class(contact_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+
+    holds = .false.
+    if (allocated(self%movement%u)) &
+      & holds = moved(self%movement, view%u) < but_rounding*self%skin/2
+  end function still_holds
+
+  !> The pairs that are near.
+  subroutine find_pairs(self, view, pairs)
+    class(contact_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    type(pairs_type), intent(out) :: pairs
+
+    if (.not. allocated(self%begun)) call internal_fault('contact has not begun')
+    call search_pairs(view, self%slots, self%side, self%reach, self%rule%pieces, pairs)
+  end subroutine find_pairs
+
+  !> Points that are near others.
+  subroutine acting(self, view, slots)
+    class(contact_type), intent(in) :: self     !! the contact
+    type(term_view_type), intent(in) :: view    !! the instant
+    integer(i4), allocatable, intent(out) :: slots(:)
+    type(pairs_type) :: anew
+
+    if (is_noted(self%movement, view)) then
+      slots = self%pairs%slots
+    else
+      call find_pairs(self, view, anew)
+      call move_alloc(anew%slots, slots)
+    end if
+  end subroutine acting
 
   !> The force density that contact makes on each point.
   subroutine add_force(self, view, force)
@@ -255,8 +199,8 @@ contains
     if (self%part == of_normal_force) call pass(self, view, forces, density)
   end subroutine add_energy
 
-  !> Forces or energies of all points, whichever has a size. Where points have moved too far since
-  !> the last search, as in a step that is only tried, it searches for itself.
+  !> Forces or energies of all points, whichever has a size. At an instant that was not searched, as
+  !> in a state that is only tried, it searches for itself.
   subroutine pass(self, view, force, energy)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
@@ -264,10 +208,10 @@ contains
     real(wp), intent(inout), contiguous :: energy(:)
     type(pairs_type) :: anew
 
-    if (moved(self, self%pairs, view) < self%skin/2) then
+    if (is_noted(self%movement, view)) then
       call sum_pairs(self, self%pairs, view, force, energy)
     else
-      call search(self, view, anew)
+      call find_pairs(self, view, anew)
       call sum_pairs(self, anew, view, force, energy)
     end if
   end subroutine pass
@@ -283,16 +227,17 @@ contains
     real(wp), dimension(size(view%u, 2)) :: r, r0, n, v, total
     real(wp) :: distance, begins, stiffness, stored, push, critical, speed
     integer :: i, e, k, j
-    logical :: ready
+    logical :: ready, listed
 
-    !$omp parallel default(none) shared(self, pairs, view, force, energy) &
+    !$omp parallel if (size(pairs%slots) >= worth_threads) default(none) &
+    !$omp shared(self, pairs, view, force, energy) &
     !$omp private(bonds, r, r0, n, v, total, distance, begins, stiffness, stored, push, critical, &
-    !$omp speed, i, e, k, j, ready)
+    !$omp speed, i, e, k, j, ready, listed)
     ready = .false.
     !$omp do schedule(dynamic, at_once)
-    do i = 1, size(self%slots)
-      if (pairs%start(i + 1) == pairs%start(i)) cycle
-      k = self%slots(i)
+    do i = 1, size(pairs%slots)
+      k = pairs%slots(i)
+      listed = .false.
       total = 0.0_wp
       stored = 0.0_wp
       do e = pairs%start(i), pairs%start(i + 1) - 1
@@ -309,7 +254,8 @@ contains
         if (self%rule%pieces) then
           if (.not. ready) call allocate_bonds(view%family, bonds)
           ready = .true.
-          call view%family%bonds_of(k, bonds)
+          if (.not. listed) call view%family%bonds_of(k, bonds)
+          listed = .true.
           if (any(bonds%j(:bonds%n) == j .and. bonds%intact(:bonds%n))) cycle
         end if
         ! points at one place push along the line that they began with

@@ -9,7 +9,7 @@ module pd_force_obstacle
   implicit none (type, external)
   private
   public :: obstacle_type, a_sphere, a_cylinder, a_box, a_half_space
-  public :: find_gap, velocity_at, shift_at, surface_of
+  public :: find_gap, velocity_at, shift_at, surface_of, reach_of_shape, turned_at_most
 
   !> Shapes.
   integer, parameter :: a_sphere = 1, a_cylinder = 2, a_box = 3, a_half_space = 4
@@ -47,7 +47,8 @@ contains
 
     r = -obstacle%centre
     r(:size(y)) = r(:size(y)) + y
-    own = matmul(r, obstacle%frame)
+    own = [dot_product(r, obstacle%frame(:, 1)), dot_product(r, obstacle%frame(:, 2)), &
+      & dot_product(r, obstacle%frame(:, 3))]
     select case (obstacle%shape)
     case (a_sphere)
       gap = norm2(own)
@@ -63,7 +64,8 @@ contains
       gap = own(3)
       normal = [0.0_wp, 0.0_wp, 1.0_wp]
     end select
-    normal = matmul(obstacle%frame, normal)
+    normal = obstacle%frame(:, 1)*normal(1) + obstacle%frame(:, 2)*normal(2) &
+      & + obstacle%frame(:, 3)*normal(3)
   end subroutine find_gap
 
   !> A box about the origin: within it the nearest face counts, beside an edge the edge.
@@ -100,6 +102,44 @@ contains
     normal = flat(1)*out
     normal(3) = flat(2)
   end subroutine beside_cylinder
+
+  !> How far from its centre the body reaches at most; a half-space without end [m].
+  pure real(wp) function reach_of_shape(obstacle) result(reach)
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
+
+    select case (obstacle%shape)
+    case (a_sphere)
+      reach = obstacle%half(1)
+    case (a_cylinder)
+      reach = norm2(obstacle%half(2:))
+    case (a_box)
+      reach = norm2(obstacle%half)
+    case default
+      reach = sqrt(huge(reach))
+    end select
+  end function reach_of_shape
+
+  !> By how much at most rotation of a body from one time to another changes the distance between its
+  !> surface and a place that is nearer than `margin` to it then [m]. With its centre at rest a place
+  !> at y from it is as far from the surface as the place Q^T y was, where Q is the rotation: these
+  !> are |Q - 1| |y| apart. A sphere does not change by rotation, a cylinder and a half-space by that
+  !> of their axis alone, |Q - 1| is then the way of the axis' end; of a box the sum of squares of
+  !> all components is a bound.
+  pure real(wp) function turned_at_most(before, now, margin, farthest) result(most)
+    type(obstacle_type), intent(in) :: before, now  !! the surface
+    real(wp), intent(in) :: margin                  !! [m]
+    real(wp), intent(in) :: farthest                !! from the centre at which there are places [m]
+    real(wp) :: turned
+
+    most = 0.0_wp
+    if (now%shape == a_sphere) return
+    if (now%shape == a_box) then
+      turned = norm2(now%frame - before%frame)
+    else
+      turned = norm2(now%frame(:, 3) - before%frame(:, 3))
+    end if
+    most = turned*min(farthest, reach_of_shape(now) + margin)
+  end function turned_at_most
 
   !> The velocity of the body's material at a place [m/s].
   pure function velocity_at(obstacle, y) result(v)

@@ -5,23 +5,22 @@
 !> A term extends `force_term_type` and says what force density it adds, what energy it stores, how
 !> stiff it is at most, what it has to keep for a restart, and what it is, in a line. It sees the
 !> body through a `term_view_type`. That is all: the loops over time, the time step, the energy
-!> balance, checkpoints and the solvers of static equilibrium work on the list of terms alone.
+!> balance, checkpoints and the solvers of static equilibrium work on the list of terms alone
+!> (`pd_force_terms`).
 !>
 !> The same bits on any number of threads: a term that computes in parallel lets each slot sum what
 !> is its own, in a fixed order.
 module pd_force_term
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp
-  use pd_base_reduce, only: inner
-  use pd_base_text, only: to_text
+  use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type
   use pd_law_material, only: material_type
   use pd_family_family, only: family_type
   use pd_force_obstacle, only: obstacle_type
   implicit none (type, external)
   private
-  public :: force_term_type, term_list_type, term_view_type, density_of
+  public :: force_term_type, term_view_type, density_of, name_of
   public :: no_tangent, has_tangent, no_stiffness
 
   !> How the force of a term depends on displacements: somehow, and the term can't say how; with the
@@ -55,6 +54,7 @@ module pd_force_term
     integer :: tangent = no_tangent      !! `no_tangent`, `has_tangent` or `no_stiffness`
     logical :: summed_apart = .false.    !! whoever holds it sums the work of its few points
     logical :: has_partner = .false.     !! it acts between points and what is no point
+    logical :: acts_on_few = .false.     !! `acting` tells on which points, internal terms alone
   contains
     procedure(add_force_interface), deferred :: add_force
     procedure(add_energy_interface), deferred :: add_energy
@@ -65,6 +65,8 @@ module pd_force_term
     procedure :: add_tangent => no_change
     procedure :: begin => begin_nothing
     procedure :: advance => begin_nothing
+    procedure :: search => search_nothing
+    procedure :: acting => acts_on_all
     procedure :: subtract_partner => no_partner
   end type force_term_type
 
@@ -122,40 +124,6 @@ module pd_force_term
     end function describe_interface
   end interface
 
-  !> A term in a list, and the account of its work.
-  type :: item_type
-    class(force_term_type), allocatable :: term
-    real(wp), allocatable :: last_u(:, :)      !! displacements and forces at the last instant
-    real(wp), allocatable :: last_force(:, :)  !! that was accounted [m], [N/m3]
-    real(wp) :: last_energy = 0.0_wp           !! that it stored then [J]
-    real(wp) :: lost = 0.0_wp                  !! of a term that is not conservative: it took [J]
-  end type item_type
-
-  !> Terms in their order. It is a term itself: the sum of those that are not external.
-  type, extends(force_term_type) :: term_list_type
-    type(item_type), allocatable :: items(:)   !! not allocated: none
-    integer :: inside = 0                      !! terms that are not external
-    integer :: outside = 0                     !! external ones
-  contains
-    procedure :: add
-    procedure :: number
-    procedure :: add_force => add_force_of_list
-    procedure :: add_external
-    procedure :: add_energy => add_energy_of_list
-    procedure :: energy
-    procedure :: add_stiffness_bound => add_bound_of_list
-    procedure :: add_damping_bound => add_damping_of_list
-    procedure :: add_tangent => add_tangent_of_list
-    procedure :: begin => begin_list
-    procedure :: advance => advance_list
-    procedure :: account
-    procedure :: keep => keep_list
-    procedure :: describe => describe_list
-    procedure :: without_tangent
-    procedure :: accounts_of
-    procedure :: has
-  end type term_list_type
-
 contains
 
   !> The density of a point [kg/m3].
@@ -203,15 +171,44 @@ contains
     if (.not. associated(view%u)) call misused(self)
   end subroutine begin_nothing
 
-  !> Take from the displacements `moved` since the last instant [m], (n_slots, dim), those of what
-  !> the points push against, for a term that `has_partner`: the rest is what its force does work on
-  !> without the work on the partner. A term that has one has a procedure of its own.
-  subroutine no_partner(self, view, moved)
+  !> Called whenever displacements are new, before forces are asked for: the place to find out what is
+  !> near. It changes no force: a term that was not asked finds the same in a slower way. By default
+  !> there is nothing to search.
+  subroutine search_nothing(self, view, before)
+    class(force_term_type), intent(inout) :: self  !! the term
+    type(term_view_type), intent(in) :: view       !! the instant
+    class(force_term_type), intent(in), optional :: before
+      !! the term that stands before it in a list, which has searched
+
+    if (.not. associated(view%u)) call misused(self)
+    if (present(before)) then
+      if (before%external .and. self%acts_on_few) call misused(self)
+    end if
+  end subroutine search_nothing
+
+  !> The slots on which the term may act at an instant, in the order of their points: nowhere else
+  !> does it make forces or store energy. For a term that `acts_on_few`, which has a procedure of its
+  !> own.
+  subroutine acts_on_all(self, view, slots)
+    class(force_term_type), intent(in) :: self       !! the term
+    type(term_view_type), intent(in) :: view         !! the instant
+    integer(i4), allocatable, intent(out) :: slots(:)
+
+    if (self%acts_on_few) call misused(self)
+    slots = view%body%slot
+  end subroutine acts_on_all
+
+  !> Take from displacements since the last instant those of what the points push against, for a
+  !> term that `has_partner`: the rest is what its force does work on without the work on the
+  !> partner. A term that has one has a procedure of its own.
+  subroutine no_partner(self, view, slots, moved)
     class(force_term_type), intent(in) :: self  !! the term
     type(term_view_type), intent(in) :: view    !! the instant
-    real(wp), intent(inout) :: moved(:, :)      !! (n_slots, dim) [m]
+    integer(i4), intent(in) :: slots(:)         !! of some points
+    real(wp), intent(inout) :: moved(:, :)      !! (slots, dim) by how much they have moved [m]
 
-    if (size(moved) /= size(view%u) .or. self%has_partner) call misused(self)
+    if (size(moved, 1) /= size(slots) .or. .not. associated(view%u) .or. self%has_partner) &
+      & call misused(self)
   end subroutine no_partner
 
   !> A call that contradicts what a term says of itself.
@@ -228,303 +225,5 @@ contains
     name = 'without a name'
     if (allocated(term%name)) name = '"'//term%name//'"'
   end function name_of
-
-  ! ---------------------------------------------------------------- the list
-
-  !> Add a term, as the last one. Of a list, its terms are added one by one.
-  recursive subroutine add(self, term)
-    class(term_list_type), intent(inout) :: self  !! the list, with the term at its end on return
-    class(force_term_type), intent(in) :: term   !! is copied
-    type(item_type), allocatable :: items(:)
-    integer :: i, n
-
-    select type (term)
-    class is (term_list_type)
-      do i = 1, term%number()
-        call self%add(term%items(i)%term)
-      end do
-      return
-    class default  ! a single term
-      continue
-    end select
-    n = self%number()
-    allocate (items(n + 1))
-    do i = 1, n
-      call move_alloc(self%items(i)%term, items(i)%term)
-    end do
-    allocate (items(n + 1)%term, source=term)
-    call move_alloc(items, self%items)
-    if (term%external) then
-      self%outside = self%outside + 1
-    else
-      self%inside = self%inside + 1
-    end if
-    self%conservative = self%conservative .and. (term%external .or. term%conservative)
-  end subroutine add
-
-  !> How many terms there are.
-  pure integer function number(self)
-    class(term_list_type), intent(in) :: self  !! the list
-
-    number = 0
-    if (allocated(self%items)) number = size(self%items)
-  end function number
-
-  !> The force density of the terms that are not external, added to `force`.
-  subroutine add_force_of_list(self, view, force)
-    class(term_list_type), intent(in) :: self  !! the list
-    type(term_view_type), intent(in) :: view   !! the instant
-    real(wp), intent(inout), contiguous :: force(:, :)
-      !! (n_slots, dim) force density, added to [N/m3]
-    integer :: i
-
-    if (self%inside == 0) return
-    do i = 1, self%number()
-      if (.not. self%items(i)%term%external) call self%items(i)%term%add_force(view, force)
-    end do
-  end subroutine add_force_of_list
-
-  !> The force density of the external terms that are not summed apart, added to `force`.
-  subroutine add_external(self, view, force)
-    class(term_list_type), intent(in) :: self           !! the list
-    type(term_view_type), intent(in) :: view            !! the instant
-    real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) [N/m3]
-    integer :: i
-
-    do i = 1, self%number()
-      if (self%items(i)%term%external .and. .not. self%items(i)%term%summed_apart) &
-        & call self%items(i)%term%add_force(view, force)
-    end do
-  end subroutine add_external
-
-  !> The energy density that the terms store which are not external.
-  subroutine add_energy_of_list(self, view, density)
-    class(term_list_type), intent(in) :: self          !! the list
-    type(term_view_type), intent(in) :: view           !! the instant
-    real(wp), intent(inout), contiguous :: density(:)  !! (n_slots) energy density, added to [J/m3]
-    integer :: i
-
-    if (self%inside == 0) return
-    do i = 1, self%number()
-      if (.not. self%items(i)%term%external) call self%items(i)%term%add_energy(view, density)
-    end do
-  end subroutine add_energy_of_list
-
-  !> The energy that the terms store which are not external [J].
-  real(wp) function energy(self, view)
-    class(term_list_type), intent(in) :: self  !! the list
-    type(term_view_type), intent(in) :: view   !! the instant
-    real(wp), allocatable :: density(:)
-
-    energy = 0.0_wp
-    if (self%inside == 0) return
-    allocate (density(view%body%n_slots), source=0.0_wp)
-    call self%add_energy(view, density)
-    energy = inner(view%body%order, density, view%body%volume)
-  end function energy
-
-  !> Bounds of all terms, external ones included: they act on the motion as well.
-  subroutine add_bound_of_list(self, view, bound)
-    class(term_list_type), intent(in) :: self  !! the list
-    type(term_view_type), intent(in) :: view   !! the instant
-    real(wp), intent(inout), contiguous :: bound(:)
-      !! (n_slots) bound of the stiffness, added to [N/m4]
-    integer :: i
-
-    do i = 1, self%number()
-      call self%items(i)%term%add_stiffness_bound(view, bound)
-    end do
-  end subroutine add_bound_of_list
-
-  !> As above, of the damping.
-  subroutine add_damping_of_list(self, view, bound)
-    class(term_list_type), intent(in) :: self  !! the list
-    type(term_view_type), intent(in) :: view   !! the instant
-    real(wp), intent(inout), contiguous :: bound(:)
-      !! (n_slots) bound of the damping, added to [N s/m4]
-    integer :: i
-
-    do i = 1, self%number()
-      call self%items(i)%term%add_damping_bound(view, bound)
-    end do
-  end subroutine add_damping_of_list
-
-  !> What all terms resist, external ones included.
-  subroutine add_tangent_of_list(self, view, w, kw)
-    class(term_list_type), intent(in) :: self    !! the list
-    type(term_view_type), intent(in) :: view     !! the instant
-    real(wp), intent(in), contiguous :: w(:, :)  !! (n_slots, dim) small displacement [m]
-    real(wp), intent(inout), contiguous :: kw(:, :)
-      !! (n_slots, dim) resistance to it, added to [N/m3]
-    integer :: i
-
-    do i = 1, self%number()
-      if (self%items(i)%term%tangent /= no_stiffness) &
-        & call self%items(i)%term%add_tangent(view, w, kw)
-    end do
-  end subroutine add_tangent_of_list
-
-  !> All terms begin.
-  subroutine begin_list(self, view)
-    class(term_list_type), intent(inout) :: self  !! the list, with its terms begun on return
-    type(term_view_type), intent(in) :: view      !! the start
-    integer :: i
-
-    do i = 1, self%number()
-      call self%items(i)%term%begin(view)
-    end do
-  end subroutine begin_list
-
-  !> All terms advance to the instant of the view.
-  subroutine advance_list(self, view)
-    class(term_list_type), intent(inout) :: self
-      !! the list, with the histories of its terms up to date on return
-    type(term_view_type), intent(in) :: view  !! the instant
-    integer :: i
-
-    do i = 1, self%number()
-      call self%items(i)%term%advance(view)
-    end do
-  end subroutine advance_list
-
-  !> Work since the last call, by the trapezoidal rule: that of external terms adds to `supplied`,
-  !> what terms that are not conservative took and do not store to `lost`. To be called once per
-  !> step, when the forces are known.
-  subroutine account(self, view, supplied, lost)
-    class(term_list_type), intent(inout) :: self
-      !! the list; keeps displacements, forces and energies of this instant
-    type(term_view_type), intent(in) :: view        !! the instant
-    real(wp), intent(inout) :: supplied             !! [J]
-    real(wp), intent(inout) :: lost                 !! [J]
-    real(wp), allocatable :: force(:, :), density(:), moved(:, :)
-    real(wp) :: work, stored
-    integer :: i
-
-    do i = 1, self%number()
-      associate (item => self%items(i))
-        if (item%term%summed_apart) cycle
-        if (.not. item%term%external .and. item%term%conservative) cycle
-        if (.not. allocated(force)) allocate (force, mold=view%u)
-        if (.not. allocated(density)) allocate (density(size(view%u, 1)))
-        force = 0.0_wp
-        call item%term%add_force(view, force)
-        stored = 0.0_wp
-        if (.not. item%term%external) then
-          density = 0.0_wp
-          call item%term%add_energy(view, density)
-          stored = inner(view%body%order, density, view%body%volume)
-        end if
-        if (allocated(item%last_u)) then
-          if (item%term%has_partner) then
-            moved = view%u - item%last_u
-            call item%term%subtract_partner(view, moved)
-            density = sum((item%last_force + force)/2*moved, 2)
-          else
-            density = sum((item%last_force + force)/2*(view%u - item%last_u), 2)
-          end if
-          work = inner(view%body%order, density, view%body%volume)
-          if (item%term%external) then
-            supplied = supplied + work
-          else
-            lost = lost - work - (stored - item%last_energy)
-            item%lost = item%lost - work - (stored - item%last_energy)
-          end if
-        end if
-        item%last_u = view%u
-        item%last_force = force
-        item%last_energy = stored
-      end associate
-    end do
-  end subroutine account
-
-  !> Keep all terms and the accounts of their work.
-  subroutine keep_list(self, archive)
-    class(term_list_type), intent(inout) :: self
-      !! the list; histories and accounts are set where the archive reads
-    class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
-    integer :: i
-
-    do i = 1, self%number()
-      associate (item => self%items(i))
-        call item%term%keep(archive)
-        if (item%term%summed_apart) cycle
-        call archive%keep('last place of term '//to_text(i), item%last_u)
-        call archive%keep('last force of term '//to_text(i), item%last_force)
-        call archive%keep('last energy of term '//to_text(i), item%last_energy)
-        call archive%keep('loss of term '//to_text(i), item%lost)
-      end associate
-    end do
-  end subroutine keep_list
-
-  !> The lines of all terms, each ended by a newline.
-  function describe_list(self) result(text)
-    class(term_list_type), intent(in) :: self  !! the list
-    character(:), allocatable :: text, one
-    integer :: i
-
-    text = ''
-    do i = 1, self%number()
-      one = self%items(i)%term%describe()
-      if (one /= '') text = text//one//new_line('a')
-    end do
-  end function describe_list
-
-  !> What the terms of a name store and, if they are not conservative, have taken, at the instant
-  !> that was last accounted.
-  subroutine accounts_of(self, view, name, stored, lost)
-    class(term_list_type), intent(in) :: self  !! the list
-    type(term_view_type), intent(in) :: view   !! that instant
-    character(*), intent(in) :: name           !! of the terms
-    real(wp), intent(out) :: stored            !! [J]
-    real(wp), intent(out) :: lost              !! since the start [J]
-    real(wp), allocatable :: density(:)
-    integer :: i
-
-    stored = 0.0_wp
-    lost = 0.0_wp
-    do i = 1, self%number()
-      associate (item => self%items(i))
-        if (.not. allocated(item%term%name)) cycle
-        if (item%term%name /= name) cycle
-        if (item%term%conservative) then
-          allocate (density(view%body%n_slots), source=0.0_wp)
-          call item%term%add_energy(view, density)
-          stored = stored + inner(view%body%order, density, view%body%volume)
-          deallocate (density)
-        else
-          stored = stored + item%last_energy
-          lost = lost + item%lost
-        end if
-      end associate
-    end do
-  end subroutine accounts_of
-
-  !> Whether there is a term of this name.
-  pure logical function has(self, name)
-    class(term_list_type), intent(in) :: self  !! the list
-    character(*), intent(in) :: name           !! of a term
-    integer :: i
-
-    has = .false.
-    do i = 1, self%number()
-      if (.not. allocated(self%items(i)%term%name)) cycle
-      has = has .or. self%items(i)%term%name == name
-    end do
-  end function has
-
-  !> The name of the first term whose force depends on displacements and that has no tangent; '' if
-  !> there is none.
-  function without_tangent(self) result(name)
-    class(term_list_type), intent(in) :: self  !! the list
-    character(:), allocatable :: name
-    integer :: i
-
-    name = ''
-    do i = 1, self%number()
-      if (self%items(i)%term%tangent /= no_tangent) cycle
-      name = name_of(self%items(i)%term)
-      return
-    end do
-  end function without_tangent
 
 end module pd_force_term

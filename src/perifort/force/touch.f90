@@ -5,6 +5,10 @@
 !> d dimensions, what the bonds of half a family make of such a displacement. Restitution, damping
 !> and friction are those of contact between points (`pd_force_contact`). The body bears the
 !> opposite force where the point is, so that no moment is lost.
+!>
+!> The points within D and a skin of the surface are listed. The distance of a point changes by no
+!> more than the point, the body's centre, and by rotation the body's material beside the point have
+!> moved: as long as these together are less than the skin, no other point can touch.
 module pd_force_touch
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
@@ -13,8 +17,12 @@ module pd_force_touch
   use pd_base_vectors, only: cross
   use pd_body_body, only: body_type
   use pd_force_contact, only: contact_rule_type, normal_force, of_friction, of_normal_force, slope
-  use pd_force_obstacle, only: find_gap, shift_at, surface_of, velocity_at
-  use pd_force_term, only: density_of, force_term_type, no_tangent, term_list_type, term_view_type
+  use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
+    & remember_places
+  use pd_force_obstacle, only: find_gap, obstacle_type, reach_of_shape, shift_at, surface_of, &
+    & turned_at_most, velocity_at
+  use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
+  use pd_force_terms, only: term_list_type
   implicit none (type, external)
   private
   public :: touch_type, new_touch, loads_on, points_within
@@ -22,6 +30,11 @@ module pd_force_touch
   real(wp), parameter :: usual_distance = 0.5_wp  !! of the point's spacing: where its cell ends
   real(wp), parameter :: crowded = 2.0_wp
     !! points that touch at once over those of a lattice on the area, for the bound of the stiffness
+
+  real(wp), parameter :: skin = 1.0_wp            !! of the smallest spacing
+  !> The skin may be used up but for rounding.
+  real(wp), parameter :: but_rounding = 1 - 1.0e-6_wp
+  integer, parameter :: worth_threads = 1000      !! points that are near the surface
 
   !> Contact with one rigid body as a term.
   type, extends(force_term_type) :: touch_type
@@ -31,12 +44,21 @@ module pd_force_touch
     integer(i4), allocatable :: slots(:)     !! points that may touch, in order
     real(wp), allocatable :: begins(:)       !! gap at which each is pushed [m]
     real(wp) :: delta = 1.0_wp               !! horizon [m]
+    real(wp) :: skin = 0.0_wp                !! [m]
+    logical :: follows = .false.             !! it stands behind the term of the normal force of
+                                             !! the same rule, and takes what that has found
+    integer, allocatable :: near(:)          !! which of the points were near at the last search
+    type(obstacle_type) :: then              !! the surface then
+    real(wp) :: farthest = 0.0_wp            !! from its centre was a point then [m]
+    type(movement_type) :: movement          !! of the points since
   contains
     procedure :: add_force
     procedure :: add_energy
     procedure :: add_stiffness_bound
     procedure :: add_damping_bound
     procedure :: begin
+    procedure :: search
+    procedure :: acting
     procedure :: keep
     procedure :: describe
     procedure :: subtract_partner
@@ -67,6 +89,9 @@ contains
     touch%slots = pack(body%slot, touches(body%body(body%slot)))
     touch%begins = usual_distance*body%spacing(touch%slots)
     if (rule%distance > 0.0_wp) touch%begins = rule%distance
+    touch%acts_on_few = .true.
+    if (size(touch%slots) > 0) touch%skin = skin*minval(body%spacing(touch%slots))
+    call new_movement(body, touch%slots, touch%movement)
   end subroutine new_touch
 
   !> Where points are at the start: those that are nearer then are pushed from that gap on.
@@ -82,6 +107,103 @@ contains
     end do
   end subroutine begin
 
+  !> List the points near the surface anew if others may have come near.
+  subroutine search(self, view, before)
+    class(touch_type), intent(inout) :: self   !! the contact
+    type(term_view_type), intent(in) :: view   !! the instant
+    class(force_term_type), intent(in), optional :: before
+      !! the term that stands before it in a list, which has searched
+
+    if (self%follows .and. present(before)) then
+      select type (before)
+      type is (touch_type)
+        if (self%movement%searches /= before%movement%searches) then
+          self%near = before%near
+          self%movement%searches = before%movement%searches
+        end if
+      class default
+        call internal_fault('friction follows no contact with a rigid body')
+      end select
+    else if (.not. still_holds(self, view)) then
+      call find_near(self, view, self%near, self%farthest)
+      self%then = view%obstacles(self%obstacle)
+      call remember_places(self%movement, view%u)
+    end if
+    call note_instant(self%movement, view)
+  end subroutine search
+
+  !> Whether no point is near that the last search has not found.
+  logical function still_holds(self, view) result(holds)
+    class(touch_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    real(wp) :: way
+
+    holds = .false.
+    if (.not. allocated(self%movement%u) .or. size(self%slots) == 0) return
+    associate (now => view%obstacles(self%obstacle))
+      way = norm2(now%centre - self%then%centre)
+      ! without a look at the points if the body alone has moved too far
+      if (way >= self%skin) return
+      way = way + moved(self%movement, view%u)
+      way = way + turned_at_most(self%then, now, maxval(self%begins), self%farthest + way)
+    end associate
+    holds = way < but_rounding*self%skin
+  end function still_holds
+
+  !> The points near the surface, and how far from the body's centre any point is.
+  subroutine find_near(self, view, near, farthest)
+    class(touch_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    integer, allocatable, intent(out) :: near(:)
+    real(wp), intent(out) :: farthest             !! [m]
+    type(obstacle_type) :: obstacle
+    logical :: is_near(size(self%slots))
+    real(wp) :: gap, normal(3), y(size(view%u, 2)), away, within
+    integer :: i
+
+    farthest = 0.0_wp
+    obstacle = view%obstacles(self%obstacle)
+    within = reach_of_shape(obstacle)
+    !$omp parallel do schedule(static) default(none) &
+    !$omp shared(self, view, obstacle, is_near, within) private(i, y, away, gap, normal) &
+    !$omp reduction(max:farthest)
+    do i = 1, size(self%slots)
+      y = place_of(view, int(self%slots(i)))
+      away = norm2(y - obstacle%centre(:size(y)))
+      farthest = max(farthest, away)
+      is_near(i) = away < within + self%begins(i) + self%skin
+      if (.not. is_near(i)) cycle
+      call find_gap(obstacle, y, gap, normal)
+      is_near(i) = gap < self%begins(i) + self%skin
+    end do
+    near = pack([(i, i=1, size(self%slots))], is_near)
+  end subroutine find_near
+
+  !> Points that are near the surface.
+  subroutine acting(self, view, slots)
+    class(touch_type), intent(in) :: self       !! the contact
+    type(term_view_type), intent(in) :: view    !! the instant
+    integer(i4), allocatable, intent(out) :: slots(:)
+    integer, allocatable :: near(:)
+
+    call take_near(self, view, near)
+    slots = self%slots(near)
+  end subroutine acting
+
+  !> Which points are near the surface: at an instant that was not searched, all may be.
+  subroutine take_near(self, view, near)
+    class(touch_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    integer, allocatable, intent(out) :: near(:)
+    integer :: i
+
+    if (is_noted(self%movement, view)) then
+      near = self%near
+    else
+      near = [(i, i=1, size(self%slots))]
+    end if
+  end subroutine take_near
+
   !> Where a point is [m].
   pure function place_of(view, k) result(y)
     type(term_view_type), intent(in) :: view
@@ -96,16 +218,18 @@ contains
     type(term_view_type), intent(in) :: view    !! the instant
     real(wp), intent(inout), contiguous :: force(:, :)
       !! (n_slots, dim) force density, added to [N/m3]
+    integer, allocatable :: near(:)
     real(wp) :: push(3), stored
-    integer :: i, k
+    integer :: n, k
     logical :: touches
 
-    !$omp parallel do schedule(static) default(none) shared(self, view, force) &
-    !$omp private(i, k, push, stored, touches)
-    do i = 1, size(self%slots)
-      call touch_point(self, view, i, touches, push, stored)
+    call take_near(self, view, near)
+    !$omp parallel do schedule(static) if (size(near) >= worth_threads) default(none) &
+    !$omp shared(self, view, force, near) private(n, k, push, stored, touches)
+    do n = 1, size(near)
+      call touch_point(self, view, near(n), touches, push, stored)
       if (.not. touches) cycle
-      k = self%slots(i)
+      k = self%slots(near(n))
       force(k, :) = force(k, :) + push(:size(force, 2))
     end do
   end subroutine add_force
@@ -116,16 +240,19 @@ contains
     type(term_view_type), intent(in) :: view    !! the instant
     real(wp), intent(inout), contiguous :: density(:)
       !! (n_slots) energy density, added to [J/m3]
+    integer, allocatable :: near(:)
     real(wp) :: push(3), stored
-    integer :: i
+    integer :: n, k
     logical :: touches
 
     if (self%part /= of_normal_force) return
-    !$omp parallel do schedule(static) default(none) shared(self, view, density) &
-    !$omp private(i, push, stored, touches)
-    do i = 1, size(self%slots)
-      call touch_point(self, view, i, touches, push, stored)
-      if (touches) density(self%slots(i)) = density(self%slots(i)) + stored
+    call take_near(self, view, near)
+    !$omp parallel do schedule(static) if (size(near) >= worth_threads) default(none) &
+    !$omp shared(self, view, density, near) private(n, k, push, stored, touches)
+    do n = 1, size(near)
+      call touch_point(self, view, near(n), touches, push, stored)
+      k = self%slots(near(n))
+      if (touches) density(k) = density(k) + stored
     end do
   end subroutine add_energy
 
@@ -220,22 +347,24 @@ contains
     type(term_view_type), intent(in) :: view
     real(wp) :: totals(6)
     type(running_type) :: running
+    integer, allocatable :: near(:)
     real(wp), allocatable :: push(:, :)
     logical, allocatable :: touches(:)
     real(wp) :: force(3), arm(3), stored
-    integer :: i, k
+    integer :: n, k
 
-    allocate (push(3, size(self%slots)), touches(size(self%slots)))
-    !$omp parallel do schedule(static) default(none) shared(self, view, push, touches) &
-    !$omp private(i, stored)
-    do i = 1, size(self%slots)
-      call touch_point(self, view, i, touches(i), push(:, i), stored)
+    call take_near(self, view, near)
+    allocate (push(3, size(near)), touches(size(near)))
+    !$omp parallel do schedule(static) if (size(near) >= worth_threads) default(none) &
+    !$omp shared(self, view, push, touches, near) private(n, stored)
+    do n = 1, size(near)
+      call touch_point(self, view, near(n), touches(n), push(:, n), stored)
     end do
     call new_running(view%body%order, running)
-    do i = 1, size(self%slots)
-      if (.not. touches(i)) cycle
-      k = self%slots(i)
-      force = -push(:, i)*view%body%volume(k)
+    do n = 1, size(near)
+      if (.not. touches(n)) cycle
+      k = self%slots(near(n))
+      force = -push(:, n)*view%body%volume(k)
       arm = -view%obstacles(self%obstacle)%centre
       arm(:view%body%dim) = arm(:view%body%dim) + place_of(view, k)
       call add_point(view%body%order, view%body%point(k), [force, cross(arm, force)], running)
@@ -272,19 +401,19 @@ contains
     end do
   end subroutine points_within
 
-  !> Take from displacements since the last instant what the body's material has moved at the points
-  !> that touch it: what is left does work on contact.
-  subroutine subtract_partner(self, view, moved)
+  !> Take from displacements since the last instant what the body's material has moved beside each
+  !> point: what is left does work on contact.
+  subroutine subtract_partner(self, view, slots, moved)
     class(touch_type), intent(in) :: self       !! the contact
     type(term_view_type), intent(in) :: view    !! the instant
-    real(wp), intent(inout) :: moved(:, :)      !! (n_slots, dim) [m]
+    integer(i4), intent(in) :: slots(:)         !! of some points
+    real(wp), intent(inout) :: moved(:, :)      !! (slots, dim) by how much they have moved [m]
     real(wp) :: shift(3)
-    integer :: i, k
+    integer :: n
 
-    do i = 1, size(self%slots)
-      k = self%slots(i)
-      shift = shift_at(view%obstacles(self%obstacle), place_of(view, k))
-      moved(k, :) = moved(k, :) - shift(:size(moved, 2))
+    do n = 1, size(slots)
+      shift = shift_at(view%obstacles(self%obstacle), place_of(view, int(slots(n))))
+      moved(n, :) = moved(n, :) - shift(:size(moved, 2))
     end do
   end subroutine subtract_partner
 

@@ -6,7 +6,8 @@ module pd_motion_loads
   use pd_base_expression, only: expression_type
   use pd_base_field, only: field_type, field_values, new_field
   use pd_base_kinds, only: wp, i4
-  use pd_force_term, only: force_term_type, term_list_type, term_view_type, no_stiffness
+  use pd_force_term, only: force_term_type, term_view_type, no_stiffness
+  use pd_force_terms, only: term_list_type
   use pd_motion_conditions, only: condition_fault, note_fault
   use pd_motion_curve, only: curve_type
   implicit none (type, external)

@@ -13,7 +13,8 @@ module pd_motion_system
   use pd_force_model, only: model_type, options_of, p_of
   use pd_force_obstacle, only: obstacle_type
   use pd_force_reference, only: point_dilatation, point_force
-  use pd_force_term, only: term_list_type, term_view_type
+  use pd_force_term, only: term_view_type
+  use pd_force_terms, only: term_list_type
   use pd_force_workspace, only: workspace_type
   use pd_motion_conditions, only: motion_type, impose, remember_start, free_component, &
     & condition_fault, renew_motions
@@ -253,6 +254,7 @@ contains
     end associate
     if (system%terms%inside == 0 .or. now == up_to_marks) return
     call view_of(system, t, view)
+    call system%terms%search(view)
     call system%terms%add_force(view, system%state%force)
     call share_halo(system%body, system%state%force)
   end subroutine renew_forces

@@ -22,7 +22,7 @@ module pd_set_up_prepare
   use pd_force_breaking, only: damage_of, find_weakest
   use pd_force_generic_bonds, only: begin_laws, refresh_bonds
   use pd_force_model, only: new_model
-  use pd_force_term, only: term_list_type
+  use pd_force_terms, only: term_list_type
   use pd_motion_loads, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system, explain_condition
   use pd_scene_content_rules, only: place_fault, scene_fault

@@ -10,7 +10,8 @@ module pd_set_up_rigid_bodies
   use pd_body_body, only: body_type
   use pd_force_contact, only: contact_rule_type, of_friction, of_normal_force
   use pd_force_obstacle, only: a_box, a_cylinder, a_half_space, a_sphere, obstacle_type
-  use pd_force_term, only: term_list_type, term_view_type
+  use pd_force_term, only: term_view_type
+  use pd_force_terms, only: term_list_type
   use pd_force_touch, only: new_touch, points_within, touch_type
   use pd_motion_pose, only: momentum_of, new_shape_pose
   use pd_motion_rigid_body, only: course_type, guide_body, place_obstacle, rigid_body_type, &
@@ -210,6 +211,7 @@ contains
         call terms%add(touch)
         if (.not. rule%friction > 0.0_wp) cycle
         call new_touch(body, delta, rule, touches, r, of_friction, touch)
+        touch%follows = .true.
         call terms%add(touch)
       end do
     end associate

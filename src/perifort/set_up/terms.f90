@@ -7,7 +7,7 @@ module pd_set_up_terms
     & of_normal_force
   use pd_force_dashpots, only: new_dashpots
   use pd_force_springs, only: new_springs
-  use pd_force_term, only: term_list_type
+  use pd_force_terms, only: term_list_type
   use pd_law_material, only: material_type
   use pd_motion_conditions, only: motion_type
   use pd_motion_loads, only: load_of, load_type
@@ -163,6 +163,7 @@ contains
         call terms%add(contact)
         if (.not. rule%friction > 0.0_wp) cycle
         call new_contact(body, delta, rule, of_friction, contact)
+        contact%follows = .true.
         call terms%add(contact)
       end associate
     end do

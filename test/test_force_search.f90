@@ -1,0 +1,267 @@
+!> Contact finds what is near from step to step: in runs with bodies that come as fast as they can,
+!> the forces from lists with a skin are compared at each step with sums over all pairs of points,
+!> and over all points.
+module test_force_search
+  use pd_base_error, only: fault_type => error_type
+  use pd_base_kinds, only: wp
+  use pd_family_family, only: allocate_bonds, bonds_type
+  use pd_force_contact, only: contact_type
+  use pd_force_obstacle, only: a_half_space, a_sphere, find_gap, obstacle_type, turned_at_most
+  use pd_force_term, only: term_view_type
+  use pd_force_touch, only: touch_type
+  use pd_motion_explicit_integrators, only: run_explicit
+  use pd_motion_observer, only: instant_type, observer_type
+  use pd_motion_system, only: system_type, view_of
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_prepare, only: set_up_type
+  use comparisons, only: max_abs
+  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
+  use bodies, only: expect, expect_true, noise, ready_alone, rotation_matrix
+  use test_scene_expect, only: expect_scene, line
+  implicit none (type, external)
+  private
+  public :: collect_force_search
+
+  real(wp), parameter :: h = 1.0e-3_wp            !! spacing of all bodies [m]
+  real(wp), parameter :: bulk = 1.0e9_wp/1.5_wp   !! E/(3 (1 - 2 nu)) [Pa]
+  character(*), parameter :: block = '&scene dimension = 3 /'//line// &
+    & '&material youngs_modulus = 1e9 density = 1e3 poissons_ratio = 0.25 /'//line// &
+    & "&body name = 'block' lower = -4e-3, -4e-3, -3e-3 upper = 4e-3, 4e-3, 0 "// &
+    & 'points = 8, 8, 3 /'//line
+
+  !> Compares at each step.
+  type, extends(observer_type) :: judge_type
+    integer :: steps = 0          !! compared
+    integer :: touching = 0       !! of these with forces
+    real(wp) :: off = 0.0_wp      !! largest deviation of a force over the largest force
+  contains
+    procedure :: observe
+  end type judge_type
+
+contains
+
+  subroutine collect_force_search(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('points that come fast', test_points), &
+      & new_unittest('pieces that come fast', test_pieces), &
+      & new_unittest('rigid bodies that come fast', test_rigid), &
+      & new_unittest('the bound of rotation', test_rotation)]
+  end subroutine collect_force_search
+
+  !> Forces of all terms, from their lists, and from sums over all pairs and points.
+  subroutine observe(observer, system, instant, error)
+    class(judge_type), intent(inout) :: observer
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    type(fault_type), allocatable, intent(out) :: error
+    type(term_view_type) :: view
+    real(wp), allocatable :: force(:, :), known(:, :)
+    integer :: t
+
+    call view_of(system, instant%time, view)
+    allocate (force(system%body%n_slots, 3), known(system%body%n_slots, 3), source=0.0_wp)
+    call system%terms%add_force(view, force)
+    do t = 1, system%terms%number()
+      select type (term => system%terms%items(t)%term)
+      type is (contact_type)
+        call add_all_pairs(system, term, known)
+      type is (touch_type)
+        call add_all_points(system, term, known)
+      class default
+        continue
+      end select
+    end do
+    observer%steps = observer%steps + 1
+    if (max_abs(known) > 0.0_wp) observer%touching = observer%touching + 1
+    if (.not. max_abs(force - known) <= 1.0e-11_wp*max_abs(known)) observer%off = max(observer%off, &
+      & max_abs(force - known)/max(max_abs(known), tiny(1.0_wp)))
+    if (instant%step < 0) allocate (error)
+  end subroutine observe
+
+  !> The force of all pairs that are closer than 0.9 spacings, or than at the start.
+  subroutine add_all_pairs(system, contact, force)
+    type(system_type), intent(in) :: system
+    type(contact_type), intent(in) :: contact
+    real(wp), intent(inout) :: force(:, :)
+    type(bonds_type) :: bonds
+    real(wp) :: r(3), d, begins, stiffness
+    integer :: k, j
+
+    call allocate_bonds(system%family, bonds)
+    associate (body => system%body, u => system%state%u)
+      ! 18 K/(pi delta^4), the density of a pair's force per volume of the other point
+      stiffness = contact%rule%stiffness*18*bulk &
+        & /(acos(-1.0_wp)*system%family%rule%delta**5)
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        call system%family%bonds_of(k, bonds)
+        do j = 1, body%n_slots
+          if (body%point(j) == 0 .or. j == k) cycle
+          r = body%x(j, :) - body%x(k, :)
+          begins = min(0.9_wp*h, norm2(r))
+          r = r + u(j, :) - u(k, :)
+          d = norm2(r)
+          if (d >= begins) cycle
+          if (contact%rule%pieces) then
+            if (any(bonds%j(:bonds%n) == j .and. bonds%intact(:bonds%n))) cycle
+          else
+            if (body%body(k) == body%body(j)) cycle
+          end if
+          force(k, :) = force(k, :) - stiffness*body%volume(j)*(begins - d)*r/d
+        end do
+      end do
+    end associate
+  end subroutine add_all_pairs
+
+  !> The force on all points that are nearer to a surface than half a spacing.
+  subroutine add_all_points(system, touch, force)
+    type(system_type), intent(in) :: system
+    type(touch_type), intent(in) :: touch
+    real(wp), intent(inout) :: force(:, :)
+    real(wp) :: gap, normal(3)
+    integer :: k
+
+    associate (body => system%body, u => system%state%u)
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        call find_gap(system%obstacles(touch%obstacle), body%x(k, :) + u(k, :), gap, normal)
+        if (gap >= h/2) cycle
+        force(k, :) = force(k, :) + touch%rule%stiffness*12*bulk/system%family%rule%delta**2 &
+          & *(h/2 - gap)*normal
+      end do
+    end associate
+  end subroutine add_all_points
+
+  !> Run a scene, compare at each of its steps; the number of searches that it took.
+  subroutine judge(text, searches, error)
+    character(*), intent(in) :: text
+    integer, intent(out) :: searches
+    type(error_type), allocatable, intent(inout) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(judge_type) :: observer
+    type(fault_type), allocatable :: fault
+    integer :: t
+
+    searches = 0
+    call expect_scene(error, text, scene)
+    if (allocated(error)) return
+    call ready_alone(scene, set_up, error)
+    if (allocated(error)) return
+    call run_explicit(set_up%system, trim(scene%time%integrator), set_up%plan%step, &
+      & set_up%plan%steps, observer, fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+    call expect_true(error, observer%steps > set_up%plan%steps, 'steps are missing')
+    call expect_true(error, observer%touching > 3, 'they hardly touch')
+    call expect(error, observer%off, 0.0_wp, 0.0_wp, 'forces')
+    do t = 1, set_up%system%terms%number()
+      select type (term => set_up%system%terms%items(t)%term)
+      type is (contact_type)
+        searches = term%movement%searches
+      type is (touch_type)
+        searches = term%movement%searches
+      class default
+        continue
+      end select
+    end do
+  end subroutine judge
+
+  !> A small body flies into the block at 50, 400 and 1500 m/s; the fastest goes by more than half a
+  !> skin in each step, so that each needs a search, the slowest by a twentieth of it.
+  subroutine test_points(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: speeds(3) = [character(4) :: '50', '400', '1500']
+    character(*), parameter :: integrators(3) = [character(16) :: 'forward_backward', &
+      & 'velocity_verlet', 'runge_kutta']
+    integer :: searches, i
+
+    do i = 1, 3
+      call judge(block//"&body name = 'shot' lower = -1e-3, -1e-3, 1e-3 upper = 1e-3, 1e-3, 3e-3 " &
+        & //'points = 2, 2, 2 /'//line//"&region name = 'shot' where = 'z > 0.5e-3' /"//line// &
+        & "&initial region = 'shot' velocity_z = -"//trim(speeds(i))//" velocity_x = 30 /"//line// &
+        & "&contact between = 'block', 'shot' /"//line//"&time integrator = '"// &
+        & trim(integrators(i))//"' steps = "//trim(merge('150', '60 ', i == 1))//' /', searches, &
+        & error)
+      if (i == 1) call expect_true(error, searches > 2 .and. searches < 75, 'searches')
+      if (i == 3) call expect_true(error, searches > 30, 'it was searched too seldom')
+      if (allocated(error)) return
+    end do
+  end subroutine test_points
+
+  !> The block, cut at half its length, whose halves meet at 40 and 600 m/s.
+  subroutine test_pieces(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: speeds(2) = [character(3) :: '40', '600']
+    integer :: searches, i
+
+    do i = 1, 2
+      call judge(block//'&crack corner = 0, -1, -1 edge_1 = 0, 2, 0 edge_2 = 0, 0, 2 /'//line// &
+        & "&region name = 'right' where = 'x > 0' /"//line// &
+        & "&initial region = 'right' velocity_x = -"//trim(speeds(i))//' velocity_y = 25 /'// &
+        & line//"&contact within = 'block' stiffness = 3 /"//line//'&time steps = 60 /', searches, &
+        & error)
+      if (i == 1) call expect_true(error, searches > 2 .and. searches < 50, 'searches')
+      if (allocated(error)) return
+    end do
+  end subroutine test_pieces
+
+  !> A sphere, a box and a cylinder that turn, and a half-space that moves, come fast.
+  subroutine test_rigid(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: bodies(5) = [character(170) :: &
+      & "shape = 'sphere' centre = 0, 0, 2.1e-3 radius = 2e-3 mass = 1e-4 velocity_z = -60", &
+      & "shape = 'sphere' centre = 0, 0, 2.1e-3 radius = 2e-3 mass = 1e-4 velocity_z = -1500", &
+      & "shape = 'box' centre = 0, 0, 4e-3 edges = 6e-3, 1e-3, 1e-3 mass = 1e-4 "// &
+      & 'velocity_z = -60 spin_y = 9e4 spin_x = 2e4', &
+      & "shape = 'cylinder' centre = 0, 0, 2.5e-3 radius = 1e-3 length = 6e-3 axis = 1, 0, 0 "// &
+      & 'mass = 1e-4 velocity_z = -60 spin_y = 5e4 spin_x = 4e5', &
+      & "shape = 'half_space' centre = 0, 0, -5e-3 normal = 0, 0, 1 displacement_z = '60*t' "// &
+      & "rotation = 'imposed' spin_y = 4e4"]
+    integer :: searches, i
+
+    do i = 1, size(bodies)
+      call judge(block//"&rigid name = 'tool' "//trim(bodies(i))//' /'//line// &
+        & "&contact between = 'block', 'tool' /"//line//'&time duration = 4e-5 /', searches, error)
+      if (i /= 2) call expect_true(error, searches > 1 .and. searches < 40, 'searches')
+      if (i == 2) call expect_true(error, searches > 20, 'it was searched too seldom')
+      if (allocated(error)) then
+        error%message = error%message//': '//trim(bodies(i))
+        return
+      end if
+    end do
+  end subroutine test_rigid
+
+  !> At places and rotations at random the distance from the surface changes by no more than the
+  !> bound, and now and then by half of it.
+  subroutine test_rotation(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(obstacle_type) :: before, now
+    real(wp) :: y(3), axis(3), gap, gap_before, normal(3), change, bound
+    integer :: shape, state, i, c, tight
+
+    state = 3
+    do shape = a_sphere, a_half_space
+      tight = 0
+      do i = 1, 2000
+        before%shape = shape
+        before%half = [0.7_wp, 0.7_wp, 1.6_wp]
+        axis = [(noise(state), c=1, 3)]
+        before%frame = rotation_matrix(axis/norm2(axis), 3*noise(state))
+        now = before
+        axis = [(noise(state), c=1, 3)]
+        now%frame = matmul(rotation_matrix(axis/norm2(axis), 0.5_wp*noise(state)), before%frame)
+        y = 2.0_wp*[(noise(state), c=1, 3)]
+        call find_gap(before, y, gap_before, normal)
+        call find_gap(now, y, gap, normal)
+        change = abs(gap - gap_before)
+        bound = turned_at_most(before, now, max(gap, 0.0_wp), norm2(y))
+        call expect_true(error, change <= bound + 1.0e-14_wp, 'the distance changes by more')
+        if (change > bound/2 .and. bound > 1.0e-3_wp) tight = tight + 1
+        if (allocated(error)) return
+      end do
+      if (shape /= a_sphere) call expect_true(error, tight > 20, 'the bound is far too high')
+    end do
+  end subroutine test_rotation
+
+end module test_force_search
