@@ -63,6 +63,26 @@ def save(figure, path, dpi=90):
     pictures.save(figure, Path(path), dpi)
 
 
+def small_film(results, field, path, width=480, colours=32, every=1):
+    """A gif of every so many-th frame of the film that `./pf plot --film gif` makes, so many points
+    wide and with few colours: small enough for a page. Pillow comes with matplotlib.
+    """
+    from PIL import Image
+    made, = results.plot(field=field, film="gif", to=results.folder, quiet=True)
+    with Image.open(made) as film:
+        size = (width, round(width * film.height / film.width))
+        frames = []
+        for number in range(film.n_frames):
+            film.seek(number)
+            frames.append(film.convert("RGB").resize(size, Image.Resampling.LANCZOS))
+    # The last frame is kept, which has all colours
+    frames = frames[(len(frames) - 1) % every::every]
+    palette = frames[-1].quantize(colours, dither=Image.Dither.NONE)
+    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=200 * every, loop=0)
+    print(f"  wrote {path}")
+
+
 RESULT_COLUMNS = ("error", "seconds", "points", "bonds", "steps", "bytes", "energy_drift", "pareto",
                   "value", "true_error")
 
