@@ -61,10 +61,10 @@ contains
     end associate
   end function momentum
 
-  !> Two equal bars meet at +- 1 m/s. They press for 2 L/c: their strain energy grows to all that there
-  !> is, until the waves are at the free ends, and falls to nothing, both linearly in time, so that it
-  !> is above half of that for L/c. Then they part with their velocities exchanged. A contact 60 times
-  !> as stiff as a bond gives way by a row of points in a hundred.
+  !> Two equal bars meet at +- 1 m/s. They press for 2 L/c: their strain energy grows to all that
+  !> there is, until the waves are at the free ends, and falls to nothing, both linearly in time, so
+  !> that it is above half of that for L/c. Then they part with their velocities exchanged. A
+  !> contact 60 times as stiff as a bond gives way by a row of points in a hundred.
   subroutine test_bars(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: length = 1.0_wp, speed = 1.0e3_wp
@@ -297,8 +297,8 @@ contains
       & 'they have not touched')
   end subroutine test_threads
 
-  !> Two blocks of glass that meet at 500 m/s, row on row: with a stiffness of 10 no pair comes nearer
-  !> than 0.3 spacings.
+  !> Two blocks of glass that meet at 500 m/s, row on row: with a stiffness of 10 no pair comes
+  !> nearer than 0.3 spacings.
   subroutine test_fast(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
@@ -353,8 +353,8 @@ contains
       & 'damping = 0.1 stiffness = 5 /'//line//'&time steps = 300 /'
     character(*), parameter :: blocks = '&scene dimension = 3 /'//line//soft// &
       & "&body name = 'a' lower = 0, 0, 0 upper = 0.08, 0.08, 0.03 points = 8, 8, 3 /"//line// &
-      & "&body name = 'b' lower = 0.023, 0.03, 0.03 upper = 0.063, 0.07, 0.07 points = 4, 4, 4 /"// &
-      & line//"&region name = 'a' where = 'z < 0.03' /"//line// &
+      & "&body name = 'b' lower = 0.023, 0.03, 0.03 upper = 0.063, 0.07, 0.07 points = 4, 4, 4 /" &
+      & //line//"&region name = 'a' where = 'z < 0.03' /"//line// &
       & "&region name = 'b' where = 'z > 0.03' /"//line
     type(set_up_type) :: still, moving, turned
     real(wp), allocatable :: v(:, :), other(:, :)
@@ -366,8 +366,8 @@ contains
     ! x, y, z become y, z, x
     call run('&scene dimension = 3 /'//line//soft// &
       & "&body name = 'a' lower = 0, 0, 0 upper = 0.03, 0.08, 0.08 points = 3, 8, 8 /"//line// &
-      & "&body name = 'b' lower = 0.03, 0.023, 0.03 upper = 0.07, 0.063, 0.07 points = 4, 4, 4 /"// &
-      & line//"&region name = 'b' where = 'x > 0.03' /"//line// &
+      & "&body name = 'b' lower = 0.03, 0.023, 0.03 upper = 0.07, 0.063, 0.07 points = 4, 4, 4 /" &
+      & //line//"&region name = 'b' where = 'x > 0.03' /"//line// &
       & "&initial region = 'b' velocity_y = 5 velocity_x = -8 /"//rest, turned, error)
     if (allocated(error)) return
     v = of_points(still)

@@ -57,6 +57,7 @@ contains
     type(fault_type), allocatable, intent(out) :: error
     type(term_view_type) :: view
     real(wp), allocatable :: force(:, :), known(:, :)
+    real(wp) :: off
     integer :: t
 
     call view_of(system, instant%time, view)
@@ -74,8 +75,11 @@ contains
     end do
     observer%steps = observer%steps + 1
     if (max_abs(known) > 0.0_wp) observer%touching = observer%touching + 1
-    if (.not. max_abs(force - known) <= 1.0e-11_wp*max_abs(known)) observer%off = max(observer%off, &
-      & max_abs(force - known)/max(max_abs(known), tiny(1.0_wp)))
+    if (.not. max_abs(force - known) <= 1.0e-11_wp*max_abs(known)) then
+      off = max_abs(force - known)/max(max_abs(known), tiny(1.0_wp))
+      ! one that is not a number counts, too
+      observer%off = max(observer%off, merge(off, huge(off), off <= huge(off)))
+    end if
     if (instant%step < 0) allocate (error)
   end subroutine observe
 

@@ -151,8 +151,8 @@ contains
     !$omp end parallel
   end function joins_labels
 
-  !> The cells around a cell and itself, as ranges of places in `order`: those along x stand one after
-  !> another.
+  !> The cells around a cell and itself, as ranges of places in `order`: those along x stand one
+  !> after another.
   pure subroutine rows_around(cells, cell, rows, number)
     type(cells_type), intent(in) :: cells      !! as `sort_into_cells` made them
     integer, intent(in) :: cell                !! from 1, as in `cell` of these

@@ -119,12 +119,12 @@ contains
     end select
   end function reach_of_shape
 
-  !> By how much at most rotation of a body from one time to another changes the distance between its
-  !> surface and a place that is nearer than `margin` to it then [m]. With its centre at rest a place
-  !> at y from it is as far from the surface as the place Q^T y was, where Q is the rotation: these
-  !> are |Q - 1| |y| apart. A sphere does not change by rotation, a cylinder and a half-space by that
-  !> of their axis alone, |Q - 1| is then the way of the axis' end; of a box the sum of squares of
-  !> all components is a bound.
+  !> By how much at most rotation of a body from one time to another changes the distance between
+  !> its surface and a place that is nearer than `margin` to it then [m]. With its centre at rest a
+  !> place at y from it is as far from the surface as the place Q^T y was, where Q is the rotation:
+  !> these are |Q - 1| |y| apart. A sphere does not change by rotation, a cylinder and a half-space
+  !> by that of their axis alone, |Q - 1| is then the way of the axis' end; of a box the sum of
+  !> squares of all components is a bound.
   pure real(wp) function turned_at_most(before, now, margin, farthest) result(most)
     type(obstacle_type), intent(in) :: before, now  !! the surface
     real(wp), intent(in) :: margin                  !! [m]

@@ -171,9 +171,9 @@ contains
     if (.not. associated(view%u)) call misused(self)
   end subroutine begin_nothing
 
-  !> Called whenever displacements are new, before forces are asked for: the place to find out what is
-  !> near. It changes no force: a term that was not asked finds the same in a slower way. By default
-  !> there is nothing to search.
+  !> Called whenever displacements are new, before forces are asked for: the place to find out what
+  !> is near. It changes no force: a term that was not asked finds the same in a slower way. By
+  !> default there is nothing to search.
   subroutine search_nothing(self, view, before)
     class(force_term_type), intent(inout) :: self  !! the term
     type(term_view_type), intent(in) :: view       !! the instant
@@ -187,8 +187,8 @@ contains
   end subroutine search_nothing
 
   !> The slots on which the term may act at an instant, in the order of their points: nowhere else
-  !> does it make forces or store energy. For a term that `acts_on_few`, which has a procedure of its
-  !> own.
+  !> does it make forces or store energy. For a term that `acts_on_few`, which has a procedure of
+  !> its own.
   subroutine acts_on_all(self, view, slots)
     class(force_term_type), intent(in) :: self       !! the term
     type(term_view_type), intent(in) :: view         !! the instant

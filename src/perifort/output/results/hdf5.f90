@@ -81,8 +81,8 @@ module pd_output_results_hdf5
 contains
 
   !> Start the library: silent (its errors become `error_type`), and without locks on files, so that
-  !> a file can be read while it is written. Further calls do nothing: with each, h5open_f would make
-  !> HDF5's Fortran types anew and keep the old ones, and closing a file searches all types.
+  !> a file can be read while it is written. Further calls do nothing: with each, h5open_f would
+  !> make HDF5's Fortran types anew and keep the old ones, and closing a file searches all types.
   subroutine start_hdf5(error)
     type(error_type), allocatable, intent(out) :: error
     logical, save :: started = .false.
