@@ -487,8 +487,6 @@ contains
     call refuse(head(2)//"&remove shape = 'box' upper = 1, 1 /", &
       & '&remove takes points of a mesh')
     call refuse(head(2)//"&horizon family = 'lattice' /", 'cannot have the lattice families')
-    call refuse(head(2)//"&horizon surface_correction = 'consistent' /", &
-      & "surface_correction = 'consistent' does not serve a mesh|meshes.nml")
 
   contains
 

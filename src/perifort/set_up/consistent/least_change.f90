@@ -148,7 +148,7 @@ contains
       if (maxval(abs(rest)) <= target) exit
       if (size(levels) == 0) cycle
       ! what rounding leaves outside of the matrix's range would grow without end
-      if (maxval(abs(rest)) > much*least) then
+      if (maxval(abs(rest))/much > least) then
         step = best
         exit
       end if
