@@ -29,10 +29,10 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('fast loops agree with the theory point by point', test_reference), &
-      & new_unittest('rotated bodies agree with the theory', test_turned), &
+      & new_unittest('long: rotated bodies agree with the theory', test_turned), &
       & new_unittest('a heated body has forces without its thermal strain', test_unheated), &
       & new_unittest('net force and moment vanish', test_balance), &
-      & new_unittest('rigid motions give no force', test_rigid), &
+      & new_unittest('long: rigid motions give no force', test_rigid), &
       & new_unittest('the force is the gradient of the energy', test_gradient), &
       & new_unittest('bonds do not depend on the order of their ends', test_mirror), &
       & new_unittest('stretch keeps its digits from 1e-16 to 10', test_stretch), &

@@ -31,7 +31,7 @@ contains
       & new_unittest('chain of springs, free and held, in closed form', test_chain), &
       & new_unittest('two points: one frequency', test_pair), &
       & new_unittest('a chain of 2000: the top of the dispersion relation', test_dispersion), &
-      & new_unittest('seven bodies: the ratios of a sparse eigenvalue solver', test_ratios), &
+      & new_unittest('long: seven bodies: the ratios of a sparse eigenvalue solver', test_ratios), &
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('everything constrained: no vibration', test_held), &
       & new_unittest('no breaking exceeds the lasting bound', test_lasting), &

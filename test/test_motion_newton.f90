@@ -44,7 +44,7 @@ contains
       & new_unittest('solves with growing residual', test_uphill), &
       & new_unittest('a growing crack', test_crack), &
       & new_unittest('a body without support', test_unsupported), &
-      & new_unittest('left to dynamic relaxation', test_fallback), &
+      & new_unittest('long: left to dynamic relaxation', test_fallback), &
       & new_unittest('a list of bonds', test_list), &
       & new_unittest('a block in mixed precision', test_mixed), &
       & new_unittest('no unconverged state within a load step becomes an output', test_no_rest)]
