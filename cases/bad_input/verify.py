@@ -29,8 +29,8 @@ import numpy as np
 
 from mutations import SCENE, bases, keys, mutant
 
-LIMIT = 10.0         # seconds that a process may take
-PATIENCE = 3.0       # seconds after which a run is asked to stop
+LIMIT = 20.0         # seconds that a process may take
+PATIENCE = 8.0       # seconds after which a run is asked to stop; a build with checks sets up in 3
 MEMORY = 4 << 30     # bytes of address space
 SHOWN = 20           # failures that are described
 
