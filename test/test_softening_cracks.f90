@@ -13,13 +13,13 @@ module test_softening_cracks
   use pd_motion_account, only: energies_of, energies_type
   use pd_motion_system, only: system_type
   use pd_output_report_begin, only: run_options_type
-  use pd_output_results_files, only: file_bytes
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: set_up_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: diary_type, expect_true, prepare_run, ready
   use comparisons, only: expect_close
+  use restarts, only: read_bytes
   implicit none (type, external)
   private
   public :: collect_softening_cracks
@@ -360,18 +360,6 @@ contains
     call expect_true(error, size(a) > 0 .and. size(a) == size(b), 'sizes of '//name)
     if (.not. allocated(error)) call expect_true(error, all(a == b), name//' differs')
   end subroutine expect_same_file
-
-  subroutine read_bytes(path, bytes)
-    character(*), intent(in) :: path
-    integer(i1), allocatable, intent(out) :: bytes(:)
-    integer :: unit
-
-    allocate (bytes(max(0_i8, file_bytes(path))))
-    if (size(bytes) == 0) return
-    open (newunit=unit, file=path, access='stream', form='unformatted', action='read')
-    read (unit) bytes
-    close (unit)
-  end subroutine read_bytes
 
   subroutine test_refused(error)
     type(error_type), allocatable, intent(out) :: error

@@ -130,6 +130,26 @@ contains
     node(3) = (number - 1)/(level%nodes(1)*level%nodes(2))
   end function node_at
 
+  !> The points that a spline reaches, cell by cell.
+  pure subroutine points_under(level, node, points)
+    type(level_type), intent(in) :: level
+    integer, intent(in) :: node(3)                      !! from 0
+    integer(i4), allocatable, intent(out) :: points(:)
+    integer :: cell(3), number, i, j, l
+
+    allocate (points(0))
+    do l = 0, merge(3, 0, level%dim > 2)
+      do j = 0, merge(3, 0, level%dim > 1)
+        do i = 0, 3
+          cell = node - [i, j, l]
+          if (any(cell < 0) .or. any(cell >= level%cells)) cycle
+          number = cell_number(level, cell)
+          points = [points, level%order(level%start(number):level%start(number + 1) - 1)]
+        end do
+      end do
+    end do
+  end subroutine points_under
+
   !> A spline and its gradient at point k; 0 where it does not reach.
   pure subroutine spline_at(level, node, k, value, gradient)
     type(level_type), intent(in) :: level
@@ -183,32 +203,25 @@ contains
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(inout) :: level
     real(wp) :: diagonal(level%dim), part
-    integer(i8) :: p, e
-    integer :: number, node(3), cell(3), i, j, l, k, u
+    integer(i4), allocatable :: points(:)
+    integer(i8) :: e
+    integer :: number, node(3), i, k, u
 
     allocate (level%inverse(level%dim, product(level%nodes)))
     !$omp parallel do schedule(dynamic, 8) default(none) shared(conditions, level) &
-    !$omp private(diagonal, part, p, e, number, node, cell, i, j, l, k, u)
+    !$omp private(diagonal, part, points, e, number, node, i, k, u)
     do number = 1, product(level%nodes)
       node = node_at(level, number)
       diagonal = 0.0_wp
-      do l = 0, merge(3, 0, level%dim > 2)
-        do j = 0, merge(3, 0, level%dim > 1)
-          do i = 0, 3
-            cell = node - [i, j, l]
-            if (any(cell < 0) .or. any(cell >= level%cells)) cycle
-            do p = level%start(cell_number(level, cell)), &
-                & level%start(cell_number(level, cell) + 1) - 1
-              k = int(level%order(p))
-              do e = conditions%start(k), conditions%start(k + 1) - 1
-                u = int(conditions%unknown(e))
-                part = of_bond(conditions, level, node, u)**2
-                ! a bond with both ends here is met twice
-                if (reaches(level, node, other_end(conditions, u, k))) part = part/2
-                diagonal = diagonal + part*conditions%n(:, e)**2
-              end do
-            end do
-          end do
+      call points_under(level, node, points)
+      do i = 1, size(points)
+        k = int(points(i))
+        do e = conditions%start(k), conditions%start(k + 1) - 1
+          u = int(conditions%unknown(e))
+          part = of_bond(conditions, level, node, u)**2
+          ! a bond with both ends here is met twice
+          if (reaches(level, node, other_end(conditions, u, k))) part = part/2
+          diagonal = diagonal + part*conditions%n(:, e)**2
         end do
       end do
       level%inverse(:, number) = diagonal
@@ -370,8 +383,8 @@ contains
     real(wp), intent(in) :: r(:, :)
     real(wp), intent(inout) :: c(:, :)  !! (dim, splines) set
     real(wp) :: total(3), value, gradient(3)
-    integer(i8) :: p
-    integer :: rows(3, 3), number, node(3), cell(3), i, j, l, k, x, y, dim
+    integer(i4), allocatable :: points(:)
+    integer :: rows(3, 3), number, node(3), i, k, x, y, dim
 
     dim = level%dim
     rows = 0
@@ -382,27 +395,18 @@ contains
     end do
     !$omp parallel do schedule(dynamic, 8) default(none) &
     !$omp shared(conditions, level, r, c, rows, dim) &
-    !$omp private(total, value, gradient, p, number, node, cell, i, j, l, k, x, y)
+    !$omp private(total, value, gradient, points, number, node, i, k, x, y)
     do number = 1, product(level%nodes)
       node = node_at(level, number)
       total = 0.0_wp
-      do l = 0, merge(3, 0, dim > 2)
-        do j = 0, merge(3, 0, dim > 1)
-          do i = 0, 3
-            cell = node - [i, j, l]
-            if (any(cell < 0) .or. any(cell >= level%cells)) cycle
-            do p = level%start(cell_number(level, cell)), &
-                & level%start(cell_number(level, cell) + 1) - 1
-              k = int(level%order(p))
-              call spline_at(level, node, k, value, gradient)
-              do x = 1, dim
-                total(x) = total(x) + conditions%shift(k)*value &
-                  & *r(dim*(dim + 1)/2 + x, k)
-                do y = 1, dim
-                  total(x) = total(x) + conditions%strain(k)*gradient(y)*r(rows(x, y), k)
-                end do
-              end do
-            end do
+      call points_under(level, node, points)
+      do i = 1, size(points)
+        k = int(points(i))
+        call spline_at(level, node, k, value, gradient)
+        do x = 1, dim
+          total(x) = total(x) + conditions%shift(k)*value*r(dim*(dim + 1)/2 + x, k)
+          do y = 1, dim
+            total(x) = total(x) + conditions%strain(k)*gradient(y)*r(rows(x, y), k)
           end do
         end do
       end do
