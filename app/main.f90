@@ -1,25 +1,34 @@
 !> Arguments -> one command -> exit status.
 program main
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, status_interrupted
   use pd_base_text, only: printable
+  use pd_comm_world, only: abort_world, begin_world, end_world, wait_for_turn, world_type
   use pd_command_line, only: command_line_type, read_command_line
   use pd_commands, only: execute
   implicit none (type, external)
 
+  type(world_type) :: world
   type(command_line_type) :: line
   type(error_type), allocatable :: error
   integer :: status
 
+  call begin_world(world)
   call read_command_line(line, error)
   if (.not. allocated(error)) call execute(line, error)
 
   status = 0
   if (allocated(error)) then
-    flush (output_unit)
-    write (error_unit, '(2a)') 'error: ', printable(error%message)
     status = error%status
+    flush (output_unit)
+    ! the rank that speaks first ends the others, except where all have stopped together
+    call wait_for_turn(world, error%elsewhere)
+    if (world%rank == 0 .or. status /= status_interrupted) &
+      & write (error_unit, '(2a)') 'error: ', printable(error%message)
+    flush (error_unit)
+    if (status /= status_interrupted) call abort_world(status)
   end if
+  call end_world()
   ! Quiet: the notes on floating-point flags that gfortran adds to `stop` say nothing to a user.
   stop status, quiet=.true.
 end program main

@@ -2,19 +2,16 @@
 !> (the points that it owns and copies of those within the horizon), and what ranks say to each
 !> other goes through memory that they share. Their runs, by the same integrators and solvers, have
 !> the bits of the run in one piece.
-!>
-!> Forces at a point must be added in an order that does not depend on which other points a rank
-!> has: lattices that sum a point's own bonds do that, in 1D and, with mixed precision, in 2D
-!> (doc/architecture.md, Ranks).
 module test_ranks
   use omp_lib, only: omp_get_num_threads, omp_get_thread_num
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_error, only: fault_type => error_type
-  use pd_base_order, only: ascending_order, block_points, number_points, order_type, ranks_type
-  use pd_base_reduce, only: add_point, first_largest, first_where, inner, largest_over, &
-    & least_over, new_running, noise, noise_after, running_type, sum_listed, sum_over, &
-    & total_of_running
-  use pd_body_body, only: allocate_points, body_type, gather, keep_points, own_points
+  use pd_base_order, only: ascending_order, number_points, order_type, ranks_type
+  use pd_base_reduce, only: add_point, bring_noise, first_largest, first_where, inner, &
+    & largest_over, least_over, new_running, noise, noise_after, running_type, sum_listed, &
+    & sum_over, total_of_running
+  use pd_body_body, only: allocate_points, body_type, gather
+  use pd_body_division, only: divide_space, division_type, take_part, work_of_points
   use pd_family_cracks, only: cut_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_force_breaking, only: damage_of
@@ -26,6 +23,7 @@ module test_ranks
   use pd_motion_static_relaxation, only: relaxation_type, run_relaxation
   use pd_motion_system, only: start_system, system_type
   use pd_set_up_prepare, only: set_up_type
+  use pd_set_up_ranks, only: find_lowest, reproducible_layer, work_of_body
   use pd_scene_content_types, only: crack_group, scene_type
   use bodies, only: box_scene, diary_type, expect, expect_true, ready
   use comparisons, only: expect_close, max_abs
@@ -56,12 +54,13 @@ module test_ranks
     procedure :: add_all
     procedure :: take_largest
     procedure :: share
+    procedure :: collect
   end type fake_type
 
   !> A rank's part of a system, and the numbers of its points.
   type :: part_type
     type(system_type) :: system
-    integer(i4), allocatable :: global(:)
+    integer, allocatable :: owner(:)      !! rank that owns each copy, from 1
     type(relaxation_type) :: relaxation
     type(diary_type) :: diary
     type(fault_type), allocatable :: fault
@@ -77,6 +76,7 @@ contains
       & new_unittest('random numbers begin anywhere', test_noise), &
       & new_unittest('places in ascending order', test_order), &
       & new_unittest('an explicit run', test_explicit), &
+      & new_unittest('an explicit run in space', test_block), &
       & new_unittest('a growing crack', test_crack), &
       & new_unittest('dynamic relaxation', test_relaxation), &
       & new_unittest('dynamic relaxation of a bar', test_bar), &
@@ -125,12 +125,22 @@ contains
     !$omp barrier
   end subroutine share
 
-  !> Where the ranks begin, as blocks.
-  pure function cuts_of(last) result(cut)
-    integer, intent(in) :: last(:)   !! points of the ranks
-    integer(i8) :: cut(size(last) - 1)
-    cut = last(:size(last) - 1)/block_points + 1_i8
-  end function cuts_of
+  subroutine collect(self, values, all_values)
+    class(fake_type), intent(inout) :: self
+    real(wp), intent(in) :: values(:)
+    real(wp), allocatable, intent(out) :: all_values(:)
+    integer :: r
+
+    self%hub%of_rank(self%rank)%values = values
+    !$omp barrier
+    allocate (all_values(0))
+    if (self%rank == 1) then
+      do r = 1, size(self%hub%of_rank)
+        all_values = [all_values, self%hub%of_rank(r)%values]
+      end do
+    end if
+    !$omp barrier
+  end subroutine collect
 
   ! ---------------------------------------------------------------- sums
 
@@ -186,7 +196,7 @@ contains
       end if
       call expect(error, total, first_total, 0.0_wp, 'the sum')
       call expect(error, product, first_product, 0.0_wp, 'the inner product')
-      call new_running(order, running)
+      call new_running(running)
       do i = 1, n
         call add_point(order, int(i, i4), [a(i)], running)
       end do
@@ -200,7 +210,7 @@ contains
         listed(i) = mod(i/2000, 2) == 1
       end do
       some = pack([(int(i, i4), i=1, n)], listed)
-      call new_running(order, running)
+      call new_running(running)
       do i = 1, size(some)
         call add_point(order, some(i), a(some(i):some(i)), running)
       end do
@@ -215,83 +225,109 @@ contains
         & in_slots(:, 2) < 1.0_wp) == findloc(b > 0.999_wp, .true., dim=1), 'the first place')
       if (allocated(error)) return
     end do
-    ! eight lanes of 32 terms, then trees: a few dozen roundings at most
-    call expect(error, first_product, real(exact, wp), &
-      & 50*epsilon(1.0_wp)*sum(abs(a*b)), 'the inner product in higher precision')
+    ! each term is cut off below 2^-60 of the largest one; the rest is one rounding, or three
+    call expect(error, first_product, real(exact, wp), 2.0_wp**(-60)*n*maxval(abs(a*b)) &
+      & + 3*epsilon(1.0_wp)*abs(first_product), &
+      & 'the inner product in higher precision')
   end subroutine test_arrangements
 
-  !> Sums over points that two and five ranks share, wherever they are cut.
+  !> Sums over points that some ranks share in any way.
   subroutine test_splits(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: n = 150000
     real(wp), allocatable :: a(:)
-    integer(i4), allocatable :: slot(:)
     type(order_type) :: whole
     real(wp) :: expected
-    integer :: i, state
+    integer :: i, state, owner(n)
 
     allocate (a(n))
     state = 77
     do i = 1, n
       a(i) = 1 + noise(state)*10.0_wp**(8*noise(state))
     end do
-    slot = [(int(i, i4), i=1, n)]
-    call number_points(slot, whole)
+    call number_points([(int(i, i4), i=1, n)], whole)
     expected = sum_over(whole, a)
-    call try([75000, n])
-    call try([65536, n])           ! where a group ends
-    call try([256, n])
-    call try([1, n])
-    call try([n - 1, n])
-    call try([1000, 1001, 1100, 65700, n])   ! three begin in one block
-    call try([0, 70000, 70000, 131072, n])   ! two that own nothing
+    owner = merge(1, 2, [(i, i=1, n)] <= n/2)
+    call try(2)
+    owner = merge(1, 2, [(i, i=1, n)] == 77)
+    call try(2)
+    owner = merge(1, 3, [(mod(i, 2), i=1, n)] == 0)   ! the second owns nothing
+    call try(3)
+    do i = 1, n
+      owner(i) = min(5, 1 + int(2.5_wp*(1 + noise(state))))
+    end do
+    call try(5)
+    ! terms of any size: what is below the last digit of the sum must not matter where it is
+    do i = 1, n
+      a(i) = noise(state)*10.0_wp**(40*noise(state))
+    end do
+    expected = sum_over(whole, a)
+    call try(5)
+    a = a*1.0e245_wp
+    expected = sum_over(whole, a)
+    call try(5)
+    a = a*1.0e-300_wp*1.0e-200_wp
+    expected = sum_over(whole, a)
+    call try(5)
 
   contains
 
-    subroutine try(last)
-      integer, intent(in) :: last(:)
+    subroutine try(ranks)
+      integer, intent(in) :: ranks
       type(hub_type), target :: hub
-      type(fake_type), target :: ranks(size(last))
-      real(wp) :: total(size(last)), one_by_one(size(last)), totals(6)
+      type(fake_type), target :: fake(ranks)
+      real(wp) :: total(ranks), one_by_one(ranks), listed(ranks), totals(6)
       real(wp), allocatable :: mine(:)
+      integer(i8), allocatable :: number(:)
+      integer(i4), allocatable :: slot(:)
+      integer :: states(ranks)
+      logical :: same(ranks)
       type(order_type) :: order
       type(running_type) :: running
       logical :: enough
-      integer :: r, first, p
+      integer :: r, p
 
       if (allocated(error)) return
-      allocate (hub%of_rank(size(last)))
+      allocate (hub%of_rank(ranks))
       enough = .false.
       total = 0.0_wp
       one_by_one = 0.0_wp
-      !$omp parallel num_threads(size(last)) default(none) &
-      !$omp shared(last, hub, ranks, total, one_by_one, a, slot, enough) &
-      !$omp private(r, p, first, order, mine, running, totals)
-      if (omp_get_num_threads() == size(last)) then
+      same = .true.
+      !$omp parallel num_threads(ranks) default(none) &
+      !$omp shared(ranks, owner, hub, fake, total, one_by_one, listed, a, enough, states, same) &
+      !$omp private(r, p, order, mine, number, slot, running, totals)
+      if (omp_get_num_threads() == ranks) then
         r = omp_get_thread_num() + 1
         if (r == 1) enough = .true.
-        ranks(r)%rank = r
-        ranks(r)%hub => hub
-        first = 1
-        if (r > 1) first = last(r - 1) + 1
-        mine = a(first:last(r))
+        fake(r)%rank = r
+        fake(r)%hub => hub
+        number = pack([(int(p, i8), p=1, n)], owner == r)
+        mine = a(number)
+        slot = [(int(p, i4), p=1, size(mine))]
         order = order_type()
-        order%cut = cuts_of(last)
-        order%ranks => ranks(r)
-        call number_points(slot(:size(mine)), order, 1, size(mine), first - 1_i8, int(n, i8))
+        order%ranks => fake(r)
+        call number_points(slot, order, number, int(n, i8))
         total(r) = sum_over(order, mine)
-        call new_running(order, running)
-        do p = 1, size(mine)
+        call new_running(running)
+        do p = size(mine), 1, -1
           call add_point(order, int(p, i4), [mine(p)], running)
         end do
         totals = total_of_running(order, running)
         one_by_one(r) = totals(1)
+        listed(r) = sum_listed(order, slot, mine)
+        do p = 1, size(mine)
+          call bring_noise(order, p, 4711, 3, states(r))
+          if (states(r) /= noise_after(4711, 3*(number(p) - 1))) same(r) = .false.
+          states(r) = noise_after(states(r), 3_i8)
+        end do
       end if
       !$omp end parallel
       if (.not. enough) return   ! a machine that has no threads to give
-      do r = 1, size(last)
+      do r = 1, ranks
         call expect(error, total(r), expected, 0.0_wp, 'the sum of a split')
         call expect(error, one_by_one(r), expected, 0.0_wp, 'a split, point by point')
+        call expect(error, listed(r), expected, 0.0_wp, 'a split, by a list')
+        call expect_true(error, same(r), 'random numbers of a split')
       end do
     end subroutine try
   end subroutine test_splits
@@ -351,8 +387,7 @@ contains
     scene%loads(1)%pressure = -1.0e5_wp
   end subroutine plate
 
-  !> Between the rows of the plate, and in a block of the sums: what is strained beyond the fast
-  !> formulas is decided for all slots of a block of the loops, which a rank must have.
+  !> In both precisions.
   subroutine test_explicit(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -361,11 +396,28 @@ contains
     scene%boundaries(1)%velocity(2) = -1.0_wp
     scene%boundaries(2)%velocity(2) = 2.0_wp
     scene%time%steps = 60
-    call compare(scene, [36*17], 'velocity_verlet', error)
-    call compare(scene, [36*5, 36*21, 36*40 + 36], 'forward_backward', error)
+    call compare(scene, 2, 'velocity_verlet', error)
+    scene%header%precision = 'double'
+    call compare(scene, 4, 'forward_backward', error)
     scene%time%integrator = 'adams_bashforth'
-    call compare(scene, [36*20], 'adams_bashforth', error)
+    call compare(scene, 3, 'adams_bashforth', error)
   end subroutine test_explicit
+
+  !> A block in space that ranks cut along all axes, both models.
+  subroutine test_block(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call box_scene([20, 12, 14], spacing, 0.25_wp, scene)
+    deallocate (scene%boundaries)
+    allocate (scene%boundaries(1))
+    scene%boundaries(1)%side = 'z_max'
+    scene%boundaries(1)%velocity = [0.5_wp, 0.0_wp, 2.0_wp]
+    scene%time%steps = 20
+    call compare(scene, 5, 'velocity_verlet', error)
+    scene%materials(1)%model = 'bond_based'
+    call compare(scene, 3, 'velocity_verlet', error)
+  end subroutine test_block
 
   !> The crack runs along the cut.
   subroutine test_crack(error)
@@ -381,9 +433,9 @@ contains
     scene%boundaries(1)%velocity(2) = -30.0_wp
     scene%boundaries(2)%velocity(2) = 30.0_wp
     scene%time%steps = 120
-    call compare(scene, [36*20], 'velocity_verlet', error, breaks=.true.)
+    call compare(scene, 2, 'velocity_verlet', error, breaks=.true.)
     scene%time%breaking = 'after_forces'
-    call compare(scene, [36*20, 36*22], 'velocity_verlet', error, breaks=.true.)
+    call compare(scene, 3, 'velocity_verlet', error, breaks=.true.)
   end subroutine test_crack
 
   !> Pieces are found on each rank by itself, so that the points of a rank must hang together: a
@@ -406,7 +458,7 @@ contains
 
     call pulled_plate(scene)
     scene%relaxation%solver = 'dynamic_relaxation'
-    call compare(scene, [36*12], 'relaxation', error)
+    call compare(scene, 2, 'relaxation', error)
   end subroutine test_relaxation
 
   subroutine test_gradients(error)
@@ -414,7 +466,7 @@ contains
     type(scene_type) :: scene
 
     call pulled_plate(scene)
-    call compare(scene, [36*12], 'relaxation', error)
+    call compare(scene, 2, 'relaxation', error)
   end subroutine test_gradients
 
   !> In 1D a rank may end anywhere.
@@ -432,76 +484,88 @@ contains
     scene%time%method = 'relaxation'
     scene%relaxation%solver = 'dynamic_relaxation'
     scene%relaxation%tolerance = 1.0e-5_wp
-    call compare(scene, [271, 409], 'relaxation', error)
+    call compare(scene, 3, 'relaxation', error)
   end subroutine test_bar
 
-  !> Run a scene in one piece, and by ranks of which all but the last end at `last`.
-  subroutine compare(scene, last, method, error, breaks)
+  !> Run a scene on one rank, and on some.
+  subroutine compare(scene, ranks, method, error, breaks)
     type(scene_type), intent(in) :: scene
-    integer, intent(in) :: last(:)
+    integer, intent(in) :: ranks
     character(*), intent(in) :: method
     type(error_type), allocatable, intent(inout) :: error
     logical, intent(in), optional :: breaks
     type(set_up_type) :: set_up
-    type(part_type), target :: parts(size(last) + 1)
-    type(fake_type), target :: ranks(size(last) + 1)
+    type(part_type) :: one
+    type(part_type), target :: parts(ranks)
+    type(fake_type), target :: fake(ranks)
     type(hub_type), target :: hub
-    type(diary_type) :: diary
-    type(fault_type), allocatable :: fault
+    type(work_of_points) :: work
+    type(division_type) :: division
+    type(body_type) :: body
     logical :: enough
-    integer :: n, r
+    integer :: r, blocks
 
     if (allocated(error)) return
     call ready(scene, set_up, error)
     if (allocated(error)) return
-    n = size(parts)
-    allocate (hub%of_rank(n))
-    associate (whole => set_up%system)
-      do r = 1, n
-        call take_part(set_up, scene%cracks, [last, whole%body%n_points], r, parts(r), error)
-        if (allocated(error)) return
-        ranks(r)%rank = r
-        ranks(r)%hub => hub
-        parts(r)%diary%every = 7
-      end do
-      do r = 1, n
-        call find_halo(parts, r, ranks(r))
-        parts(r)%system%body%order%ranks => ranks(r)
-      end do
-      enough = .false.
-      !$omp parallel num_threads(n) default(none) shared(n, parts, enough, method, set_up) &
-      !$omp private(r)
-      if (omp_get_num_threads() == n) then
-        r = omp_get_thread_num() + 1
-        if (r == 1) enough = .true.
-        call run(parts(r)%system, parts(r)%relaxation, method, set_up%plan%step, &
-          & set_up%plan%steps, parts(r)%diary, parts(r)%fault)
-      end if
-      !$omp end parallel
-      if (.not. enough) return   ! a machine that has no threads to give
-      diary%every = 7
-      call run(whole, set_up%plan%relaxation, method, set_up%plan%step, set_up%plan%steps, &
-        & diary, fault)
-      if (allocated(fault)) call test_failed(error, fault%message)
+    allocate (hub%of_rank(ranks))
+    call in_order(set_up%system%body, body)
+    call find_lowest(body)
+    blocks = reproducible_layer(scene%header%precision == 'mixed')
+    call work_of_body(body, blocks, work)
+    call divide_space(work, 1, division)
+    call make_part(set_up, scene%cracks, body, division, 1, one, error)
+    if (allocated(error)) return
+    call work_of_body(body, blocks, work)
+    call divide_space(work, ranks, division)
+    call expect_true(error, minval(division%work) > 0.0_wp, 'a rank without points')
+    do r = 1, ranks
+      call make_part(set_up, scene%cracks, body, division, r, parts(r), error)
       if (allocated(error)) return
-      call expect_true(error, whole%external_work > 0.0_wp .and. diary%n > 1, 'nothing happened')
-      if (present(breaks)) call expect_true(error, whole%broken > 20_i8, 'the crack stands')
-      do r = 1, n
-        if (allocated(parts(r)%fault)) then
-          call test_failed(error, parts(r)%fault%message)
-          return
-        end if
-        call same_fields(whole, parts(r), error)
-        call expect_true(error, parts(r)%system%broken == whole%broken, 'broken bonds')
-        call expect(error, parts(r)%system%dissipated, whole%dissipated, 0.0_wp, 'dissipated')
-        call expect(error, parts(r)%system%external_work, whole%external_work, 0.0_wp, 'work')
-        call expect_true(error, parts(r)%diary%n == diary%n, 'rows')
-        if (allocated(error)) return
-        call expect_close(error, parts(r)%diary%kinetic, diary%kinetic, 0.0_wp, &
-          & 'kinetic energy')
-        call expect_close(error, parts(r)%diary%strain, diary%strain, 0.0_wp, 'strain energy')
-      end do
-    end associate
+      fake(r)%rank = r
+      fake(r)%hub => hub
+      parts(r)%diary%every = 7
+    end do
+    do r = 1, ranks
+      call find_halo(parts, r, fake(r))
+      parts(r)%system%body%order%ranks => fake(r)
+    end do
+    enough = .false.
+    !$omp parallel num_threads(ranks) default(none) shared(ranks, parts, enough, method, set_up) &
+    !$omp private(r)
+    if (omp_get_num_threads() == ranks) then
+      r = omp_get_thread_num() + 1
+      if (r == 1) enough = .true.
+      call run(parts(r)%system, parts(r)%relaxation, method, set_up%plan%step, &
+        & set_up%plan%steps, parts(r)%diary, parts(r)%fault)
+    end if
+    !$omp end parallel
+    if (.not. enough) return   ! a machine that has no threads to give
+    one%diary%every = 7
+    call run(one%system, one%relaxation, method, set_up%plan%step, set_up%plan%steps, &
+      & one%diary, one%fault)
+    if (allocated(one%fault)) call test_failed(error, one%fault%message)
+    if (allocated(error)) return
+    call expect_true(error, one%system%external_work > 0.0_wp .and. one%diary%n > 1, &
+      & 'nothing happened')
+    if (present(breaks)) call expect_true(error, one%system%broken > 20_i8, 'the crack stands')
+    do r = 1, ranks
+      if (allocated(parts(r)%fault)) then
+        call test_failed(error, parts(r)%fault%message)
+        return
+      end if
+      call same_fields(one%system, parts(r)%system, error)
+      associate (here => parts(r)%system)
+        call expect_true(error, here%broken == one%system%broken, 'broken bonds')
+        call expect(error, here%dissipated, one%system%dissipated, 0.0_wp, 'dissipated')
+        call expect(error, here%external_work, one%system%external_work, 0.0_wp, 'work')
+      end associate
+      call expect_true(error, parts(r)%diary%n == one%diary%n, 'rows')
+      if (allocated(error)) return
+      call expect_close(error, parts(r)%diary%kinetic, one%diary%kinetic, 0.0_wp, &
+        & 'kinetic energy')
+      call expect_close(error, parts(r)%diary%strain, one%diary%strain, 0.0_wp, 'strain energy')
+    end do
   end subroutine compare
 
   subroutine run(system, relaxation, method, step, steps, diary, fault)
@@ -522,70 +586,58 @@ contains
 
   !> All that a rank's points have, bit by bit.
   subroutine same_fields(whole, part, error)
-    type(system_type), intent(in) :: whole
-    type(part_type), intent(in) :: part
+    type(system_type), intent(in) :: whole, part
     type(error_type), allocatable, intent(inout) :: error
     real(wp), allocatable :: of_points(:, :), of_part(:, :)
-    integer :: first, last, f
+    integer :: f
 
-    first = part%global(part%system%body%first_owned)
-    last = part%global(part%system%body%last_owned)
     allocate (of_points(whole%body%n_points, whole%body%dim))
-    allocate (of_part(last - first + 1, whole%body%dim))
+    allocate (of_part(part%body%order%n_owned, whole%body%dim))
     do f = 1, 4
       of_points = 0.0_wp
       of_part = 0.0_wp
       select case (f)
       case (1)
         call gather(whole%body, whole%state%u, of_points)
-        call gather(part%system%body, part%system%state%u, of_part)
+        call gather(part%body, part%state%u, of_part)
       case (2)
         call gather(whole%body, whole%state%v, of_points)
-        call gather(part%system%body, part%system%state%v, of_part)
+        call gather(part%body, part%state%v, of_part)
       case (3)
         call gather(whole%body, whole%state%force, of_points)
-        call gather(part%system%body, part%system%state%force, of_part)
+        call gather(part%body, part%state%force, of_part)
       case default
         if (size(whole%state%damage) == 0) cycle
         call gather(whole%body, whole%state%damage, of_points(:, 1))
-        call gather(part%system%body, part%system%state%damage, of_part(:, 1))
+        call gather(part%body, part%state%damage, of_part(:, 1))
       end select
       call expect_true(error, max_abs(of_points) > 0.0_wp .or. f == 2, 'an empty field')
-      call expect(error, max_abs(of_part - of_points(first:last, :)), 0.0_wp, 0.0_wp, &
+      call expect(error, max_abs(of_part - of_points(part%body%order%number, :)), 0.0_wp, 0.0_wp, &
         & 'a field of a rank')
     end do
   end subroutine same_fields
 
-  !> The part of a system that rank `r` has: the points after those of the ranks before up to
-  !> `last(r)`, and a halo. It is built as a scene's is, from these points alone.
-  subroutine take_part(set_up, cracks, last, r, part, error)
+  !> What rank `r`, from 1, has of a system. It is built as a scene's is, from its points alone.
+  subroutine make_part(set_up, cracks, whole_body, division, r, part, error)
     type(set_up_type), intent(in), target :: set_up
     type(crack_group), intent(in) :: cracks(:)
-    integer, intent(in) :: last(:), r
+    type(body_type), intent(in) :: whole_body   !! in point order
+    type(division_type), intent(in) :: division
+    integer, intent(in) :: r
     type(part_type), intent(out) :: part
     type(error_type), allocatable, intent(inout) :: error
     type(lattice_family_type), allocatable :: family
     type(fault_type), allocatable :: fault
     type(load_type), allocatable :: loads(:)
-    type(body_type) :: body
     real(wp), allocatable :: mass(:, :)
+    integer(i4), allocatable :: here(:)    ! slot here of each point of all, or 0
     integer(i8) :: cut
-    integer :: first, c, m
-    logical, allocatable :: keep(:)
+    integer :: i, m
 
-    first = 1
-    if (r > 1) first = last(r - 1) + 1
     associate (whole => set_up%system, system => part%system)
-      call in_order(whole%body, body)
-      call near(body%x, first, last(r), whole%family%rule%delta + spacing, keep)
-      part%global = pack([(int(c, i4), c=1, body%n_points)], keep)
-      call keep_points(body, keep)
-      system%body = body
-      call own_points(system%body, findloc(part%global, int(first, i4), dim=1), &
-        & findloc(part%global, int(last(r), i4), dim=1), &
-        & first - findloc(part%global, int(first, i4), dim=1, kind=i8), &
-        & int(whole%body%n_points, i8))
-      system%body%order%cut = cuts_of(last)
+      system%body = whole_body
+      call take_part(division, r - 1, whole%family%rule%delta + spacing, system%body, part%owner)
+      part%owner = part%owner + 1
       allocate (family)
       select type (of_whole => whole%family)
       type is (lattice_family_type)
@@ -597,6 +649,8 @@ contains
       if (allocated(fault)) call test_failed(error, fault%message)
       if (allocated(error)) return
       call move_alloc(family, system%family)
+      allocate (here(whole%body%n_points), source=0_i4)
+      here(system%body%number) = system%body%slot
       call new_model(system%body, whole%model%materials, whole%model%projected, &
         & spread(.false., 1, system%body%n_slots), spread(0.0_wp, 1, system%body%n_slots), &
         & system%model)
@@ -629,50 +683,38 @@ contains
       call gather(whole%body, set_up%plan%relaxation%mass, mass)
       deallocate (part%relaxation%mass)
       allocate (part%relaxation%mass, source=0.0_wp*system%state%u)
-      part%relaxation%mass(system%body%slot, :) = mass(part%global, :)
+      do i = 1, system%body%n_points
+        part%relaxation%mass(system%body%slot(i), :) = mass(system%body%number(i), :)
+      end do
     end associate
 
   contains
 
-    !> The slot of a slot's point here, or 0.
-    integer function here(slot)
-      integer(i4), intent(in) :: slot
-      here = findloc(part%global, set_up%system%body%point(slot), dim=1)
-      if (here > 0) here = part%system%body%slot(here)
-    end function here
-
     subroutine take_motion(of_whole, motion)
       type(motion_type), intent(in) :: of_whole
       type(motion_type), intent(out) :: motion
-      integer :: i
+      integer(i4), allocatable :: slots(:)
 
       motion%name = of_whole%name
       motion%kind = of_whole%kind
       motion%amplitude = of_whole%amplitude
       motion%curve = of_whole%curve
-      allocate (motion%slots(0))
-      do i = 1, size(of_whole%slots)
-        if (here(of_whole%slots(i)) > 0) motion%slots = [motion%slots, &
-          & int(here(of_whole%slots(i)), i4)]
-      end do
+      slots = here(set_up%system%body%point(of_whole%slots))
+      motion%slots = pack(slots, slots > 0)
     end subroutine take_motion
 
     subroutine take_load(of_whole, load)
       type(load_type), intent(in) :: of_whole
       type(load_type), intent(out) :: load
-      integer, allocatable :: rows(:)
-      integer :: i
+      integer(i4), allocatable :: slots(:)
+      integer :: k
 
       load%curve = of_whole%curve
-      allocate (load%slots(0), rows(0))
-      do i = 1, size(of_whole%slots)
-        if (here(of_whole%slots(i)) == 0) cycle
-        load%slots = [load%slots, int(here(of_whole%slots(i)), i4)]
-        rows = [rows, i]
-      end do
-      load%density = of_whole%density(rows, :)
+      slots = here(set_up%system%body%point(of_whole%slots))
+      load%density = of_whole%density(pack([(k, k=1, size(slots))], slots > 0), :)
+      load%slots = pack(slots, slots > 0)
     end subroutine take_load
-  end subroutine take_part
+  end subroutine make_part
 
   !> A body's points in their order.
   subroutine in_order(body, copy)
@@ -696,42 +738,24 @@ contains
     copy%grids = body%grids
   end subroutine in_order
 
-  !> The points from `first` to `last` and those within a distance of one of them.
-  subroutine near(x, first, last, distance, keep)
-    real(wp), intent(in) :: x(:, :)
-    integer, intent(in) :: first, last
-    real(wp), intent(in) :: distance
-    logical, allocatable, intent(out) :: keep(:)
-    integer :: i, j
-
-    allocate (keep(size(x, 1)), source=.false.)
-    keep(first:last) = .true.
-    do i = 1, size(x, 1)
-      do j = first, last
-        if (keep(i)) exit
-        keep(i) = sum((x(i, :) - x(j, :))**2) <= distance**2
-      end do
-    end do
-  end subroutine near
-
-  !> Who owns the points that rank `r` has copies of, and where they are there.
-  subroutine find_halo(parts, r, ranks)
+  !> Where the points are that rank `r` has copies of.
+  subroutine find_halo(parts, r, fake)
     type(part_type), intent(in) :: parts(:)
     integer, intent(in) :: r
-    type(fake_type), intent(inout) :: ranks
-    integer :: i, s, p
+    type(fake_type), intent(inout) :: fake
+    integer :: i
 
-    allocate (ranks%slot(0), ranks%owner(0), ranks%there(0))
-    do i = 1, size(parts(r)%global)
-      if (i >= parts(r)%system%body%first_owned .and. i <= parts(r)%system%body%last_owned) cycle
-      do s = 1, size(parts)
-        p = findloc(parts(s)%global, parts(r)%global(i), dim=1)
-        if (p < parts(s)%system%body%first_owned .or. p > parts(s)%system%body%last_owned) cycle
-        ranks%slot = [ranks%slot, int(parts(r)%system%body%slot(i))]
-        ranks%owner = [ranks%owner, s]
-        ranks%there = [ranks%there, int(parts(s)%system%body%slot(p))]
+    associate (body => parts(r)%system%body)
+      fake%owner = parts(r)%owner
+      fake%slot = int(body%slot(body%order%n_owned + 1:))
+      allocate (fake%there(size(fake%slot)))
+      do i = 1, size(fake%slot)
+        associate (other => parts(fake%owner(i))%system%body)
+          fake%there(i) = other%slot(findloc(other%order%number, &
+            & body%number(body%order%n_owned + i), dim=1))
+        end associate
       end do
-    end do
+    end associate
   end subroutine find_halo
 
 end module test_ranks

@@ -28,6 +28,7 @@ contains
       text = join([character(w) :: &
         & 'perifort run FILE [--output DIR] [--threads N] [--overwrite] [--quiet]', &
         & '                  [--restart [CHECKPOINT]] [--max-minutes M] [--set KEY=VALUE] ...', &
+        & '                  [--ranks N] [--reproducible]', &
         & '', &
         & 'Compute the scene in FILE and write the results.', &
         & '', &
@@ -38,15 +39,19 @@ contains
         & '                  continue from the last checkpoint of this run, or from CHECKPOINT;', &
         & '                  without any checkpoint start from the beginning', &
         & '  --max-minutes M stop after M minutes with a checkpoint (status 4)', &
+        & '  --ranks N       number of processes; ./pf starts them, elsewhere', &
+        & '                  mpirun -n N perifort-mpi run FILE does', &
+        & '  --reproducible  forces, and so all results, have the same bits on any number of ranks', &
         & '  --quiet         print errors only'], newline)
     case ('check')
       text = join([character(w) :: &
-        & 'perifort check FILE [--threads N] [--set KEY=VALUE] ...', &
+        & 'perifort check FILE [--threads N] [--ranks N] [--set KEY=VALUE] ...', &
         & '', &
         & 'Read and check the scene in FILE and build its points and bonds, without running it.', &
         & 'Prints points, bonds, memory, time step, the algorithms that were chosen and why, and', &
         & 'the predicted time of a run.', &
         & '', &
+        & '  --ranks N       also print how N ranks would share the points', &
         & set, threads], newline)
     case ('limits')
       text = join([character(w) :: &

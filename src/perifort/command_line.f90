@@ -17,11 +17,11 @@ module pd_command_line
     & 'run', 'check', 'limits', 'study', 'choose', 'template', 'reference', 'bench', 'version', &
     & 'help']
   integer, parameter :: restart_option = 4  !! its place in `option_names`
-  character(word_length), parameter :: option_names(20) = [character(word_length) :: &
+  character(word_length), parameter :: option_names(22) = [character(word_length) :: &
     & '--output', '--threads', '--overwrite', '--restart', '--max-minutes', '--quiet', '--points', &
     & '--dimension', '--model', '--family', '--breaking', '--precision', '--surface', '--generic', &
     & '--seconds', &
-    & '--csv', '--error', '--time', '--set', '--help']
+    & '--csv', '--error', '--time', '--set', '--ranks', '--reproducible', '--help']
 
   !> A command line, understood and checked.
   type :: command_line_type
@@ -35,6 +35,8 @@ module pd_command_line
     character(:), allocatable :: checkpoint        !! its value; '' = the newest of the run
     real(wp) :: max_minutes = 0.0_wp               !! `--max-minutes`; 0 = no limit
     logical :: quiet = .false.                     !! `--quiet`
+    integer :: ranks = 0                           !! `--ranks`; 0 = not given
+    logical :: reproducible = .false.              !! `--reproducible`
     type(bench_options_type) :: bench              !! the options of `bench`
     real(wp) :: seconds = 60.0_wp                  !! `--seconds` of `limits`
     real(wp) :: error = 0.0_wp                     !! `--error` of `choose`; 0 = not given
@@ -255,6 +257,7 @@ contains
     type(command_line_type), intent(inout) :: line
     character(*), intent(in) :: name, value
     type(error_type), allocatable, intent(out) :: error
+    integer, allocatable :: numbers(:)
     integer :: status
 
     select case (name)
@@ -319,6 +322,13 @@ contains
       call read_positive(value, line%max_minutes, status)
       if (status /= 0) call usage(error, line, &
         & "'--max-minutes' needs a number above 0, as in --max-minutes 50, found '"//value//"'")
+    case ('--ranks')
+      call read_numbers(value, numbers)
+      if (size(numbers) == 1) line%ranks = numbers(1)
+      if (line%ranks == 0) call usage(error, line, &
+        & "'--ranks' needs a whole number, as in --ranks 4, found '"//value//"'")
+    case ('--reproducible')
+      line%reproducible = .true.
     case ('--quiet')
       line%quiet = .true.
     case ('--help')
@@ -385,7 +395,7 @@ contains
   pure logical function takes_value(name)
     character(*), intent(in) :: name
     takes_value = all(name /= [character(word_length) :: '--overwrite', '--restart', '--quiet', &
-      & '--surface', '--generic', '--help'])
+      & '--surface', '--generic', '--reproducible', '--help'])
   end function takes_value
 
   !> Whether several words may follow. Where a file comes next, one must do.
@@ -412,8 +422,10 @@ contains
     case ('--points', '--dimension', '--model', '--family', '--breaking', '--precision', &
       & '--surface', '--generic', '--csv')
       belongs = command == 'bench'
-    case ('--restart', '--max-minutes')
+    case ('--restart', '--max-minutes', '--reproducible')
       belongs = command == 'run'
+    case ('--ranks')
+      belongs = command == 'run' .or. command == 'check'
     case ('--output', '--overwrite', '--quiet')
       belongs = any(command == [character(6) :: 'run', 'study', 'choose'])
     case default

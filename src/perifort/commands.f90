@@ -2,11 +2,13 @@
 module pd_commands
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_set_num_threads
-  use pd_base_error, only: error_type, internal_fault
+  use pd_base_error, only: error_type, fail, internal_fault, status_usage
+  use pd_base_text, only: newline, to_text
   use pd_base_threads, only: default_threads
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_command_help, only: help_text
   use pd_command_line, only: command_line_type, restart_command
+  use pd_comm_world, only: begin_world, world_type
   use pd_driver, only: run_scene
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_report_begin, only: run_options_type
@@ -46,6 +48,10 @@ contains
     names = fields%names()
     select case (line%command)
     case ('run', 'check', 'limits', 'study', 'choose')
+      call check_ranks(line, error)
+      if (allocated(error)) return
+      options%ranks = line%ranks
+      options%reproducible = line%reproducible
       options%output_directory = line%output_directory
       options%command = line%text
       options%threads = line%threads
@@ -86,6 +92,24 @@ contains
       call internal_fault('execute does not know a command of command_names')
     end select
   end subroutine execute
+
+  !> An error if there are not as many ranks as asked for, or if the command is for one rank.
+  subroutine check_ranks(line, error)
+    type(command_line_type), intent(in) :: line
+    type(error_type), allocatable, intent(out) :: error
+    type(world_type) :: world
+
+    call begin_world(world)
+    if (line%command /= 'run') then
+      if (world%ranks > 1) call fail(error, "'"//line%command//"' runs on one rank, found "// &
+        & to_text(world%ranks), status_usage)
+    else if (line%ranks > 0 .and. line%ranks /= world%ranks) then
+      call fail(error, "'--ranks "//to_text(line%ranks)//"' needs so many processes, found "// &
+        & to_text(world%ranks)//newline//'  start them by ./pf run FILE --ranks '// &
+        & to_text(line%ranks)//', or by mpirun -n '//to_text(line%ranks)//' perifort-mpi run FILE', &
+        & status_usage)
+    end if
+  end subroutine check_ranks
 
   !> Version, compiler with flags, HDF5.
   subroutine write_version()

@@ -1,9 +1,10 @@
 !> From a scene to its results, in the steps of chapter 7.
 module pd_driver
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail, status_usage
   use pd_base_interrupt, only: handlers_type, let_writes_fail, put_back_handlers, &
     & signal_handlers, watch_for_interrupt
+  use pd_comm_world, only: begin_world, world_type
   use pd_force_terms, only: term_list_type
   use pd_motion_observer, only: observer_type
   use pd_output_report_begin, only: run_options_type
@@ -48,28 +49,40 @@ contains
   end subroutine run_scene
 
   !> `run_scene` of a complete scene, with signals and threads of its own.
-  subroutine compute(scene, options, error, observer, answer, terms)
+  subroutine compute(scene, given, error, observer, answer, terms)
     type(scene_type), intent(in) :: scene
-    type(run_options_type), intent(in) :: options
+    type(run_options_type), intent(in) :: given
     type(error_type), allocatable, intent(out) :: error
     class(observer_type), intent(inout), optional, target :: observer
     type(answer_type), intent(out), optional :: answer
     type(term_list_type), intent(in), optional :: terms
+    type(run_options_type) :: own
     type(set_up_type) :: set_up
     type(run_output_type), target :: output
     type(pair_type) :: watchers
+    type(world_type), target :: world
 
+    own = given
     call let_writes_fail()
-    call output%look_back(scene, options, error)
+    call begin_world(world)
+    world%reproducible = own%reproducible
+    ! the first rank writes and speaks for all
+    own%files = own%files .and. world%rank == 0
+    own%quiet = own%quiet .or. world%rank > 0
+    if (own%restart .and. world%ranks > 1) then
+      call fail(error, 'a run on several ranks cannot continue from a checkpoint', status_usage)
+      return
+    end if
+    call output%look_back(scene, own, error)
     if (allocated(error) .or. output%complete) return
 
     ! points and families (7.1, 7.11), volumes (7.2) and surfaces (7.7), conditions (7.8), cracks
     ! and no-fail zones (7.9), and the time step (7.4) or the mass of relaxation (7.5)
-    call prepare(scene, set_up, error, options%threads, terms)
-    if (.not. allocated(error)) call output%foresee(scene, options, set_up, error)
+    call prepare(scene, set_up, error, own%threads, terms, world)
+    if (.not. allocated(error)) call output%foresee(scene, own, set_up, error)
     if (allocated(error)) return
 
-    call output%open(scene, options, set_up, present(answer), error)
+    call output%open(scene, own, set_up, present(answer), error)
     if (allocated(error) .or. output%complete) return
     watchers%recorder => output%recorder
     if (present(observer)) watchers%own => observer
@@ -78,7 +91,7 @@ contains
     ! integration in time (7.3) or load steps to equilibrium (7.5), with breaking (7.9, 7.10)
     call move(set_up%system, set_up%plan, watchers, error)
 
-    call output%close(scene, options, set_up, .not. watchers%own_fault, error)
+    call output%close(scene, own, set_up, .not. watchers%own_fault, error)
     if (present(answer)) call output%answer(answer)
   end subroutine compute
 

@@ -14,6 +14,7 @@ module pd_preview
   use pd_output_report_estimate, only: estimate
   use pd_output_report_overview, only: overview
   use pd_output_measures_measure, only: measure_list_type
+  use pd_output_report_ranks, only: table_of_ranks
   use pd_output_report_schedule, only: planned_outputs, planned_rows, schedule_of, schedule_type
   use pd_output_report_say, only: say
   use pd_output_report_summary, only: checkpoint_line, summary_before
@@ -87,6 +88,7 @@ contains
       call tell(summary_before(scene, system, plan, measures, set_up%cut, &
         & set_up%warnings, set_up%notes, set_up%team%threads()))
       call tell_lines(overview(scene, system, .not. plan%relaxes))
+      if (options%ranks > 0) call tell_lines(table_of_ranks(system%body, system%family, options%ranks))
       call estimate(scene, fields_of(options), system, plan, &
         & schedule_of(scene, plan, system%family%n_bonds), set_up%timer%total(), times)
       call tell_lines(times)

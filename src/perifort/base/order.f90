@@ -1,16 +1,17 @@
-!> The order of points: their numbers, fixed blocks of these, the slots in which they are, and the
-!> ranks that own them.
+!> The order of points: their numbers, blocks of them, the slots in which they are, and the ranks
+!> that own them.
 !>
-!> A rank is a process that owns a range of point numbers. There is one, which owns all points, as
-!> long as `ranks` points to nothing.
+!> A rank is a process that owns some of the points. It numbers them from 1, in the order of their
+!> numbers among all points, and copies of other ranks' points (its halo) come after them. There is
+!> one process, which owns all points, as long as `ranks` points to nothing.
 module pd_base_order
   use pd_base_kinds, only: wp, i4, i8
   implicit none (type, external)
   private
-  public :: order_type, ranks_type, block_points, block_of, place_of, owns
+  public :: order_type, ranks_type, block_points, number_of, owned_point, owns
   public :: number_points, slots_of_block, take_block, put_block, ascending_order
 
-  integer, parameter :: block_points = 256  !! points of a block, and blocks of a group
+  integer, parameter :: block_points = 256  !! points of a block
   !> Runs of points in consecutive slots are used if they have so many points in the mean.
   integer, parameter :: worth_runs = 8
 
@@ -20,6 +21,7 @@ module pd_base_order
     procedure(all_values), deferred :: add_all       !! each value summed over the ranks
     procedure(all_values), deferred :: take_largest  !! the largest of each value
     procedure(halo_values), deferred :: share         !! values of other ranks' points
+    procedure(all_points), deferred :: collect        !! values of all ranks, on the first one
   end type ranks_type
 
   abstract interface
@@ -38,64 +40,61 @@ module pd_base_order
       class(ranks_type), intent(inout) :: self
       real(wp), intent(inout) :: values(:, :)  !! (n_slots, components)
     end subroutine halo_values
+
+    !> Values of all ranks one after another, in the order of ranks, on the first one.
+    subroutine all_points(self, values, all_values)
+      import :: ranks_type, wp
+      implicit none (type, external)
+      class(ranks_type), intent(inout) :: self
+      real(wp), intent(in) :: values(:)                    !! of this rank; any number
+      real(wp), allocatable, intent(out) :: all_values(:)  !! of size 0 on the other ranks
+    end subroutine all_points
   end interface
 
-  !> Which points a process owns and where they are. Numbers of points are those of all ranks; a
-  !> point's number here is less by `before`.
+  !> Which points a process owns and where they are. Blocks are of 256 owned points that follow
+  !> each other.
   type :: order_type
-    integer(i8) :: first = 1_i8      !! owned points
-    integer(i8) :: last = 0_i8
+    integer :: n_owned = 0           !! owned points, the first ones here
     integer(i8) :: n_global = 0_i8   !! points of all ranks
-    integer(i8) :: before = 0_i8     !! number of an owned point minus its number here
-    integer(i8) :: first_block = 1_i8  !! block of the first owned point
-    integer :: blocks = 0            !! blocks with owned points
+    integer :: blocks = 0            !! of owned points
     logical :: in_runs = .true.      !! the runs below are there, else the slots
     integer(i4), allocatable :: begin(:)       !! first run of each block (blocks + 1)
     integer(i4), allocatable :: run_slot(:)    !! slot of a run's first point
     integer(i4), allocatable :: run_at(:)      !! its place in the block, from 1
     integer(i4), allocatable :: run_length(:)  !! points in consecutive slots
     integer(i4), allocatable :: slot(:)        !! of each owned point
-    integer(i8), allocatable :: cut(:)         !! block of the first point of each rank but the
-                                               !! first, ascending
+    integer(i8), allocatable :: number(:)      !! of each owned point among those of all ranks,
+                                               !! ascending; not allocated: its number here
     class(ranks_type), pointer :: ranks => null()  !! null: this process owns all points
   end type order_type
 
 contains
 
-  !> Note where the points are.
-  pure subroutine number_points(slot, order, first, last, before, n_global)
-    integer(i4), intent(in) :: slot(:)                 !! of the points here
-    type(order_type), intent(inout) :: order           !! `ranks` and `cut` stay as they are
-    integer, intent(in), optional :: first, last       !! owned points, by their numbers here; all
-    integer(i8), intent(in), optional :: before        !! added to these it is that of all ranks; 0
-    integer(i8), intent(in), optional :: n_global      !! points of all ranks
-    integer :: one, two, i, n, pass
-    integer(i8) :: block
+  !> Note where the owned points are, and their numbers among those of all ranks.
+  pure subroutine number_points(slot, order, number, n_global)
+    integer(i4), intent(in) :: slot(:)            !! (owned points)
+    type(order_type), intent(inout) :: order      !! `ranks` stays as it is
+    integer(i8), intent(in), optional :: number(:)  !! (owned points) ascending; if absent, all
+                                                    !! points are owned
+    integer(i8), intent(in), optional :: n_global   !! points of all ranks
+    integer :: i, n, pass, block
 
-    one = 1
-    two = size(slot)
-    if (present(first)) one = first
-    if (present(last)) two = last
-    order%before = 0_i8
-    if (present(before)) order%before = before
-    order%first = one + order%before
-    order%last = two + order%before
+    order%n_owned = size(slot)
     order%n_global = size(slot, kind=i8)
     if (present(n_global)) order%n_global = n_global
-    if (.not. allocated(order%cut)) allocate (order%cut(0))
-    order%first_block = block_of(order%first)
-    order%blocks = 0
-    if (two >= one) order%blocks = int(block_of(order%last) - order%first_block + 1_i8)
+    order%blocks = block_of(size(slot))
+    if (size(slot) == 0) order%blocks = 0
     if (allocated(order%begin)) deallocate (order%begin, order%run_slot, order%run_at, &
       & order%run_length)
     if (allocated(order%slot)) deallocate (order%slot)
+    if (present(number)) order%number = number
     allocate (order%begin(order%blocks + 1), source=1_i4)
     do pass = 1, 2
       n = 0
-      do i = one, two
-        block = block_of(i + order%before) - order%first_block + 1_i8
-        if (i > one) then
-          if (slot(i) == slot(i - 1) + 1_i4 .and. place_of(i + order%before) > 1) then
+      do i = 1, size(slot)
+        block = block_of(i)
+        if (i > 1) then
+          if (slot(i) == slot(i - 1) + 1_i4 .and. place_of(i) > 1) then
             if (pass == 2) order%run_length(n) = order%run_length(n) + 1_i4
             cycle
           end if
@@ -104,77 +103,99 @@ contains
         order%begin(block + 1) = int(n + 1, i4)
         if (pass == 1) cycle
         order%run_slot(n) = slot(i)
-        order%run_at(n) = int(place_of(i + order%before), i4)
+        order%run_at(n) = int(place_of(i), i4)
         order%run_length(n) = 1_i4
       end do
-      if (pass == 1) order%in_runs = int(n, i8)*worth_runs <= max(two - one + 1, 2*worth_runs)
+      if (pass == 1) order%in_runs = int(n, i8)*worth_runs <= max(size(slot), 2*worth_runs)
       if (.not. order%in_runs) exit
       if (pass == 1) allocate (order%run_slot(n), order%run_at(n), order%run_length(n))
     end do
     if (order%in_runs) return
-    order%slot = slot(one:two)
+    order%slot = slot
     allocate (order%run_slot(0), order%run_at(0), order%run_length(0))
   end subroutine number_points
 
-  !> The block of a point.
-  elemental integer(i8) function block_of(point)
-    integer(i8), intent(in) :: point  !! its number, among those of all ranks
-    block_of = (point - 1_i8)/block_points + 1_i8
+  !> The block of an owned point.
+  elemental integer function block_of(point)
+    integer, intent(in) :: point  !! its number here
+    block_of = (point - 1)/block_points + 1
   end function block_of
 
-  !> The place of a point in its block, from 1.
+  !> The place of an owned point in its block, from 1.
   elemental integer function place_of(point)
-    integer(i8), intent(in) :: point  !! its number, among those of all ranks
-    place_of = int(mod(point - 1_i8, int(block_points, i8))) + 1
+    integer, intent(in) :: point  !! its number here
+    place_of = mod(point - 1, block_points) + 1
   end function place_of
+
+  !> The number of an owned point among the points of all ranks.
+  elemental integer(i8) function number_of(order, point)
+    type(order_type), intent(in) :: order  !! the points that are owned
+    integer, intent(in) :: point           !! its number here
+    number_of = int(point, i8)
+    if (allocated(order%number)) number_of = order%number(point)
+  end function number_of
+
+  !> The number here of an owned point; 0 where another rank owns it.
+  pure integer function owned_point(order, number) result(point)
+    type(order_type), intent(in) :: order  !! the points that are owned
+    integer(i8), intent(in) :: number      !! its number among the points of all ranks
+    integer :: low, high
+
+    point = 0
+    if (.not. allocated(order%number)) then
+      if (number <= order%n_owned) point = int(number)
+      return
+    end if
+    low = 1
+    high = order%n_owned
+    do while (low <= high)
+      point = low + (high - low)/2
+      if (order%number(point) == number) return
+      if (order%number(point) < number) low = point + 1
+      if (order%number(point) > number) high = point - 1
+    end do
+    point = 0
+  end function owned_point
 
   !> Whether the point with this number here (0: none) is one that the process owns.
   elemental logical function owns(order, point)
     type(order_type), intent(in) :: order  !! the points that are owned
     integer(i4), intent(in) :: point  !! its number here, or 0
-    owns = point + order%before >= order%first .and. point + order%before <= order%last &
-      & .and. point > 0_i4
+    owns = point > 0_i4 .and. point <= order%n_owned
   end function owns
 
-  !> The slots of the owned points of a block: those of the places `at`, `at` + 1, ...
-  pure subroutine slots_of_block(order, block, at, n, slots)
+  !> The slots of the points of a block, in their order.
+  pure subroutine slots_of_block(order, block, n, slots)
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer, intent(in) :: block                !! 1 to `order%blocks`
-    integer, intent(out) :: at                  !! place of the first one in the block
     integer, intent(out) :: n                   !! how many
     integer, intent(out) :: slots(block_points)  !! the first `n` are set
-    integer(i8) :: first, last
-    integer :: r, i, m
+    integer :: r, i, first
 
-    first = max(order%first, (order%first_block + block - 2)*block_points + 1)
-    last = min(order%last, (order%first_block + block - 1)*block_points)
-    at = place_of(first)
-    n = int(last - first + 1_i8)
+    first = (block - 1)*block_points
+    n = min(order%n_owned - first, block_points)
     if (.not. order%in_runs) then
-      slots(:n) = order%slot(first - order%first + 1:last - order%first + 1)
+      slots(:n) = order%slot(first + 1:first + n)
       return
     end if
-    m = 0
     do r = order%begin(block), order%begin(block + 1) - 1
       do i = 1, order%run_length(r)
-        slots(m + i) = order%run_slot(r) + i - 1
+        slots(order%run_at(r) + i - 1) = order%run_slot(r) + i - 1
       end do
-      m = m + order%run_length(r)
     end do
   end subroutine slots_of_block
 
-  !> The values of a block's owned points at their places in the block; 0 elsewhere.
+  !> The values of a block's points at their places in the block; 0 behind the last one.
   pure subroutine take_block(order, block, values, taken)
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     integer, intent(in) :: block                      !! 1 to `order%blocks`
     real(wp), intent(in), contiguous :: values(:)     !! (n_slots)
     real(wp), intent(out) :: taken(block_points)  !! by place in the block
-    integer(i8) :: first, last
-    integer :: r, i, at, from
+    integer :: r, i, at, from, first, n
 
-    first = (order%first_block + block - 2)*block_points
-    last = min(order%last - first, int(block_points, i8))
-    if (first < order%first - 1_i8 .or. last < block_points) taken = 0.0_wp
+    first = (block - 1)*block_points
+    n = min(order%n_owned - first, block_points)
+    if (n < block_points) taken(n + 1:) = 0.0_wp
     if (order%in_runs) then
       do r = order%begin(block), order%begin(block + 1) - 1
         at = order%run_at(r)
@@ -183,8 +204,8 @@ contains
       end do
       return
     end if
-    do i = int(max(1_i8, order%first - first)), int(last)
-      taken(i) = values(order%slot(first + i - order%first + 1))
+    do i = 1, n
+      taken(i) = values(order%slot(first + i))
     end do
   end subroutine take_block
 
@@ -194,8 +215,7 @@ contains
     integer, intent(in) :: block                        !! 1 to `order%blocks`
     real(wp), intent(in) :: taken(block_points)  !! by place in the block
     real(wp), intent(inout), contiguous :: values(:)    !! (n_slots); others stay
-    integer(i8) :: first, last
-    integer :: r, i, at, from
+    integer :: r, i, at, from, first
 
     if (order%in_runs) then
       do r = order%begin(block), order%begin(block + 1) - 1
@@ -205,10 +225,9 @@ contains
       end do
       return
     end if
-    first = (order%first_block + block - 2)*block_points
-    last = min(order%last - first, int(block_points, i8))
-    do i = int(max(1_i8, order%first - first)), int(last)
-      values(order%slot(first + i - order%first + 1)) = taken(i)
+    first = (block - 1)*block_points
+    do i = 1, min(order%n_owned - first, block_points)
+      values(order%slot(first + i)) = taken(i)
     end do
   end subroutine put_block
 

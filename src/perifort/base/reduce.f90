@@ -1,45 +1,66 @@
 !> Global sums, extremes, first places and random starts over the points of a body.
 !>
-!> Terms are added over fixed blocks of point numbers, whatever slots the points have: within a
-!> block of 256 points in eight lanes, point by point, then the lanes; the sums of 256 blocks that
-!> follow each other the same way (a group); then group by group. So a sum has the same bits for
-!> any arrangement of the slots, any number of threads and any split of the points among ranks.
+!> Sums have the same bits in any order of the terms: for any arrangement of the slots, any number of
+!> threads and any split of the points among ranks. Each term is cut into digits of 30 bits, whole
+!> multiples of 2^(30 i), from the first one down, each the part towards 0 of what the digits above
+!> leave. Sums of digits are sums of integers. Where the largest term begins with the digit i, the
+!> sum is that of the digits i, i - 1 and i - 2 of all terms: what is left out is below 2^-60 of the
+!> largest term for each. (Demmel and Nguyen, Parallel reproducible summation, IEEE Transactions on
+!> Computers 64, 2015, cut terms in this way.)
 !>
-!> What ranks exchange (`pd_base_order`) is one `add_all` or `take_largest` for a sum or an extreme:
-!> every number that is added has one rank that knows it, and is 0 in all others, so that these sums
-!> are exact in any order.
+!> What ranks exchange (`pd_base_order`) is one `add_all` or `take_largest` for some sums or an
+!> extreme. The sums of digits are exact there, too.
 module pd_base_reduce
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp, i4, i8
-  use pd_base_lanes, only: lanes
-  use pd_base_order, only: block_of, block_points, order_type, owns, place_of, slots_of_block, &
-    & take_block
+  use pd_base_order, only: block_points, number_of, order_type, owns, slots_of_block, take_block
   implicit none (type, external)
   private
   public :: sums_type, running_type
   public :: new_sums, add_block, total_of, new_running, add_point, total_of_running
   public :: inner, sum_over, sum_listed, largest_over, least_over, first_where, first_largest
-  public :: largest_of_ranks, sum_of_ranks, count_of_ranks, noise, noise_after
+  public :: largest_of_ranks, sum_of_ranks, count_of_ranks, any_of_ranks, noise, noise_after, bring_noise
 
   integer, parameter :: most_running = 6    !! sums that one `running_type` forms
-  integer, parameter :: worth_blocks = 4096 !! points of a list that is summed in blocks
+  integer, parameter :: worth_threads = 4096 !! terms of a list that threads share
+
+  integer, parameter :: bits = 30           !! of a digit
+  integer, parameter :: bins = 63           !! digits that a number of the machine can have
+  integer, parameter :: kept = 3            !! digits of a sum, from its first one
+  integer, parameter :: middle = 32         !! the bin of multiples of 1
+  real(wp), parameter :: largest_term = 2.0_wp**(bits*(bins + 1 - middle))  !! has no digits
+  integer(i8), parameter :: base = 2_i8**bits
+
+  !> The digits of the sum of some terms.
+  type :: digits_type
+    integer :: first = 0                  !! the largest term's first bin, 0: all terms are 0
+    integer(i8) :: digit(kept) = 0_i8     !! from the bin `first` downwards
+    real(wp) :: beyond = 0.0_wp           !! the plain sum of terms without digits
+  end type digits_type
+
+  !> The sum of many blocks: digits of all bins, how many blocks begin in each bin, and the plain sum
+  !> of terms without digits.
+  type :: whole_type
+    integer(i8) :: digit(bins) = 0_i8
+    integer(i8) :: carry(bins) = 0_i8     !! of the digits of several ranks, in units of 2^31 of
+                                          !! these
+    integer(i8) :: begin(bins) = 0_i8
+    real(wp) :: beyond = 0.0_wp
+  end type whole_type
 
   !> Some sums at once, block by block; blocks may be added by different threads.
   type :: sums_type
     private
-    integer :: number = 0                          !! of sums
-    real(wp), allocatable :: block(:, :)           !! (number, blocks)
-    real(wp), allocatable :: cut(:, :, :)          !! terms of cut blocks (points, number, cuts)
+    integer :: number = 0                              !! of sums
+    type(digits_type), allocatable :: block(:, :)      !! (number, blocks)
   end type sums_type
 
-  !> Some sums at once of a few points, which are added in ascending order.
+  !> Some sums at once of a few points, in any order.
   type :: running_type
     private
-    integer(i8) :: block = 0_i8                          !! of the last point, 0: none yet
-    integer(i8) :: group = 0_i8
-    real(wp) :: point_lane(lanes, most_running) = 0.0_wp
-    real(wp) :: block_lane(lanes, most_running) = 0.0_wp
-    real(wp) :: total(most_running) = 0.0_wp
-    type(sums_type), allocatable :: of_ranks             !! where there are more than one
+    integer :: waiting = 0                             !! terms that are not in digits yet
+    real(wp), allocatable :: terms(:, :)               !! (block_points, most_running)
+    type(whole_type), allocatable :: whole(:)          !! (most_running)
   end type running_type
 
   !> Sum of a b over all points, of all components.
@@ -54,30 +75,130 @@ module pd_base_reduce
 
 contains
 
-  ! ---------------------------------------------------------------- sums in blocks
+  ! ---------------------------------------------------------------- digits
 
-  ! The parentheses below fix the order of sums, which the compiler may change without.
+  !> The digits of a sum of at most 256 terms.
+  pure type(digits_type) function digits_of(terms) result(sum_of_digits)
+    real(wp), intent(in), contiguous :: terms(:)
+    real(wp) :: left(block_points), plain, largest, scale_up
+    integer(i4) :: digit
+    integer(i8) :: total
+    integer :: n, i, d, b
 
-  !> The sum of a block's terms.
-  pure real(wp) function sum_of_block(terms) result(total)
-    real(wp), intent(in) :: terms(block_points)
-    real(wp) :: lane(lanes)
-    integer :: i, l
-
-    lane = 0.0_wp
-    do i = 0, block_points - lanes, lanes
-      do l = 1, lanes
-        lane(l) = (lane(l) + terms(i + l))
-      end do
+    n = size(terms)
+    plain = 0.0_wp
+    do i = 1, n
+      plain = plain + terms(i)
     end do
-    total = sum_of_lanes(lane)
-  end function sum_of_block
+    if (.not. ieee_is_finite(plain)) then
+      sum_of_digits%beyond = plain
+      return
+    end if
+    largest = 0.0_wp
+    do i = 1, n
+      largest = max(largest, abs(terms(i)))
+    end do
+    if (largest >= largest_term) then
+      sum_of_digits%beyond = plain
+      return
+    end if
+    if (.not. largest > 0.0_wp) return
+    ! the largest term is below 2^exponent
+    b = max(kept, (exponent(largest) + bits*middle + bits - 1)/bits - 1)
+    sum_of_digits%first = b
+    scale_up = 2.0_wp**(bits*(middle - b))
+    do i = 1, n
+      left(i) = terms(i)*scale_up
+    end do
+    do d = 1, kept
+      total = 0_i8
+      do i = 1, n
+        digit = int(left(i), i4)
+        left(i) = (left(i) - digit)*base
+        total = total + digit
+      end do
+      sum_of_digits%digit(d) = total
+    end do
+  end function digits_of
 
-  pure real(wp) function sum_of_lanes(lane) result(total)
-    real(wp), intent(in) :: lane(lanes)
-    total = (((lane(1) + lane(5)) + (lane(3) + lane(7))) &
-      & + ((lane(2) + lane(6)) + (lane(4) + lane(8))))
-  end function sum_of_lanes
+  !> Add digits to a whole sum.
+  pure subroutine add_digits(more, whole)
+    type(digits_type), intent(in) :: more
+    type(whole_type), intent(inout) :: whole
+    integer :: d
+
+    if (.not. ieee_is_finite(more%beyond) .or. abs(more%beyond) > 0.0_wp) &
+      & whole%beyond = whole%beyond + more%beyond
+    if (more%first == 0) return
+    whole%begin(more%first) = whole%begin(more%first) + 1_i8
+    do d = 1, kept
+      whole%digit(more%first - d + 1) = whole%digit(more%first - d + 1) + more%digit(d)
+    end do
+  end subroutine add_digits
+
+  !> The values of whole sums, over all ranks.
+  subroutine values_of(order, whole, total)
+    type(order_type), intent(in) :: order            !! which ranks there are
+    type(whole_type), intent(inout) :: whole(:)      !! of this rank
+    real(wp), intent(out) :: total(:)
+    integer(i8), parameter :: half = 2_i8**31
+    real(wp), allocatable :: message(:, :)
+    integer :: s
+
+    if (associated(order%ranks)) then
+      ! digits in two parts, so that their sums over any number of ranks are exact as reals
+      allocate (message(3*bins + 1, size(whole)))
+      do s = 1, size(whole)
+        message(:bins, s) = real(whole(s)%digit/half, wp)
+        message(bins + 1:2*bins, s) = real(mod(whole(s)%digit, half), wp)
+        message(2*bins + 1:3*bins, s) = real(whole(s)%begin, wp)
+        message(3*bins + 1, s) = whole(s)%beyond
+      end do
+      call add_everywhere(order, size(message), message)
+      do s = 1, size(whole)
+        whole(s)%carry = nint(message(:bins, s), i8)
+        whole(s)%digit = nint(message(bins + 1:2*bins, s), i8)
+        whole(s)%begin = nint(message(2*bins + 1:3*bins, s), i8)
+        whole(s)%beyond = message(3*bins + 1, s)
+      end do
+    end if
+    do s = 1, size(whole)
+      total(s) = value_of(whole(s))
+    end do
+  end subroutine values_of
+
+  !> Add numbers over all ranks.
+  subroutine add_everywhere(order, n, numbers)
+    type(order_type), intent(in) :: order
+    integer, intent(in) :: n
+    real(wp), intent(inout) :: numbers(n)
+    call order%ranks%add_all(numbers)
+  end subroutine add_everywhere
+
+  !> The value of a whole sum. Its digits are first brought below 2^30 in size, so that the value
+  !> depends on the sum alone.
+  pure real(wp) function value_of(whole) result(total)
+    type(whole_type), intent(in) :: whole
+    integer(i8) :: digit(0:kept)   ! digit(0) is what exceeds the first bin
+    integer :: d, first
+
+    total = whole%beyond
+    first = findloc(whole%begin > 0_i8, .true., dim=1, back=.true.)
+    if (first == 0) return
+    digit(0) = 0_i8
+    do d = 1, kept
+      digit(d) = whole%digit(first - d + 1)
+      digit(d - 1) = digit(d - 1) + 2*whole%carry(first - d + 1)  ! 2^31 is twice the upper unit
+    end do
+    do d = kept, 1, -1
+      digit(d - 1) = digit(d - 1) + digit(d)/base
+      digit(d) = mod(digit(d), base)
+    end do
+    total = total + (((real(digit(0), wp)*base + real(digit(1), wp))*base + real(digit(2), wp)) &
+      & + real(digit(3), wp)/base)*2.0_wp**(bits*(first - 1 - middle))
+  end function value_of
+
+  ! ---------------------------------------------------------------- sums in blocks
 
   !> Room for `number` sums.
   pure subroutine new_sums(order, number, sums)
@@ -87,25 +208,17 @@ contains
 
     sums%number = number
     allocate (sums%block(number, order%blocks))
-    if (size(order%cut) == 0) return
-    allocate (sums%cut(block_points, number, size(order%cut)), source=0.0_wp)
   end subroutine new_sums
 
-  !> Take the terms of a block, which are 0 at places without an owned point.
-  pure subroutine add_block(order, block, terms, sums)
-    type(order_type), intent(in) :: order  !! which points are owned
-    integer, intent(in) :: block                  !! 1 to `order%blocks`, each once
-    real(wp), intent(in) :: terms(:, :)           !! (block_points, number)
+  !> Take the terms of a block.
+  pure subroutine add_block(block, terms, sums)
+    integer, intent(in) :: block                  !! 1 to the order's `blocks`, each once
+    real(wp), intent(in), contiguous :: terms(:, :)  !! (any of its points and zeros, number)
     type(sums_type), intent(inout) :: sums  !! with the sums of the block on return
-    integer :: s, i
+    integer :: s
 
     do s = 1, sums%number
-      sums%block(s, block) = sum_of_block(terms(:, s))
-    end do
-    do i = 1, size(order%cut)
-      if (order%cut(i) /= order%first_block + block - 1) cycle
-      sums%block(:, block) = 0.0_wp
-      sums%cut(:, :, i) = terms
+      sums%block(s, block) = digits_of(terms(:, s))
     end do
   end subroutine add_block
 
@@ -114,224 +227,88 @@ contains
     type(order_type), intent(in) :: order  !! which points are owned
     type(sums_type), intent(in) :: sums  !! every block has been added
     real(wp) :: total(sums%number)
-    real(wp) :: group(sums%number)
-    integer :: b, place
+    type(whole_type) :: whole(sums%number)
+    integer :: b, s
 
-    if (associated(order%ranks)) then
-      total = total_of_ranks(order, sums)
-      return
-    end if
-    total = 0.0_wp
-    b = 1
-    do while (b <= order%blocks)
-      place = place_of(order%first_block + b - 1_i8)
-      call sum_group(order, sums, b, place, group)
-      total = (total + group)
-      b = b + block_points - place + 1
+    do b = 1, size(sums%block, 2)
+      do s = 1, sums%number
+        call add_digits(sums%block(s, b), whole(s))
+      end do
     end do
+    call values_of(order, whole, total)
   end function total_of
-
-  !> The sums of the blocks of a group, of which `first` is the first one here, at a place.
-  pure subroutine sum_group(order, sums, first, at, values)
-    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
-    type(sums_type), intent(in) :: sums
-    integer, intent(in) :: first, at
-    real(wp), intent(out) :: values(:)
-    real(wp) :: terms(block_points)
-    integer :: n, s
-
-    n = min(block_points - at + 1, order%blocks - first + 1)
-    do s = 1, sums%number
-      terms(:at - 1) = 0.0_wp
-      terms(at:at + n - 1) = sums%block(s, first:first + n - 1)
-      terms(at + n:) = 0.0_wp
-      values(s) = sum_of_block(terms)
-    end do
-  end subroutine sum_group
-
-  !> The same where there are more ranks than one. Blocks and groups in which a rank begins are
-  !> completed from the parts of all ranks.
-  function total_of_ranks(order, sums) result(total)
-    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
-    type(sums_type), intent(in) :: sums
-    real(wp) :: total(sums%number)
-    real(wp), allocatable :: group(:, :), parts(:, :, :), values(:)
-    integer(i8) :: split(size(order%cut))
-    integer :: s, b, c, g, n, at, groups
-
-    split = block_of(order%cut)
-    groups = int(block_of(block_of(max(1_i8, order%n_global))))
-    allocate (group(groups, sums%number), source=0.0_wp)
-    allocate (parts(block_points, sums%number, size(split)), source=0.0_wp)
-    b = 1
-    do while (b <= order%blocks)
-      g = int(block_of(order%first_block + b - 1_i8))
-      at = place_of(order%first_block + b - 1_i8)
-      n = min(block_points - at + 1, order%blocks - b + 1)
-      c = findloc(split, int(g, i8), dim=1)
-      if (c == 0) then
-        call sum_group(order, sums, b, at, group(g, :))
-      else
-        parts(at:at + n - 1, :, c) = transpose(sums%block(:, b:b + n - 1))
-      end if
-      b = b + n
-    end do
-    values = [reshape(group, [size(group)]), reshape(parts, [size(parts)])]
-    if (size(split) > 0) values = [values, reshape(sums%cut, [size(sums%cut)])]
-    call order%ranks%add_all(values)
-    group = reshape(values(:size(group)), shape(group))
-    parts = reshape(values(size(group) + 1:size(group) + size(parts)), shape(parts))
-    do c = 1, size(split)
-      b = size(group) + size(parts) + block_points*sums%number*(c - 1)
-      do s = 1, sums%number
-        ! ranks that begin in one block have left it to the first of them
-        if (findloc(order%cut, order%cut(c), dim=1) == c) &
-          & parts(place_of(order%cut(c)), s, findloc(split, split(c), dim=1)) &
-          & = sum_of_block(values(b + 1:b + block_points))
-        b = b + block_points
-      end do
-    end do
-    do c = 1, size(split)
-      if (findloc(split, split(c), dim=1) < c) cycle
-      do s = 1, sums%number
-        group(split(c), s) = sum_of_block(parts(:, s, c))
-      end do
-    end do
-    total = 0.0_wp
-    do g = 1, groups
-      total = (total + group(g, :))
-    end do
-  end function total_of_ranks
 
   ! ---------------------------------------------------------------- sums of a few points
 
   !> Begin sums of points that come one after another.
-  pure subroutine new_running(order, running)
-    type(order_type), intent(in) :: order  !! which points are owned
+  pure subroutine new_running(running)
     type(running_type), intent(out) :: running  !! nothing is added yet
-
-    if (.not. associated(order%ranks)) return
-    allocate (running%of_ranks)
-    call new_sums(order, most_running, running%of_ranks)
-    running%of_ranks%block = 0.0_wp
+    allocate (running%terms(block_points, most_running), source=0.0_wp)
+    allocate (running%whole(most_running))
   end subroutine new_running
 
-  !> Add the terms of a point; points come in ascending order, any of them may be left out. Points
-  !> that the process does not own are left to those that do.
+  !> Add the terms of a point. Points that the process does not own are left to those that do.
   pure subroutine add_point(order, point, terms, running)
     type(order_type), intent(in) :: order  !! which points are owned
     integer(i4), intent(in) :: point           !! its number here
     real(wp), intent(in) :: terms(:)           !! at most `most_running`
     type(running_type), intent(inout) :: running  !! with the terms of this point on return
-    integer(i8) :: number
-    integer :: l, n, c
 
     if (.not. owns(order, point)) return
-    number = point + order%before
-    n = size(terms)
-    if (block_of(number) /= running%block) call end_block(order, block_of(number), running)
-    l = int(mod(number - 1_i8, int(lanes, i8))) + 1
-    running%point_lane(l, :n) = (running%point_lane(l, :n) + terms)
-    if (.not. allocated(running%of_ranks)) return
-    c = findloc(order%cut, running%block, dim=1)
-    if (c > 0) running%of_ranks%cut(place_of(number), :n, c) &
-      & = (running%of_ranks%cut(place_of(number), :n, c) + terms)
+    if (running%waiting == block_points) call end_block(running)
+    running%waiting = running%waiting + 1
+    running%terms(running%waiting, :size(terms)) = terms
+    running%terms(running%waiting, size(terms) + 1:) = 0.0_wp
   end subroutine add_point
 
-  !> The sum of the last block is complete; `next` is the one to come.
-  pure subroutine end_block(order, next, running)
-    type(order_type), intent(in) :: order  !! the points that are owned, and their slots
-    integer(i8), intent(in) :: next
+  !> Bring the terms that wait into digits.
+  pure subroutine end_block(running)
     type(running_type), intent(inout) :: running
-    real(wp) :: value, terms(block_points)
-    integer :: s, l
+    integer :: s
 
-    if (running%block > 0_i8) then
-      l = int(mod(running%block - 1_i8, int(lanes, i8))) + 1
-      do s = 1, most_running
-        value = sum_of_lanes(running%point_lane(:, s))
-        running%block_lane(l, s) = (running%block_lane(l, s) + value)
-        if (.not. allocated(running%of_ranks)) cycle
-        if (all(order%cut /= running%block)) &
-          & running%of_ranks%block(s, running%block - order%first_block + 1) = value
-      end do
-      running%point_lane = 0.0_wp
-    end if
-    if (next > 0_i8 .and. block_of(max(1_i8, next)) == running%group) then
-      running%block = next
-      return
-    end if
-    terms = 0.0_wp
     do s = 1, most_running
-      ! by the loop that sums blocks elsewhere: where sum_of_lanes is compiled into this loop over
-      ! sums, gfortran 12 takes the lanes one after another
-      terms(:lanes) = running%block_lane(:, s)
-      value = sum_of_block(terms)
-      running%total(s) = (running%total(s) + value)
+      call add_digits(digits_of(running%terms(:running%waiting, s)), running%whole(s))
     end do
-    running%block_lane = 0.0_wp
-    running%block = next
-    running%group = block_of(max(1_i8, next))
+    running%waiting = 0
   end subroutine end_block
 
   !> The sums over all points that were added, on all ranks.
   function total_of_running(order, running) result(total)
-    type(order_type), intent(in) :: order  !! which points are owned
+    type(order_type), intent(in) :: order    !! which ranks there are
     type(running_type), intent(inout) :: running  !! nothing can be added any more
     real(wp) :: total(most_running)
 
-    call end_block(order, 0_i8, running)
-    if (allocated(running%of_ranks)) then
-      total = total_of(order, running%of_ranks)
-    else
-      total = running%total
-    end if
+    call end_block(running)
+    call values_of(order, running%whole, total)
   end function total_of_running
 
   !> The sum of `terms` of some points, on all ranks: the same bits as adding one after another, but
-  !> threads share the blocks.
+  !> threads share the terms.
   real(wp) function sum_listed(order, points, terms) result(total)
     type(order_type), intent(in) :: order    !! which points are owned
-    integer(i4), intent(in) :: points(:)     !! numbers here, ascending
+    integer(i4), intent(in) :: points(:)     !! numbers here
     real(wp), intent(in) :: terms(:)         !! (points)
-    type(running_type) :: running
-    type(sums_type) :: sums
-    real(wp) :: of_block(block_points, 1), totals(most_running), one(1)
-    integer(i8) :: number
-    integer :: begin(order%blocks + 1), b, i
+    type(digits_type) :: digits((size(points) + block_points - 1)/block_points)
+    type(whole_type) :: whole(1)
+    real(wp) :: some(block_points), totals(1)
+    integer :: b, i, first, n
 
-    if (associated(order%ranks) .or. size(points) < worth_blocks) then
-      call new_running(order, running)
-      do i = 1, size(points)
-        call add_point(order, points(i), terms(i:i), running)
+    !$omp parallel do schedule(static) if (size(points) >= worth_threads) default(none) &
+    !$omp shared(order, points, terms, digits) private(b, i, first, n, some)
+    do b = 1, size(digits)
+      first = (b - 1)*block_points
+      n = min(block_points, size(points) - first)
+      do i = 1, n
+        some(i) = 0.0_wp
+        if (owns(order, points(first + i))) some(i) = terms(first + i)
       end do
-      totals = total_of_running(order, running)
-      total = totals(1)
-      return
-    end if
-    ! the first point of each block in the list
-    b = 1
-    begin(1) = 1
-    do i = 1, size(points)
-      number = points(i) + order%before
-      do while (order%first_block + b - 1 < block_of(number))
-        b = b + 1
-        begin(b) = i
-      end do
+      digits(b) = digits_of(some(:n))
     end do
-    begin(b + 1:) = size(points) + 1
-    call new_sums(order, 1, sums)
-    !$omp parallel do schedule(static) default(none) shared(order, points, terms, begin, sums) &
-    !$omp private(b, i, of_block)
-    do b = 1, order%blocks
-      of_block = 0.0_wp
-      do i = begin(b), begin(b + 1) - 1
-        of_block(place_of(points(i) + order%before), 1) = terms(i)
-      end do
-      call add_block(order, b, of_block, sums)
+    do b = 1, size(digits)
+      call add_digits(digits(b), whole(1))
     end do
-    one = total_of(order, sums)
-    total = one(1)
+    call values_of(order, whole, totals)
+    total = totals(1)
   end function sum_listed
 
   ! ---------------------------------------------------------------- sums of arrays over slots
@@ -352,7 +329,7 @@ contains
       call take_block(order, i, a, terms(:, 1))
       call take_block(order, i, b, other)
       terms(:, 1) = terms(:, 1)*other
-      call add_block(order, i, terms, sums)
+      call add_block(i, terms, sums)
     end do
     sums_of_all = total_of(order, sums)
     total = sums_of_all(1)
@@ -377,7 +354,7 @@ contains
         call take_block(order, i, b(:, c), other)
         terms(:, 1) = terms(:, 1) + one*other
       end do
-      call add_block(order, i, terms, sums)
+      call add_block(i, terms, sums)
     end do
     sums_of_all = total_of(order, sums)
     total = sums_of_all(1)
@@ -409,7 +386,7 @@ contains
         call take_block(order, i, weight, one)
         terms(:, 1) = terms(:, 1)*one
       end if
-      call add_block(order, i, terms, sums)
+      call add_block(i, terms, sums)
     end do
     sums_of_all = total_of(order, sums)
     total = sums_of_all(1)
@@ -455,7 +432,7 @@ contains
     !$omp parallel do schedule(static) default(none) shared(order, values, sums) private(i, terms)
     do i = 1, order%blocks
       call take_block(order, i, values, terms(:, 1))
-      call add_block(order, i, terms, sums)
+      call add_block(i, terms, sums)
     end do
     sums_of_all = total_of(order, sums)
     total = sums_of_all(1)
@@ -467,13 +444,13 @@ contains
   real(wp) function largest_scalar(order, values) result(largest)
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:)  !! (n_slots)
-    integer :: block, i, n, at, slots(block_points)
+    integer :: block, i, n, slots(block_points)
 
     largest = -huge(largest)
     !$omp parallel do schedule(static) default(none) shared(order, values) &
-    !$omp private(block, i, n, at, slots) reduction(max:largest)
+    !$omp private(block, i, n, slots) reduction(max:largest)
     do block = 1, order%blocks
-      call slots_of_block(order, block, at, n, slots)
+      call slots_of_block(order, block, n, slots)
       do i = 1, n
         largest = max(largest, values(slots(i)))
       end do
@@ -485,13 +462,13 @@ contains
   real(wp) function largest_size(order, values) result(largest)
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:, :)  !! (n_slots, dim)
-    integer :: block, i, n, c, at, slots(block_points)
+    integer :: block, i, n, c, slots(block_points)
 
     largest = 0.0_wp
     !$omp parallel do schedule(static) default(none) shared(order, values) &
-    !$omp private(block, i, n, c, at, slots) reduction(max:largest)
+    !$omp private(block, i, n, c, slots) reduction(max:largest)
     do block = 1, order%blocks
-      call slots_of_block(order, block, at, n, slots)
+      call slots_of_block(order, block, n, slots)
       do c = 1, size(values, 2)
         do i = 1, n
           largest = max(largest, abs(values(slots(i), c)))
@@ -505,13 +482,13 @@ contains
   real(wp) function least_over(order, values) result(least)
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     real(wp), intent(in), contiguous :: values(:)  !! (n_slots)
-    integer :: block, i, n, at, slots(block_points)
+    integer :: block, i, n, slots(block_points)
 
     least = huge(least)
     !$omp parallel do schedule(static) default(none) shared(order, values) &
-    !$omp private(block, i, n, at, slots) reduction(min:least)
+    !$omp private(block, i, n, slots) reduction(min:least)
     do block = 1, order%blocks
-      call slots_of_block(order, block, at, n, slots)
+      call slots_of_block(order, block, n, slots)
       do i = 1, n
         least = min(least, values(slots(i)))
       end do
@@ -523,14 +500,14 @@ contains
   integer(i8) function first_where(order, marked) result(first)
     type(order_type), intent(in) :: order  !! the points that are owned, and their slots
     logical, intent(in) :: marked(:)  !! (n_slots)
-    integer :: block, i, n, at, slots(block_points)
+    integer :: block, i, n, slots(block_points)
 
     first = 0_i8
     blocks: do block = 1, order%blocks
-      call slots_of_block(order, block, at, n, slots)
+      call slots_of_block(order, block, n, slots)
       do i = 1, n
         if (.not. marked(slots(i))) cycle
-        first = (order%first_block + block - 2)*block_points + at + i - 1
+        first = number_of(order, (block - 1)*block_points + i)
         exit blocks
       end do
     end do blocks
@@ -562,6 +539,13 @@ contains
     call order%ranks%take_largest(values)
     largest = values(1)
   end function largest_of_ranks
+
+  !> Whether it is so on any rank.
+  logical function any_of_ranks(order, here) result(anywhere)
+    type(order_type), intent(in) :: order  !! which ranks there are
+    logical, intent(in) :: here            !! on this rank
+    anywhere = largest_of_ranks(order, merge(1.0_wp, 0.0_wp, here)) > 0.5_wp
+  end function any_of_ranks
 
   !> The sum of what each rank has. Its rounding depends on the ranks: it is for what only watches.
   real(wp) function sum_of_ranks(order, value) result(total)
@@ -596,6 +580,21 @@ contains
     if (state <= 0) state = state + 2147483647
     noise = 2*real(state, wp)/2147483647.0_wp - 1
   end function noise
+
+  !> The state of `noise` before the numbers of an owned point, where each point draws as many, in
+  !> the order of the points of all ranks.
+  pure subroutine bring_noise(order, point, seed, each, state)
+    type(order_type), intent(in) :: order  !! the points that are owned
+    integer, intent(in) :: point           !! its number here; 1 first, then one by one
+    integer, intent(in) :: seed            !! the state before the first of all points
+    integer, intent(in) :: each            !! numbers that a point draws
+    integer, intent(inout) :: state        !! after the numbers of the point before
+    logical :: follows
+
+    follows = .false.
+    if (point > 1) follows = number_of(order, point) == number_of(order, point - 1) + 1_i8
+    if (.not. follows) state = noise_after(seed, each*(number_of(order, point) - 1_i8))
+  end subroutine bring_noise
 
   !> The state of `noise` after so many numbers: a rank begins with its own points.
   pure integer function noise_after(seed, drawn) result(state)

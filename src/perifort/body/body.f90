@@ -5,8 +5,8 @@
 !> (padding and cells cut out), which have no volume and no bonds. Results are written in point
 !> order. `gather` and `scatter` translate between the two.
 !>
-!> A process owns a range of its points; the others, its halo, are copies of what other processes
-!> own. One process alone owns all.
+!> A process owns its first points; the others, its halo, are copies of what other processes own.
+!> One process alone owns all.
 module pd_body_body
   use pd_base_text, only: to_text
   use pd_base_kinds, only: wp, i2, i4, i8
@@ -16,13 +16,17 @@ module pd_body_body
   implicit none (type, external)
   private
   public :: body_type, not_finite_text, grid_type, lattice_type, skin_type, allocate_points, &
-    & append_points, keep_points, arrange, gather, scatter, own_points, owned, share_halo
+    & append_points, keep_points, order_points, arrange, gather, scatter, own_points, owned, &
+    & number_at, share_halo
 
   !> A uniform grid: points at origin + axes (i - 1/2) spacing, i integer.
   type :: grid_type
     real(wp) :: origin(3) = 0.0_wp  !! [m]
     real(wp) :: spacing = 0.0_wp    !! [m]
     logical :: turned = .false.     !! its axes are not x, y and z
+    !> The least place of a point of any rank along each axis, known where forces must not depend
+    !> on the ranks [m].
+    real(wp), allocatable :: lowest(:)
     !> Unit vectors in columns.
     real(wp) :: axes(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
   end type grid_type
@@ -53,9 +57,9 @@ module pd_body_body
     integer(i2), allocatable :: grid(:)     !! number of its grid, 0 in a cloud
     integer(i4), allocatable :: point(:)    !! the slot's point, 0 if dead
     integer(i4), allocatable :: slot(:)     !! the point's slot (n_points)
-    integer :: first_owned = 1              !! points that the process owns
-    integer :: last_owned = 0
-    type(order_type) :: order               !! where the owned points are, for sums over them
+    type(order_type) :: order               !! the points that the process owns, for sums over them
+    integer(i8), allocatable :: number(:)   !! of each point among those of all processes; not
+                                            !! allocated: its number here
     type(grid_type), allocatable :: grids(:)
     real(wp) :: delta = 0.0_wp              !! the horizon [m]
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
@@ -143,14 +147,22 @@ contains
     call own_all(body)
   end subroutine keep_points
 
+  !> Put the points of a body into another order: point i becomes what point `order(i)` was.
+  pure subroutine order_points(body, order)
+    type(body_type), intent(inout) :: body  !! in point order, before and after
+    integer(i4), intent(in) :: order(:)     !! (n_points) each number once
+    call gather_all(body, order)
+    call own_all(body)
+  end subroutine order_points
+
   !> Move every point into its slot. `point(slot)` is 0 for dead slots.
   pure subroutine arrange(body, point)
     type(body_type), intent(inout) :: body  !! in point order; with its slots and their order on
                                             !! return
     integer(i4), intent(in) :: point(:)     !! (n_slots), the point that each slot takes; 0: a dead
                                             !! slot
-    integer(i8) :: before, n_global
-    integer :: s
+    integer(i8) :: n_global
+    integer :: s, n_owned
 
     call gather_all(body, point)
     body%point = point
@@ -159,28 +171,51 @@ contains
     end do
     ! a dead slot needs a valid material, so that loops over rows need no test
     where (point == 0) body%material = 1_i2
-    before = body%order%before
+    n_owned = body%order%n_owned
     n_global = body%order%n_global
-    call number_points(body%slot, body%order, body%first_owned, body%last_owned, before, n_global)
+    call order_owned(body, n_owned, n_global)
   end subroutine arrange
 
   !> The process owns all points.
   pure subroutine own_all(body)
     type(body_type), intent(inout) :: body
-    call own_points(body, 1, body%n_points, 0_i8, int(body%n_points, i8))
+    if (allocated(body%number)) deallocate (body%number)
+    if (allocated(body%order%number)) deallocate (body%order%number)
+    call number_points(body%slot, body%order)
   end subroutine own_all
 
-  !> Note which points the process owns.
-  pure subroutine own_points(body, first, last, before, n_global)
+  !> Note which points the process owns: the first ones.
+  pure subroutine own_points(body, n_owned, number, n_global)
     type(body_type), intent(inout) :: body  !! in point order or arranged in slots
-    integer, intent(in) :: first, last     !! the first and the last one, by their numbers here
-    integer(i8), intent(in) :: before      !! added to these it is that among all points
-    integer(i8), intent(in) :: n_global    !! points of all processes
+    integer, intent(in) :: n_owned          !! how many
+    integer(i8), intent(in) :: number(:)    !! (n_points) among the points of all processes; those
+                                            !! of owned points ascend
+    integer(i8), intent(in) :: n_global     !! points of all processes
 
-    body%first_owned = first
-    body%last_owned = last
-    call number_points(body%slot, body%order, first, last, before, n_global)
+    body%number = number
+    call order_owned(body, n_owned, n_global)
   end subroutine own_points
+
+  !> Bring the order of the owned points up to date.
+  pure subroutine order_owned(body, n_owned, n_global)
+    type(body_type), intent(inout) :: body
+    integer, intent(in) :: n_owned
+    integer(i8), intent(in) :: n_global
+
+    if (allocated(body%number)) then
+      call number_points(body%slot(:n_owned), body%order, body%number(:n_owned), n_global)
+    else
+      call number_points(body%slot, body%order)
+    end if
+  end subroutine order_owned
+
+  !> The number of a slot's point among those of all processes; 0 for a dead slot.
+  elemental integer(i8) function number_at(body, slot) result(number)
+    type(body_type), intent(in) :: body  !! arranged in slots
+    integer, intent(in) :: slot          !! 1 to n_slots
+    number = int(body%point(slot), i8)
+    if (allocated(body%number) .and. number > 0_i8) number = body%number(number)
+  end function number_at
 
   !> Whether the process owns the point of a slot; no process owns dead slots.
   elemental logical function owned(body, slot)
@@ -244,8 +279,8 @@ contains
     real(wp), intent(inout) :: of_points(:)   !! (owned points)
     integer :: i
 
-    do i = body%first_owned, body%last_owned
-      of_points(i - body%first_owned + 1) = of_slots(body%slot(i))
+    do i = 1, body%order%n_owned
+      of_points(i) = of_slots(body%slot(i))
     end do
   end subroutine gather_reals
 
@@ -256,8 +291,8 @@ contains
     integer :: i, c
 
     do c = 1, size(of_slots, 2)
-      do i = body%first_owned, body%last_owned
-        of_points(i - body%first_owned + 1, c) = of_slots(body%slot(i), c)
+      do i = 1, body%order%n_owned
+        of_points(i, c) = of_slots(body%slot(i), c)
       end do
     end do
   end subroutine gather_vectors
@@ -268,8 +303,8 @@ contains
     integer(i4), intent(inout) :: of_points(:)   !! (owned points)
     integer :: i
 
-    do i = body%first_owned, body%last_owned
-      of_points(i - body%first_owned + 1) = int(of_slots(body%slot(i)), i4)
+    do i = 1, body%order%n_owned
+      of_points(i) = int(of_slots(body%slot(i)), i4)
     end do
   end subroutine gather_small
 
@@ -279,8 +314,8 @@ contains
     logical, intent(inout) :: of_points(:)   !! (owned points)
     integer :: i
 
-    do i = body%first_owned, body%last_owned
-      of_points(i - body%first_owned + 1) = of_slots(body%slot(i))
+    do i = 1, body%order%n_owned
+      of_points(i) = of_slots(body%slot(i))
     end do
   end subroutine gather_logicals
 
@@ -290,8 +325,8 @@ contains
     real(wp), intent(inout) :: of_slots(:)    !! (n_slots)
     integer :: i
 
-    do i = body%first_owned, body%last_owned
-      of_slots(body%slot(i)) = of_points(i - body%first_owned + 1)
+    do i = 1, body%order%n_owned
+      of_slots(body%slot(i)) = of_points(i)
     end do
   end subroutine scatter_reals
 
@@ -302,8 +337,8 @@ contains
     integer :: i, c
 
     do c = 1, size(of_points, 2)
-      do i = body%first_owned, body%last_owned
-        of_slots(body%slot(i), c) = of_points(i - body%first_owned + 1, c)
+      do i = 1, body%order%n_owned
+        of_slots(body%slot(i), c) = of_points(i, c)
       end do
     end do
   end subroutine scatter_vectors
@@ -338,7 +373,7 @@ contains
       text = 'has no finite value at t = '//to_text(t)//' s'
       return
     end if
-    text = 'has no finite value at point '//to_text(int(body%point(slot)))//' at ('
+    text = 'has no finite value at point '//to_text(number_at(body, int(slot)))//' at ('
     do c = 1, body%dim
       if (c > 1) text = text//', '
       text = text//to_text(body%x(slot, c))

@@ -200,6 +200,7 @@ contains
     grid%cell_volume = body%volume(k)
     cells = extent(body, g)
     grid%alignment = family%block_length
+    if (allocated(body%grids(g)%lowest)) call fix_box(body, g, grid, cells)
     call make_offsets(family%rule, body%dim, cells, grid)
     associate (m => grid%reach_cells)
       grid%stride = [1, whole_blocks(cells(1) + m, grid%alignment), 0]
@@ -223,6 +224,31 @@ contains
     call order_offsets(grid)
     family%grids = [family%grids, grid]
   end subroutine add_grid
+
+  !> Let the box of a grid begin where blocks of a row begin on all ranks, and count its cells from
+  !> the lowest one of all ranks.
+  subroutine fix_box(body, g, grid, cells)
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: g
+    type(offsets_type), intent(inout) :: grid  !! with its alignment
+    integer, intent(inout) :: cells(3)         !! more along x on return
+    integer :: c, more
+
+    grid%fixed = .true.
+    do c = 1, body%dim
+      grid%before(c) = nint((lower_side(body, g, c) - body%grids(g)%lowest(c))/grid%spacing)
+    end do
+    more = modulo(grid%before(1), grid%alignment)
+    grid%before(1) = grid%before(1) - more
+    cells(1) = cells(1) + more
+  end subroutine fix_box
+
+  !> The least place of a point of grid `g` along its axis `c` [m].
+  pure real(wp) function lower_side(body, g, c)
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: g, c
+    lower_side = minval(coordinate(body%grids(g), body%x, c), mask=body%grid == g)
+  end function lower_side
 
   !> Put every point into its cell.
   subroutine place_points(body, family, error)
@@ -257,7 +283,9 @@ contains
       n = n + 1
       number(g) = n
       do c = 1, body%dim
-        lower(c, g) = minval(coordinate(body%grids(g), body%x, c), mask=body%grid == g)
+        lower(c, g) = lower_side(body, g, c)
+        if (family%grids(n)%fixed) lower(c, g) = body%grids(g)%lowest(c) &
+          & + family%grids(n)%before(c)*family%grids(n)%spacing
       end do
     end do
     allocate (point(n_slots), source=0_i4)

@@ -1,9 +1,10 @@
 !> What must not be: points on top of each other. And what may surprise: points with no neighbour.
 module pd_family_neighbours
-  use pd_base_kinds, only: wp, i1, i4
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_reduce, only: count_of_ranks
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, number_at, owned
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private
@@ -44,9 +45,10 @@ contains
     end do
     !$omp end parallel
     do k = 1, body%n_slots
-      if (body%point(k) == 0) cycle
+      if (.not. owned(body, k)) cycle
       if (alone(family%alike(k)) == 1_i1) isolated = isolated + 1
     end do
+    isolated = int(count_of_ranks(body%order, int(isolated, i8)))
     k = findloc(other > 0, .true., dim=1)
     if (k == 0) return
     j = other(k)
@@ -66,7 +68,7 @@ contains
       integer, intent(in) :: s
       character(:), allocatable :: text
       integer :: c
-      text = to_text(int(body%point(s)))//' ('//to_text(body%x(s, 1))
+      text = to_text(number_at(body, s))//' ('//to_text(body%x(s, 1))
       do c = 2, body%dim
         text = text//', '//to_text(body%x(s, c))
       end do

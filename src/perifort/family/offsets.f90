@@ -15,6 +15,9 @@ module pd_family_offsets
     integer :: alignment = lanes               !! rows are a multiple of this long [slots]
     integer :: reach_cells = 0                 !! farthest offset along an axis
     integer :: stride(3) = 0                   !! from one cell to the next along x, y, z [slots]
+    integer :: before(3) = 0                   !! cells along each axis that other ranks have before
+                                               !! this box, where forces do not depend on the ranks
+    logical :: fixed = .false.                 !! they do not
     integer(i8) :: first = 0_i8                !! first slot of the box
     integer(i8) :: last = 0_i8                 !! its last slot
     real(wp) :: spacing = 0.0_wp               !! [m]

@@ -55,7 +55,11 @@ contains
         reach = grids(g)%reach_cells + 1
         reach(1) = (grids(g)%reach_cells - 1)/block_length + 1
         call find_layers(grids(g), dim, block_length, block(blocks), layer)
-        call cut_grid(layer, reach, of_grid)
+        if (grids(g)%fixed) then
+          of_grid = fixed_slabs(layer(:, dim) + grids(g)%before(dim), reach(dim))
+        else
+          call cut_grid(layer, reach, of_grid)
+        end if
         slab(blocks) = of_grid + n
         ! each grid begins with the first colour
         n = n + maxval(of_grid)
@@ -106,6 +110,20 @@ contains
       & even_number(min(slabs(axis), size(layer, 1)/least_blocks)), number)
     slab = number(layer(:, axis) + 1)
   end subroutine cut_grid
+
+  !> The slab of each block where forces must not depend on the ranks: slabs are as thick as may be
+  !> and counted from the lowest layer of all ranks, so that what is added to a slot comes in the
+  !> same order on all. Slab 1 may be empty.
+  pure function fixed_slabs(layer, thickness) result(slab)
+    integer, intent(in) :: layer(:)    !! of each block along the slowest axis, from 0
+    integer, intent(in) :: thickness   !! of a slab
+    integer :: slab(size(layer))
+    integer :: first
+
+    slab = layer/thickness
+    first = minval(slab)
+    slab = slab - (first - modulo(first, 2)) + 1
+  end function fixed_slabs
 
   !> Slabs to make where there could be `most`: 1, or twice 1, 2, 3, 4, 6, 8, 12 and so on, which
   !> most numbers of threads divide.

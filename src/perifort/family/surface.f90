@@ -2,7 +2,7 @@
 !> of the bulk.
 module pd_family_surface
   use pd_base_kinds, only: wp
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, share_halo
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_law_weighted, only: weighted_law_type
@@ -81,6 +81,8 @@ contains
       S(k, :) = S(i, :)
     end do
     !$omp end parallel
+    call share_halo(body, D)
+    call share_halo(body, S)
   end subroutine surface_factors
 
   !> Whether some law has factors that differ from 1. Without, sums have the bits of the plain loop.

@@ -3,6 +3,7 @@
 module pd_force_bound
   use pd_base_kinds, only: wp, i8
   use pd_base_lanes, only: lanes
+  use pd_body_body, only: body_type, share_halo
   use pd_family_lattice, only: lattice_family_type, grid_at
   use pd_force_model, only: model_type, t_of
   use pd_force_weights, only: allocate_weights, block_weights, half_of
@@ -15,7 +16,8 @@ contains
 
   !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken. Weights of
   !> either sign count with their size.
-  subroutine lattice_bound(family, model, workspace, bound)
+  subroutine lattice_bound(body, family, model, workspace, bound)
+    type(body_type), intent(in) :: body              !! arranged in the slots of the family
     type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
     type(lattice_workspace_type), intent(in) :: workspace  !! with its weights
@@ -26,10 +28,10 @@ contains
 
     allocate (inverse(family%n_slots), source=0.0_wp)
     bound = 0.0_wp
-    !$omp parallel default(none) shared(family, model, workspace, bound, inverse) &
-    !$omp private(scratch, half, b, pass)
-    call allocate_weights(family, model, scratch)
     do pass = merge(1, 2, model%dilatation), 2
+      !$omp parallel default(none) shared(family, model, workspace, bound, inverse, pass) &
+      !$omp private(scratch, half, b)
+      call allocate_weights(family, model, scratch)
       !$omp do schedule(static)
       do b = 1, size(family%block)
         if (workspace%weights(b) > 0) then
@@ -40,8 +42,9 @@ contains
           call add_block(family, model, pass, b, scratch, half, inverse, bound)
         end if
       end do
+      !$omp end parallel
+      if (pass == 1) call share_halo(body, inverse)
     end do
-    !$omp end parallel
   end subroutine lattice_bound
 
   !> One block of the `pass`; `half` is room for half of it, if it is long.

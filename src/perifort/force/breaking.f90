@@ -4,7 +4,7 @@ module pd_force_breaking
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_order, only: ascending_order, owns
-  use pd_base_reduce, only: add_point, count_of_ranks, new_running, running_type, total_of_running
+  use pd_base_reduce, only: add_point, count_of_ranks, largest_of_ranks, new_running, running_type, total_of_running
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
@@ -116,7 +116,7 @@ contains
     broken = count_of_ranks(body%order, sum(int(number, i8), mask=owns(body%order, &
       & body%point(slots))))/2_i8
     order = ascending_order(body%point(slots))
-    call new_running(body%order, running)
+    call new_running(running)
     do i = 1, size(order)
       m = order(i)
       call add_point(body%order, body%point(slots(m)), lost(m, :), running)
@@ -176,7 +176,8 @@ contains
 
   !> Where the strength of bonds scatters: the smallest critical stretch of each slot's bonds, and
   !> of all, by which the loops choose the bonds to check.
-  subroutine find_weakest(family, model)
+  subroutine find_weakest(body, family, model)
+    type(body_type), intent(in) :: body        !! arranged in the slots of the family
     class(family_type), intent(in) :: family   !! whole
     type(model_type), intent(inout) :: model   !! gets `weakest` and a new `least_critical`
     type(bonds_type) :: bonds
@@ -196,7 +197,7 @@ contains
       end do
     end do
     !$omp end parallel
-    model%least_critical = minval(model%weakest)
+    model%least_critical = -largest_of_ranks(body%order, -minval(model%weakest))
   end subroutine find_weakest
 
   !> Whether the `i`-th bond of slot `k` is beyond `part` of its limit.

@@ -2,8 +2,9 @@
 !> scene has. Chosen once before the loop, so that a step costs only what the scene uses.
 module pd_force_model
   use pd_base_error, only: internal_fault
+  use pd_base_reduce, only: any_of_ranks, largest_of_ranks
   use pd_base_kinds, only: wp, i1, i2, i8
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, number_at
   use pd_family_bond_weights, only: bond_weights_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never
@@ -84,21 +85,27 @@ contains
     do k = 1, body%n_slots
       if (body%point(k) > 0) used(body%material(k)) = .true.
     end do
+    ! ranks that have no point of a material must take part in what it asks for
+    do k = 1, size(used)
+      used(k) = any_of_ranks(body%order, used(k))
+    end do
     model%dilatation = any(used .and. abs(materials%a) > 0.0_wp)
     if (present(laws)) then
       allocate (model%laws, source=laws)
       call choose_pass(used, model)
     end if
-    model%thermal = any(abs(temperature_change) > 0.0_wp) .and. &
+    model%thermal = any_of_ranks(body%order, any(abs(temperature_change) > 0.0_wp)) .and. &
       & any(used .and. abs(materials%expansion) > 0.0_wp)
     if (model%thermal) model%expansion = materials(body%material)%expansion*temperature_change
     model%breaking = any(used .and. materials%critical_stretch < never) .and. &
-      & any(.not. zone .and. body%point > 0)
+      & any_of_ranks(body%order, any(.not. zone .and. body%point > 0))
     if (.not. model%breaking) return
     model%critical = materials(body%material)%critical_stretch
-    model%least_critical = minval(model%critical, mask=body%point > 0)
+    model%least_critical = -largest_of_ranks(body%order, -minval(model%critical, &
+      & mask=body%point > 0))
     where (zone) model%critical = no_fail
-    if (any(used .and. materials%scatter > 0.0_wp)) model%number = body%point + body%order%before
+    if (any(used .and. materials%scatter > 0.0_wp)) &
+      & model%number = number_at(body, [(k, k=1, body%n_slots)])
     model%compression = any(used .and. materials%break_in_compression)
     if (model%compression) then
       allocate (model%compressed(body%n_slots))

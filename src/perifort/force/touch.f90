@@ -360,7 +360,7 @@ contains
     do n = 1, size(near)
       call touch_point(self, view, near(n), touches(n), push(:, n), stored)
     end do
-    call new_running(view%body%order, running)
+    call new_running(running)
     do n = 1, size(near)
       if (.not. touches(n)) cycle
       k = self%slots(near(n))

@@ -63,7 +63,7 @@ contains
         allocate (acceleration(size(motion%slots)), source=0.0_wp)
         do c = 1, system%body%dim
           if (.not. system%static) call accelerations_of(motion, c, t, acceleration)
-          call new_running(system%body%order, running)
+          call new_running(running)
           do i = 1, size(motion%slots)
             if (motion%held(i, c) == 0_i1) cycle
             k = motion%slots(i)

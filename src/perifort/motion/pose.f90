@@ -49,7 +49,7 @@ contains
     pose%dim = body%dim
     allocate (pose%masses, source=masses)
     allocate (pose%arms(3, size(slots)), source=0.0_wp)
-    call new_running(body%order, running)
+    call new_running(running)
     do i = 1, size(slots)
       call add_point(body%order, body%point(slots(i)), masses(i)*[1.0_wp, body%x(slots(i), :)], &
         & running)
@@ -60,7 +60,7 @@ contains
     do c = 1, body%dim
       pose%arms(c, :) = body%x(slots, c) - pose%centre(c)
     end do
-    call new_running(body%order, running)
+    call new_running(running)
     do i = 1, size(slots)
       associate (r => pose%arms(:, i))
         call add_point(body%order, body%point(slots(i)), &
@@ -231,7 +231,7 @@ contains
     real(wp) :: force(3)
     integer :: i
 
-    call new_running(body%order, running)
+    call new_running(running)
     force = 0.0_wp
     do i = 1, size(slots)
       force(:body%dim) = density(:, i)*body%volume(slots(i))
@@ -251,7 +251,7 @@ contains
     real(wp) :: totals(6), d(3), angle(3)
     integer :: turn, i
 
-    call new_running(body%order, running)
+    call new_running(running)
     do i = 1, size(slots)
       call add_point(body%order, body%point(slots(i)), pose%masses(i)*u(slots(i), :), running)
     end do
@@ -259,7 +259,7 @@ contains
     pose%place(:body%dim) = totals(:body%dim)/pose%mass
     if (body%dim == 1) return
     do turn = 1, most_turns
-      call new_running(body%order, running)
+      call new_running(running)
       d = 0.0_wp
       do i = 1, size(slots)
         d(:body%dim) = u(slots(i), :)

@@ -4,7 +4,7 @@ module pd_motion_system
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
-  use pd_base_reduce, only: largest_over
+  use pd_base_reduce, only: any_of_ranks, largest_over
   use pd_body_body, only: body_type, not_finite_text, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds, stretch_ratios
@@ -572,6 +572,7 @@ contains
       load%on_held = pack([(i, i=1, size(load%slots))], any(system%held(load%slots, :) == 1_i1, 2))
       if (size(load%on_held) > 0) system%loaded_and_held = .true.
     end do
+    system%loaded_and_held = any_of_ranks(system%body%order, system%loaded_and_held)
     ! other external terms may act anywhere
     if (system%terms%outside > number_of_loads(system%terms)) &
       & system%loaded_and_held = system%loaded_and_held .or. any(system%held == 1_i1)

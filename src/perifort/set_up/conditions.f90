@@ -7,6 +7,7 @@ module pd_set_up_conditions
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
   use pd_scene_groups_course, only: ramp_of
+  use pd_base_reduce, only: any_of_ranks
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_meshes, only: facet_mask, names_set
@@ -49,7 +50,7 @@ contains
           chosen = region_mask(scene, body, group%region) .and. body%layer == 0
         end if
         motion%slots = slots_where(body, chosen)
-        if (size(motion%slots) == 0) then
+        if (.not. any_of_ranks(body%order, size(motion%slots) > 0)) then
           call scene_fault(error, scene, 'boundary', m, 'region', no_points('&boundary', &
             & group%name, group%region), 'expected a shape that holds points of the bodies')
           return

@@ -3,6 +3,7 @@ module pd_set_up_families
   use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
   use pd_body_lattices, only: axes_of
   use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
@@ -15,46 +16,54 @@ module pd_set_up_families
   use pd_set_up_memory, only: any_critical
   implicit none (type, external)
   private
-  public :: make_family, finish_family, axes_of_factors
+  public :: choose_family, make_family, finish_family, axes_of_factors
 
 contains
 
-  !> Families of the kind that suits the points; the body is arranged in their slots. An error is
-  !> set if the scene asks for a lattice, or for mixed precision, that its points cannot have, or if
-  !> the lattice cannot be made.
-  subroutine make_family(scene, rule, system, error)
+  !> The kind of families that suits the points: lattices or lists. An error is set if the scene
+  !> asks for a lattice, or for mixed precision, that its points cannot have.
+  subroutine choose_family(scene, rule, body, suits, reason, error)
     type(scene_type), intent(in) :: scene       !! a checked scene
     type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
-    type(system_type), intent(inout) :: system
-      !! with its body in point order; gets its family, its body in the slots of that
+    type(body_type), intent(in) :: body         !! in point order, with all points
+    logical, intent(out) :: suits               !! lattices do
+    character(:), allocatable, intent(out) :: reason  !! why they do not
     type(error_type), allocatable, intent(out) :: error
-    type(lattice_family_type), allocatable :: lattice
-    type(list_family_type), allocatable :: list
-    character(:), allocatable :: reason
-    logical :: suits, mixed
 
     if (scene%horizon%family == 'list') then
       suits = .false.
       reason = 'asked for'
     else
-      call lattice_suits(system%body, rule, suits, reason)
+      call lattice_suits(body, rule, suits, reason)
     end if
     if (scene%horizon%family == 'lattice' .and. .not. suits) then
       call scene_fault(error, scene, 'horizon', 1, 'family', &
         & 'the scene cannot have the lattice families that &horizon family requests', reason)
       return
     end if
-    mixed = scene%header%precision == 'mixed'
-    if (mixed .and. .not. suits) then
-      call scene_fault(error, scene, 'scene', 1, 'precision', &
-        & "precision = 'mixed' needs lattice families, but the scene gets lists", reason)
-      return
-    end if
+    if (scene%header%precision == 'mixed' .and. .not. suits) call scene_fault(error, scene, &
+      & 'scene', 1, 'precision', &
+      & "precision = 'mixed' needs lattice families, but the scene gets lists", reason)
+  end subroutine choose_family
+
+  !> Families of the kind that was chosen; the body is arranged in their slots. An error is set if
+  !> the lattice cannot be made.
+  subroutine make_family(scene, rule, suits, reason, system, error)
+    type(scene_type), intent(in) :: scene       !! a checked scene
+    type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
+    logical, intent(in) :: suits                !! make a lattice, else a list
+    character(*), intent(in) :: reason          !! why it is a list
+    type(system_type), intent(inout) :: system
+      !! with its body in point order; gets its family, its body in the slots of that
+    type(error_type), allocatable, intent(out) :: error
+    type(lattice_family_type), allocatable :: lattice
+    type(list_family_type), allocatable :: list
+
     if (suits) then
       allocate (lattice)
       call new_lattice_family(system%body, rule, size(scene%cracks) + size(scene%contacts) &
         & > 0 .or. any_critical(scene), &
-        & mixed, lattice, error)
+        & scene%header%precision == 'mixed', lattice, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
       call move_alloc(lattice, system%family)

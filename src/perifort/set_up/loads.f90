@@ -3,7 +3,8 @@ module pd_set_up_loads
   use pd_base_kinds, only: wp, i4
   use pd_base_error, only: error_type
   use pd_base_expression, only: expression_type
-  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
+  use pd_base_reduce, only: add_point, any_of_ranks, largest_of_ranks, new_running, &
+    & running_type, total_of_running
   use pd_scene_content_expressions, only: expression_of, varies_in_time
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: body_group, is_turned, scene_type, load_group, is_set
@@ -55,7 +56,7 @@ contains
         end if
         if (group%body /= '') chosen = chosen .and. body%body == body_number(scene, group%body)
         load%slots = slots_where(body, chosen)
-        if (size(load%slots) == 0) then
+        if (.not. any_of_ranks(body%order, size(load%slots) > 0)) then
           call scene_fault(error, scene, 'load', l, 'region', no_points('&load', group%body, &
             & group%region), 'expected a place that holds points of the bodies')
           return
@@ -244,7 +245,7 @@ contains
     real(wp) :: totals(6)
     integer :: i
 
-    call new_running(body%order, running)
+    call new_running(running)
     do i = 1, size(slots)
       call add_point(body%order, body%point(slots(i)), [body%volume(slots(i))], running)
     end do
@@ -272,7 +273,7 @@ contains
       axes = axes_of(side_body(scene, group%body), body%dim)
       face = direction*matmul(body%x, axes(:body%dim, axis)) + body%spacing/2
     end if
-    outermost = maxval(face, mask=chosen)
+    outermost = largest_of_ranks(body%order, maxval(face, mask=chosen))
     chosen = chosen .and. face > outermost - body%spacing/2
   end function outermost_row
 

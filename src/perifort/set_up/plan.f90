@@ -2,6 +2,7 @@
 module pd_set_up_plan
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, internal_fault
+  use pd_base_reduce, only: any_of_ranks, least_over
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
@@ -55,7 +56,7 @@ contains
     call stiffness_bound(system%body, system%family, system%model, system%workspace, bound)
     plan%relaxes = scene%time%method == 'relaxation'
     plan%integrator = trim(scene%time%integrator)
-    if (.not. any(bound > 0.0_wp)) then
+    if (.not. any_of_ranks(system%body%order, any(bound > 0.0_wp))) then
       call scene_fault(error, scene, 'horizon', 1, merge('length', 'ratio ', &
         & is_set(scene%horizon%length)), &
         & 'no point of the scene has a neighbour within the horizon: there is nothing to compute', &
@@ -85,7 +86,8 @@ contains
     if (.not. (system%model%weighted .or. system%model%generic)) &
       & call printed_step(system%body, system%family, system%model, plan%printed)
     plan%book = book_step(system%model, system%body%dim, system%family%rule%delta, &
-      & depth_of(scene), minval(system%body%spacing, mask=system%body%point > 0))
+      & depth_of(scene), least_over(system%body%order, &
+      & system%body%spacing))
     plan%step = scene%time%safety*plan%limit
     if (is_set(scene%time%step)) plan%step = scene%time%step
     if (.not. plan%step > 0.0_wp) then

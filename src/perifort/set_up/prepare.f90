@@ -6,6 +6,7 @@ module pd_set_up_prepare
   use pd_base_text, only: to_text
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
+  use pd_comm_world, only: world_type
   use pd_body_generate, only: generate_body
   use pd_body_initial, only: initial_state
   use pd_body_regions, only: check_regions
@@ -34,9 +35,11 @@ module pd_set_up_prepare
   use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
     & gravity_of_scene, leave_uncorrected, sides_of_contact
-  use pd_set_up_families, only: axes_of_factors, make_family, finish_family
+  use pd_set_up_families, only: axes_of_factors, choose_family, make_family, finish_family
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
+  use pd_set_up_ranks, only: bonds_of_ranks, broken_bonds, check_ranks, divide_body, &
+    & find_lowest, join_ranks, reproducible_layer
   use pd_set_up_plan, only: plan_type, make_plan
   use pd_set_up_rigid_bodies, only: check_within, rigid_bodies_of_scene
   use pd_set_up_toughness_toughness, only: set_critical_by_lattice
@@ -64,13 +67,15 @@ contains
   !> without, threads are the caller's. `terms` of the force act in addition to those of the scene.
   !> An error is set if the scene does not fit into the memory, or if its points, families,
   !> conditions or plan are impossible.
-  subroutine prepare(scene, set_up, error, threads, terms)
+  subroutine prepare(scene, set_up, error, threads, terms, world)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(set_up_type), intent(out) :: set_up             !! ready for the first step
     type(error_type), allocatable, intent(out) :: error
     integer, intent(in), optional :: threads
       !! number of threads, 0 for one that suits; without, the caller's are used
     type(term_list_type), intent(in), optional :: terms  !! copied; none if absent
+    type(world_type), intent(inout), target, optional :: world
+      !! the ranks of the run; must stay where it is in memory as long as the system; absent: one
     type(load_type), allocatable :: loads(:)
     type(material_type), allocatable :: materials(:)
     type(law_item_type), allocatable :: laws(:)
@@ -79,10 +84,17 @@ contains
     type(layer_count_type), allocatable :: layers(:)
     real(wp) :: delta
     type(surface_type) :: surface
+    type(volume_rule_type) :: rule
     integer(i8) :: cut
+    integer, allocatable :: owner(:)
+    character(:), allocatable :: reason
+    logical :: divided, suits
     integer :: i
 
+    divided = .false.
+    if (present(world)) divided = world%ranks > 1
     call check_memory(scene, error)
+    if (.not. allocated(error) .and. divided) call check_ranks(scene, error)
     if (allocated(error)) return
     if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)
@@ -101,9 +113,23 @@ contains
       call timer%stop('lattice toughness')
 
       call timer%start('families')
-      call make_family(scene, volume_rule_type(volume_rule_number( &
-        & trim(scene%horizon%volume_correction)), delta), system, error)
+      rule = volume_rule_type(volume_rule_number(trim(scene%horizon%volume_correction)), delta)
+      call choose_family(scene, rule, system%body, suits, reason, error)
       if (allocated(error)) return
+      if (present(world)) then
+        if (world%reproducible .and. .not. suits) call scene_fault(error, scene, 'horizon', 1, &
+          & 'family', 'on lists forces depend on the ranks in their last digits: --reproducible '// &
+          & 'needs lattice families', reason)
+        if (world%reproducible .and. .not. divided) call find_lowest(system%body)
+      end if
+      if (allocated(error)) return
+      if (divided) call divide_body(scene, rule, merge(reproducible_layer( &
+        & scene%header%precision == 'mixed'), 1, suits .and. world%reproducible), world, &
+        & system%body, owner, error)
+      if (allocated(error)) return
+      call make_family(scene, rule, suits, reason, system, error)
+      if (allocated(error)) return
+      if (divided) call join_ranks(world, system%body, owner)
       call check_overlap(system%body, system%family, set_up%isolated, error)
       call place_fault(error, scene, 'body', 1, 'points')
       if (allocated(error)) return
@@ -111,6 +137,7 @@ contains
 
       call timer%start('threads')
       if (present(threads)) call set_up%team%fit(system%family%n_bonds, threads)
+      if (divided) system%family%n_bonds = bonds_of_ranks(system%body, system%family)
       call timer%stop('threads')
 
       call timer%start('conditions')
@@ -124,6 +151,10 @@ contains
       if (system%model%thermal) call heating_of_scene(scene, system%body, heated_by, &
         & system%model%expansion, system%heating)
       call check_laws(scene, system, error)
+      if (.not. allocated(error) .and. divided .and. system%model%generic) &
+        & call scene_fault(error, scene, 'material', 1, 'model', 'a run on several ranks cannot '// &
+        & 'have the bond laws of this scene, which the generic pass computes', &
+        & 'on one rank it can')
       if (allocated(error)) return
       call check_consistent(scene, system, error)
       if (allocated(error)) return
@@ -155,7 +186,7 @@ contains
         call weigh_bonds(scene, system, materials, error)
         if (allocated(error)) return
       end if
-      call find_weakest(system%family, system%model)
+      call find_weakest(system%body, system%family, system%model)
       call begin_laws(system%body, system%family, system%model, system%workspace%generic)
       call finish_family(system)
       call timer%stop('surface correction')
@@ -171,6 +202,7 @@ contains
         else
           call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
         end if
+        if (divided) cut = broken_bonds(system%body, system%family) - set_up%cut
         if (cut == 0_i8) call set_up%warnings%add('idle crack '//to_text(i), '&crack number '// &
           & to_text(i)//' cuts no bond, or only bonds that another crack has cut', tell=.false.)
         set_up%cut = set_up%cut + cut

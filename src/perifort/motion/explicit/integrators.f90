@@ -133,25 +133,25 @@ contains
     type(system_type), intent(in) :: system
     type(sums_type) :: parts
     real(wp) :: terms(block_points, 1), totals(1)
-    integer :: block, i, k, c, at, n, slots(block_points)
+    integer :: block, i, k, c, n, slots(block_points)
 
     call new_sums(system%body%order, 1, parts)
     !$omp parallel do schedule(static) default(none) shared(system, parts) &
-    !$omp private(block, i, k, c, at, n, slots, terms)
+    !$omp private(block, i, k, c, n, slots, terms)
     do block = 1, system%body%order%blocks
-      call slots_of_block(system%body%order, block, at, n, slots)
+      call slots_of_block(system%body%order, block, n, slots)
       terms = 0.0_wp
       do c = 1, system%body%dim
         do i = 1, n
           k = slots(i)
-          terms(at + i - 1, 1) = terms(at + i - 1, 1) + system%state%v(k, c)**2
+          terms(i, 1) = terms(i, 1) + system%state%v(k, c)**2
         end do
       end do
       do i = 1, n
-        terms(at + i - 1, 1) = terms(at + i - 1, 1)*system%body%volume(slots(i)) &
+        terms(i, 1) = terms(i, 1)*system%body%volume(slots(i)) &
           & /inverse_density(system%model, slots(i))
       end do
-      call add_block(system%body%order, block, terms, parts)
+      call add_block(block, terms, parts)
     end do
     totals = total_of(system%body%order, parts)
     kinetic = totals(1)/2

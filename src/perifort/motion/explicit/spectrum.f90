@@ -9,7 +9,7 @@
 module pd_motion_explicit_spectrum
   use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_base_numbers, only: pi
-  use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, noise_after
+  use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, bring_noise
   use pd_body_body, only: owned
   use pd_law_material, only: material_type
   use pd_family_family, only: bonds_type, allocate_bonds
@@ -332,8 +332,8 @@ contains
     real(wp) :: radius
 
     now = 0.0_wp
-    state = noise_after(seed, 2*system%body%dim*(system%body%order%first - 1))
-    do i = system%body%first_owned, system%body%last_owned
+    do i = 1, system%body%order%n_owned
+      call bring_noise(system%body%order, i, seed, 2*system%body%dim, state)
       k = system%body%slot(i)
       do c = 1, system%body%dim
         radius = sqrt(-2*log((1 + noise(state))/2))

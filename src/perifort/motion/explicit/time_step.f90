@@ -4,7 +4,7 @@ module pd_motion_explicit_time_step
   use pd_base_error, only: internal_fault
   use pd_base_numbers, only: pi
   use pd_base_reduce, only: largest_of_ranks
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, owned, share_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
   use pd_family_lattice, only: lattice_family_type
@@ -42,17 +42,16 @@ contains
     type is (lattice_family_type)
       ! the weights hold all that is needed, unless they are not made yet
       if (allocated(workspace%lattice%table)) then
-        call lattice_bound(family, model, workspace%lattice, bound)
+        call lattice_bound(body, family, model, workspace%lattice, bound)
         return
       end if
     class default  ! below, bond by bond, which suits any family
       continue
     end select
     allocate (inverse(body%n_slots), source=0.0_wp)
-    !$omp parallel default(none) shared(body, family, model, bound, inverse) &
-    !$omp private(bonds, n, k, i, j)
-    call allocate_bonds(family, bonds)
     if (model%dilatation) then
+      !$omp parallel default(none) shared(body, family, model, inverse) private(bonds, n, k, i, j)
+      call allocate_bonds(family, bonds)
       !$omp do schedule(dynamic, 256)
       do k = 1, body%n_slots
         if (body%point(k) == 0) cycle
@@ -74,7 +73,12 @@ contains
           inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*t_of(model, k)**2
         end associate
       end do
+      !$omp end parallel
+      call share_halo(body, inverse)
     end if
+    !$omp parallel default(none) shared(body, family, model, bound, inverse) &
+    !$omp private(bonds, n, k, i, j)
+    call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
       bound(k) = 0.0_wp
@@ -150,7 +154,8 @@ contains
 
     step = huge(step)
     do k = 1, body%n_slots
-      if (bound(k) > 0.0_wp) &
+      ! copies of other ranks' points do not have all their bonds
+      if (bound(k) > 0.0_wp .and. owned(body, k)) &
         & step = min(step, sqrt(2*model%materials(model%material(k))%density/bound(k)))
     end do
     step = -largest_of_ranks(body%order, -step)
@@ -171,6 +176,7 @@ contains
     call printed_stiffness(body, family, model, printed)
     squared = huge(squared)
     do k = 1, body%n_slots
+      if (.not. owned(body, k)) cycle
       ! a sum that is exactly 0 has no bonds
       if (printed(k) < 0.0_wp) squared = 0.0_wp
       if (printed(k) > 0.0_wp) &

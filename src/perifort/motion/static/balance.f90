@@ -113,7 +113,7 @@ contains
       type(running_type) :: running
       integer :: i, k
 
-      call new_running(system%body%order, running)
+      call new_running(running)
       do i = rigid%pieces%start(number), rigid%pieces%start(number + 1) - 1
         k = rigid%pieces%slots(i)
         call add_point(system%body%order, system%body%point(k), &
@@ -157,7 +157,7 @@ contains
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
     do p = 1, size(balance%piece)
-      call new_running(system%body%order, running)
+      call new_running(running)
       do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
         k = rigid%pieces%slots(i)
         terms = 0.0_wp
@@ -197,7 +197,7 @@ contains
     if (system%terms%inside > 0) then
       call forces_of_terms(system, t, borne)
       do p = 1, size(balance%piece)
-        call new_running(system%body%order, running)
+        call new_running(running)
         do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
           k = rigid%pieces%slots(i)
           call add_point(system%body%order, system%body%point(k), &
@@ -257,7 +257,7 @@ contains
         order = ascending_order(rigid%pieces%of(motion%slots))
         next = 1
         do p = 1, size(balance%piece)
-          call new_running(system%body%order, running)
+          call new_running(running)
           i = next
           do while (next <= size(order))
             k = motion%slots(order(next))
@@ -274,7 +274,7 @@ contains
     end do
     do p = 1, size(balance%piece)
       if (system%terms%inside > 0) then
-        call new_running(system%body%order, running)
+        call new_running(running)
         do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
           k = rigid%pieces%slots(i)
           one = 0.0_wp
@@ -283,8 +283,8 @@ contains
         end do
         call add_net()
       end if
-      call new_running(system%body%order, running)
-      call new_running(system%body%order, of_applied)
+      call new_running(running)
+      call new_running(of_applied)
       do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
         k = rigid%pieces%slots(i)
         if (all(abs(loads(k, :)) <= 0.0_wp)) cycle
@@ -343,7 +343,7 @@ contains
     call view_of(system, system%time, view)
     call system%terms%add_energy(view, energy)
     do p = 1, size(balance%piece)
-      call new_running(system%body%order, running)
+      call new_running(running)
       do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
         k = rigid%pieces%slots(i)
         call add_point(system%body%order, system%body%point(k), &

@@ -277,18 +277,18 @@ contains
     type(sums_type), intent(out) :: sums
     type(summed_type) :: parts
     real(wp) :: terms(block_points, 6), u2, totals(6)
-    integer :: block, i, k, c, n, at, m, slots(block_points)
+    integer :: block, i, k, c, n, m, slots(block_points)
 
     call new_sums(system%body%order, 6, parts)
     !$omp parallel do schedule(static) default(none) &
-    !$omp private(block, i, k, c, n, at, slots, terms, u2) &
+    !$omp private(block, i, k, c, n, slots, terms, u2) &
     !$omp shared(parts, system, relaxation, rate, a, a_before)
     do block = 1, system%body%order%blocks
-      call slots_of_block(system%body%order, block, at, n, slots)
+      call slots_of_block(system%body%order, block, n, slots)
       terms = 0.0_wp
       do c = 1, size(rate, 2)
-        do i = at, at + n - 1
-          k = slots(i - at + 1)
+        do i = 1, n
+          k = slots(i)
           if (system%held(k, c) == 1_i1) then
             terms(i, 1) = terms(i, 1) + (system%state%force(k, c)*system%body%volume(k))**2
             cycle
@@ -302,7 +302,7 @@ contains
             & - u2*(a(k, c) - a_before(k, c))/rate(k, c)
         end do
       end do
-      call add_block(system%body%order, block, terms, parts)
+      call add_block(block, terms, parts)
     end do
     totals = total_of(system%body%order, parts)
     sums%support = totals(1)

@@ -81,7 +81,7 @@ contains
     if (within) then
       allocate (energy(size(allowed)), source=0.0_wp)
       do p = 1, rigid%pieces%number
-        call new_running(system%body%order, running)
+        call new_running(running)
         do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
           k = rigid%pieces%slots(i)
           call add_point(system%body%order, system%body%point(k), [system%body%volume(k) &

@@ -370,7 +370,7 @@ contains
           call put_block(order, block, taken(:, 7), krylov%residual(:, c))
         end associate
       end do
-      call add_block(system%body%order, block, terms, parts)
+      call add_block(block, terms, parts)
     end do
     totals = total_of(system%body%order, parts)
     sums%residual = totals(1)
@@ -438,7 +438,7 @@ contains
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
         if (all(motion%held == 0_i1) .and. .not. associated(system%body%order%ranks)) cycle
-        call new_running(system%body%order, running)
+        call new_running(running)
         do i = 1, size(motion%slots)
           k = motion%slots(i)
           do c = 1, size(motion%held, 2)

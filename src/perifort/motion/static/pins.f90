@@ -51,7 +51,7 @@ contains
 
     dim = system%body%dim
     associate (body => system%body)
-      call new_running(body%order, running)
+      call new_running(running)
       do i = 1, size(motion%slots)
         k = motion%slots(i)
         call add_point(body%order, body%point(k), &
@@ -62,7 +62,7 @@ contains
       frame%size = largest_of_ranks(body%order, max(maxval(norm2(motion%pose%arms, dim=1)), &
         & maxval(body%spacing(motion%slots))))
       do n = 1, 6
-        call new_running(body%order, of_gram(n))
+        call new_running(of_gram(n))
       end do
       do i = 1, size(motion%slots)
         k = motion%slots(i)
@@ -114,7 +114,7 @@ contains
     do m = 1, size(frames)
       if (frames(m)%number == 0) cycle
       associate (motion => system%motions(m), body => system%body)
-        call new_running(body%order, running)
+        call new_running(running)
         do i = 1, size(motion%slots)
           k = motion%slots(i)
           mode = 0.0_wp
@@ -166,7 +166,7 @@ contains
     real(wp) :: totals(6), weight
     integer :: i, k
 
-    call new_running(system%body%order, running)
+    call new_running(running)
     do i = 1, size(system%motions(m)%slots)
       k = system%motions(m)%slots(i)
       weight = 1.0_wp

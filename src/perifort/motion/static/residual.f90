@@ -31,23 +31,23 @@ contains
     logical, intent(in), optional :: held   !! constrained components, too
     type(sums_type) :: parts
     real(wp) :: terms(block_points, 1), totals(1)
-    integer :: block, c, i, k, at, n, slots(block_points)
+    integer :: block, c, i, k, n, slots(block_points)
     logical :: everywhere
 
     everywhere = .false.
     if (present(held)) everywhere = held
     call new_sums(system%body%order, 1, parts)
     do block = 1, system%body%order%blocks
-      call slots_of_block(system%body%order, block, at, n, slots)
+      call slots_of_block(system%body%order, block, n, slots)
       terms = 0.0_wp
       do c = 1, size(density, 2)
         do i = 1, n
           k = slots(i)
           if (system%held(k, c) == 1_i1 .and. .not. everywhere) cycle
-          terms(at + i - 1, 1) = terms(at + i - 1, 1) + (density(k, c)*system%body%volume(k))**2
+          terms(i, 1) = terms(i, 1) + (density(k, c)*system%body%volume(k))**2
         end do
       end do
-      call add_block(system%body%order, block, terms, parts)
+      call add_block(block, terms, parts)
     end do
     totals = total_of(system%body%order, parts)
     squared = totals(1)

@@ -142,7 +142,7 @@ contains
           end do
           kw = 0.0_wp
           call system%terms%add_tangent(view, w, kw)
-          call new_running(system%body%order, running)
+          call new_running(running)
           do n = 1, size(slots)
             k = slots(n)
             do c = 1, system%body%dim
@@ -197,8 +197,8 @@ contains
     dim = system%body%dim
     associate (order => system%body%order)
       do i = 1, 6
-        call new_running(order, of_mass(i))
-        call new_running(order, of_resistance(i))
+        call new_running(of_mass(i))
+        call new_running(of_resistance(i))
       end do
       do n = 1, size(slots)
         k = slots(n)
@@ -243,7 +243,7 @@ contains
     real(wp) :: totals(6)
     integer :: n, k
 
-    call new_running(system%body%order, running)
+    call new_running(running)
     do n = 1, size(slots)
       k = slots(n)
       call add_point(system%body%order, system%body%point(k), &
@@ -298,8 +298,8 @@ contains
     do p = 1, rigid%pieces%number
       associate (piece => rigid%piece(p), pieces => rigid%pieces)
         if (piece%number == 0 .or. .not. piece%loaded) cycle
-        call new_running(system%body%order, of_work)
-        call new_running(system%body%order, of_applied)
+        call new_running(of_work)
+        call new_running(of_applied)
         do i = pieces%start(p), pieces%start(p + 1) - 1
           k = pieces%slots(i)
           do c = 1, system%body%dim
@@ -339,7 +339,7 @@ contains
     integer :: i, k, dim
 
     dim = system%body%dim
-    call new_running(system%body%order, running)
+    call new_running(running)
     do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
       k = rigid%pieces%slots(i)
       arm = 0.0_wp
@@ -392,7 +392,7 @@ contains
     type(running_type) :: running
     integer :: n, k, c
 
-    call new_running(system%body%order, running)
+    call new_running(running)
     do n = 1, size(slots)
       k = slots(n)
       mode = 0.0_wp
@@ -502,10 +502,10 @@ contains
         do turn = 1, most_turns
           centre = piece%centre
           centre(:system%body%dim) = centre(:system%body%dim) + mean_over(system, slots, u)
-          call new_running(system%body%order, of_side)
-          call new_running(system%body%order, of_misfit)
+          call new_running(of_side)
+          call new_running(of_misfit)
           do i = 1, 6
-            call new_running(system%body%order, of_matrix(i))
+            call new_running(of_matrix(i))
           end do
           do n = 1, size(slots)
             k = slots(n)

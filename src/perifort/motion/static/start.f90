@@ -143,7 +143,7 @@ contains
     real(wp) :: totals(6)
     integer :: i, k
 
-    call new_running(system%body%order, running)
+    call new_running(running)
     do i = 1, size(slots)
       k = slots(i)
       call add_point(system%body%order, system%body%point(k), [sum((imposed(k, :) - moved(k, :)) &

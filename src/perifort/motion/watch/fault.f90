@@ -2,6 +2,8 @@
 module pd_motion_watch_fault
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use pd_base_kinds, only: wp, i8
+  use pd_base_order, only: owned_point
+  use pd_body_body, only: number_at
   use pd_base_reduce, only: first_largest, first_where, largest_of_ranks, sum_of_ranks
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text, with_unit
@@ -95,16 +97,17 @@ contains
   end function stays_within
 
   !> The slot of the first point with a rate that is not finite, else with the largest component.
-  !> Where another rank owns that point, it is a slot of this one.
-  integer function fastest_slot(system, rate) result(slot)
+  !> Where another rank owns that point, it is a slot of this one, and not `mine`.
+  integer function fastest_slot(system, rate, mine) result(slot)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: rate(:, :)
+    logical, intent(out), optional :: mine
     integer(i8) :: point
 
     point = first_where(system%body%order, any(.not. ieee_is_finite(rate), dim=2))
     if (point == 0_i8) point = first_largest(system%body%order, maxval(abs(rate), dim=2))
-    point = min(max(point, system%body%order%first), system%body%order%last)
-    slot = system%body%slot(point - system%body%order%before)
+    if (present(mine)) mine = owned_point(system%body%order, point) > 0
+    slot = system%body%slot(max(1, owned_point(system%body%order, point)))
   end function fastest_slot
 
   !> The error for a motion that is none any more after `step` steps of `dt` [s]. Which of the two
@@ -117,12 +120,13 @@ contains
     character(:), allocatable :: text
     real(wp) :: speed, stretch, energy, supply
     integer :: k
+    logical :: mine
 
-    k = fastest_slot(system, system%state%v)
+    k = fastest_slot(system, system%state%v, mine)
     speed = norm2(system%state%v(k, :))
     stretch = greatest_stretch(system, k)
     text = 'unstable at step '//to_text(step)//', t = '//with_unit(step*dt, 's')//': point '// &
-      & to_text(int(system%body%point(k)))//' at ('//place(system, k)//') '
+      & to_text(number_at(system%body, k))//' at ('//place(system, k)//') '
     if (.not. ieee_is_finite(speed)) then
       text = text//'has a velocity that is not a finite number'
     else if (speed*dt > system%family%rule%delta) then
@@ -146,6 +150,7 @@ contains
       text = text//' the stable one'
     end if
     call fail(error, text//newline//'  likely cause: '//likely_cause(), status_no_answer)
+    error%elsewhere = .not. mine
 
   contains
 

@@ -32,13 +32,13 @@ contains
 
     system => now%system
     values = 0.0_wp
-    n = system%body%last_owned - system%body%first_owned + 1
+    n = system%body%order%n_owned
     !$omp parallel default(none) shared(system, values, n) private(bonds, of_point, i, k)
     call allocate_bonds(system%family, bonds)
     allocate (of_point(size(values, 2)))
     !$omp do schedule(dynamic, 64)
     do i = 1, n
-      k = system%body%slot(system%body%first_owned + i - 1)
+      k = system%body%slot(i)
       call system%family%bonds_of(k, bonds)
       call components_of(stress_of_bonds(system, k, bonds), system%body%dim, .false., of_point)
       values(i, :) = of_point

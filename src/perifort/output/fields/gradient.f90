@@ -51,12 +51,12 @@ contains
 
     if (.not. allocated(shared%gradient)) call find_gradients(system, shared)
     values = 0.0_wp
-    n = system%body%last_owned - system%body%first_owned + 1
+    n = system%body%order%n_owned
     !$omp parallel default(none) shared(system, shared, values, n) private(of_point, i, k)
     allocate (of_point(size(values, 2)))
     !$omp do schedule(static)
     do i = 1, n
-      k = system%body%slot(system%body%first_owned + i - 1)
+      k = system%body%slot(i)
       call of_gradient(system, k, shared%gradient(:, :, i), of_point)
       values(i, :) = of_point
     end do
@@ -88,7 +88,7 @@ contains
     logical :: defined
     integer :: i, k, n, undefined
 
-    n = system%body%last_owned - system%body%first_owned + 1
+    n = system%body%order%n_owned
     allocate (shared%gradient(3, 3, n))
     undefined = 0
     !$omp parallel default(none) shared(system, shared, n) private(bonds, defined, i, k) &
@@ -96,7 +96,7 @@ contains
     call allocate_bonds(system%family, bonds)
     !$omp do schedule(dynamic, 64)
     do i = 1, n
-      k = system%body%slot(system%body%first_owned + i - 1)
+      k = system%body%slot(i)
       call system%family%bonds_of(k, bonds)
       call displacement_gradient(system%state%u, k, bonds, shared%gradient(:, :, i), defined)
       if (.not. defined) undefined = undefined + 1

@@ -100,7 +100,7 @@ contains
     integer :: i
 
     associate (body => system%body)
-      call new_running(body%order, running)
+      call new_running(running)
       do i = 1, size(motion%slots)
         associate (k => motion%slots(i))
           call add_point(body%order, body%point(k), body%volume(k)*[1.0_wp, &

@@ -118,7 +118,7 @@ contains
       if (reason == '' .and. size(measure%slots) == 0) reason = 'there is no point in the '// &
         & 'outer half of the box'
       n = 0
-      do p = body%first_owned, body%last_owned
+      do p = 1, body%order%n_owned
         if (reason /= '') exit
         k = body%slot(p)
         slope = slope_of(measure, body%x(k, :))
@@ -167,10 +167,10 @@ contains
   pure function in_box(measure, body) result(inside)
     class(j_measure_type), intent(in) :: measure
     type(body_type), intent(in) :: body
-    logical :: inside(body%first_owned:body%last_owned)
+    logical :: inside(body%order%n_owned)
     integer :: p
 
-    do p = body%first_owned, body%last_owned
+    do p = 1, body%order%n_owned
       inside(p) = any(abs(slope_of(measure, body%x(body%slot(p), :))) > 0.0_wp)
     end do
   end function in_box
@@ -209,7 +209,7 @@ contains
       terms(:, s) = terms_of(measure, system, s, bonds)
     end do
     !$omp end parallel
-    call new_running(system%body%order, running)
+    call new_running(running)
     do s = 1, size(measure%slots)
       call add_point(system%body%order, system%body%point(measure%slots(s)), terms(:, s), running)
     end do

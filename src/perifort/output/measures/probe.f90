@@ -1,10 +1,11 @@
 !> Probes: points whose values are in every row of the history.
 module pd_output_measures_probe
   use pd_base_error, only: error_type
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_reduce, only: largest_of_ranks
   use pd_base_text, only: line => labelled_line, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, number_at
   use pd_body_shapes, only: touch
   use pd_family_cells, only: cells_around, cells_type, sort_into_cells
   use pd_motion_system, only: system_type
@@ -23,7 +24,10 @@ module pd_output_measures_probe
     character(:), allocatable :: name
     integer :: number = 0                !! of its group
     real(wp) :: place(3) = 0.0_wp        !! where it is asked for [m]
-    integer(i4) :: slot = 0_i4           !! of its point
+    integer(i4) :: slot = 0_i4           !! of its point; of several ranks on that which owns it
+    logical :: here = .true.             !! this rank owns it
+    integer(i8) :: point = 0_i8          !! number of its point among those of all ranks
+    real(wp) :: x(3) = 0.0_wp            !! where that is [m]
     logical :: interpolate = .false.     !! values at the place itself
     type(output_field_type), allocatable :: fields(:)
   contains
@@ -60,7 +64,7 @@ contains
     end do
   end subroutine add_probes
 
-  !> The slot of the point that is nearest to a place; ties go to the lowest point number.
+  !> The slot of the owned point that is nearest to a place; ties go to the lowest point number.
   pure integer(i4) function nearest_slot(body, place) result(slot)
     type(body_type), intent(in) :: body  !! points
     real(wp), intent(in) :: place(3)     !! where; components beyond the dimension do not count [m]
@@ -69,7 +73,7 @@ contains
 
     slot = 0_i4
     least = huge(least)
-    do i = 1, body%n_points
+    do i = 1, body%order%n_owned
       distance = norm2(body%x(body%slot(i), :) - place(:body%dim))
       ! differences within the tolerance are ties, so that ties do not depend on rounding
       if (distance >= least - touch*body%spacing(body%slot(i))) cycle
@@ -123,7 +127,27 @@ contains
     associate (unused_scene => scene)
     end associate
     measure%slot = nearest_slot(system%body, measure%place)
+    measure%point = number_at(system%body, int(measure%slot))
+    if (associated(system%body%order%ranks)) call choose_rank(measure, system%body)
+    measure%x = 0.0_wp
+    if (measure%here) measure%x(:system%body%dim) = system%body%x(measure%slot, :)
+    if (associated(system%body%order%ranks)) call system%body%order%ranks%add_all(measure%x)
   end subroutine begin_probe
+
+  !> Find out which rank owns the point that is nearest of all; ties go to the lowest number.
+  subroutine choose_rank(measure, body)
+    type(probe_measure_type), intent(inout) :: measure  !! with the nearest point of this rank
+    type(body_type), intent(in) :: body
+    real(wp) :: distance, least, lowest
+
+    distance = norm2(body%x(measure%slot, :) - measure%place(:body%dim))
+    least = -largest_of_ranks(body%order, -distance)
+    lowest = real(body%order%n_global + 1_i8, wp)
+    if (distance <= least + touch*body%spacing(measure%slot)) lowest = real(measure%point, wp)
+    lowest = -largest_of_ranks(body%order, -lowest)
+    measure%here = measure%point == nint(lowest, i8)
+    measure%point = nint(lowest, i8)
+  end subroutine choose_rank
 
   !> The components of its fields.
   function columns_of_probe(measure, dim) result(columns)
@@ -158,7 +182,9 @@ contains
     if (measure%interpolate) call stencil_at(now%system, int(measure%slot), &
       & measure%place(:now%system%body%dim), stencil(1))
     first = 1
+    values = 0.0_wp
     do f = 1, size(measure%fields)
+      if (.not. measure%here) exit
       associate (field => measure%fields(f))
         allocate (of_field(field%components(now%system%body%dim), 1))
         if (measure%interpolate) then
@@ -171,6 +197,9 @@ contains
         deallocate (of_field)
       end associate
     end do
+    ! the other ranks add zeros
+    if (associated(now%system%body%order%ranks)) &
+      & call now%system%body%order%ranks%add_all(values)
   end subroutine row_of_probe
 
   !> Its point.
@@ -191,10 +220,9 @@ contains
     end if
     do c = 1, system%body%dim
       if (c > 1) text = text//', '
-      text = text//to_text(system%body%x(measure%slot, c))
+      text = text//to_text(measure%x(c))
     end do
-    text = line('probe', measure%name//' is point '// &
-      & to_text(int(system%body%point(measure%slot)))//' at ('//text//') m')
+    text = line('probe', measure%name//' is point '//to_text(measure%point)//' at ('//text//') m')
   end function describe_probe
 
   !> A probe should lie in a body.
@@ -205,7 +233,7 @@ contains
     real(wp) :: distance
 
     associate (body => system%body)
-      distance = norm2(body%x(measure%slot, :) - measure%place(:body%dim))
+      distance = norm2(measure%x(:body%dim) - measure%place(:body%dim))
       if (distance > body%spacing(measure%slot)) call warnings%add('probe '// &
         & to_text(measure%number), 'probe '//measure%name// &
         & ' lies outside the bodies: the nearest point is '//with_unit(distance, 'm', 3)// &

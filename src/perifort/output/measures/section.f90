@@ -106,7 +106,7 @@ contains
       do n = 1, 2
         ! count, then note
         found = 0
-        do p = body%first_owned, body%last_owned
+        do p = 1, body%order%n_owned
           k = body%slot(p)
           distance = ahead(measure, body, k)
           if (distance > 0.0_wp .or. &
@@ -170,7 +170,7 @@ contains
       terms(:, s) = carried_by(measure, system, int(measure%slots(s)), bonds)
     end do
     !$omp end parallel
-    call new_running(system%body%order, running)
+    call new_running(running)
     do s = 1, size(measure%slots)
       call add_point(system%body%order, system%body%point(measure%slots(s)), terms(:, s), running)
     end do

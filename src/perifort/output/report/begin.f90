@@ -38,6 +38,9 @@ module pd_output_report_begin
     real(wp) :: max_minutes = 0.0_wp               !! of wall time, then stop in order; 0 = no limit
     character(:), allocatable :: restart_command   !! continues the run, for messages
     logical :: quiet = .false.                     !! print nothing
+    integer :: ranks = 0                           !! `preview_scene` shows how so many would share
+                                                   !! the points; 0: none
+    logical :: reproducible = .false.              !! forces do not depend on the number of ranks
     type(field_table_type), allocatable :: fields  !! that scenes may name; none = `all_fields`
   end type run_options_type
 
@@ -56,7 +59,7 @@ contains
     type(recorder_type), intent(inout) :: recorder
     logical, intent(in) :: in_memory
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: positions(:, :), volume(:)
+    real(wp), allocatable :: positions(:, :), volume(:), values(:)
     type(cells_type), allocatable :: cells
     type(kept_type), allocatable :: kept
     type(field_table_type) :: table
@@ -75,9 +78,11 @@ contains
         recorder%fields(f) = table%field(trim(scene%output%fields(f)))
       end do
       call profiles_of(scene, table, body, recorder%profiles)
-      allocate (positions(body%n_points, 3), source=0.0_wp)
+      call recorder%collector%begin(body)
+      allocate (positions(recorder%collector%n, 3), source=0.0_wp)
       do c = 1, body%dim
-        call gather(body, body%x(:, c), positions(:, c))
+        call collect(recorder, body, body%x(:, c), values)
+        positions(:, c) = values
       end do
       if (scene%output%cells .and. directory /= '') then
         allocate (cells, volume(body%n_points))
@@ -136,8 +141,10 @@ contains
     if (directory /= '') recorder%command = command_of(options)
     recorder%quiet = options%quiet
     recorder%most_seconds = 60*options%max_minutes
+    ! a checkpoint has the data of one process
+    if (recorder%collector%needed) recorder%command = ''
     path = ''
-    if (directory /= '') path = checkpoint_path(directory, stem)
+    if (directory /= '' .and. .not. recorder%collector%needed) path = checkpoint_path(directory, stem)
     call recorder%checkpoint%start(path, &
       & scene%output%checkpoint_every, scene%output%checkpoint_minutes, resumed=restart%found, &
       & keep_newest=restart%newest)
@@ -202,29 +209,40 @@ contains
     type(body_type), intent(in) :: body
     type(recorder_type), intent(inout) :: recorder
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: volume(:)
-    integer(i4), allocatable :: number(:)
-    logical, allocatable :: of_points(:)
+    real(wp), allocatable :: values(:)
     integer :: r
 
-    allocate (volume(body%n_points), number(body%n_points), of_points(body%n_points))
-    call gather(body, body%volume, volume)
-    call recorder%results%put_points('volume', volume, error)
+    call collect(recorder, body, body%volume, values)
+    call recorder%results%put_points('volume', values, error)
     if (allocated(error)) return
-    call gather(body, body%body, number)
-    call recorder%results%put_points('body', number, error)
+    call collect(recorder, body, real(body%body, wp), values)
+    call recorder%results%put_points('body', nint(values, i4), error)
     if (allocated(error)) return
-    call gather(body, body%material, number)
-    call recorder%results%put_points('material', number, error)
+    call collect(recorder, body, real(body%material, wp), values)
+    call recorder%results%put_points('material', nint(values, i4), error)
     if (allocated(error)) return
-    call gather(body, body%layer, number)
-    call recorder%results%put_points('layer', number, error)
+    call collect(recorder, body, real(body%layer, wp), values)
+    call recorder%results%put_points('layer', nint(values, i4), error)
     do r = 1, size(scene%regions)
       if (allocated(error)) return
-      call gather(body, region_mask(scene, body, trim(scene%regions(r)%name)), of_points)
+      call collect(recorder, body, merge(1.0_wp, 0.0_wp, region_mask(scene, body, &
+        & trim(scene%regions(r)%name))), values)
       call recorder%results%put_points('region_'//trim(scene%regions(r)%name), &
-        & merge(1_i1, 0_i1, of_points), error)
+        & nint(values, i1), error)
     end do
   end subroutine put_points
+
+  !> Values of slots as those of the points that this rank writes.
+  subroutine collect(recorder, body, of_slots, values)
+    type(recorder_type), intent(in) :: recorder
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: of_slots(:)              !! (n_slots)
+    real(wp), allocatable, intent(out) :: values(:)  !! (points)
+    real(wp), allocatable :: own(:)
+
+    allocate (own(body%order%n_owned))
+    call gather(body, of_slots, own)
+    call recorder%collector%whole(body, own, values)
+  end subroutine collect
 
 end module pd_output_report_begin

@@ -5,6 +5,7 @@ module pd_output_report_recorder
   use pd_base_clock, only: phase_timer_type, progress_type
   use pd_base_error, only: error_type, fail, status_interrupted
   use pd_base_interrupt, only: interrupted
+  use pd_base_reduce, only: any_of_ranks
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: newline, to_text
@@ -13,6 +14,7 @@ module pd_output_report_recorder
   use pd_motion_account, only: energies_of, velocities_now
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_type
+  use pd_output_collector, only: collector_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
   use pd_output_measures_line, only: profile_type, write_profiles
@@ -31,6 +33,7 @@ module pd_output_report_recorder
 
   type, extends(observer_type) :: recorder_type
     type(results_type) :: results
+    type(collector_type) :: collector        !! of the points of all ranks
     type(schedule_type) :: schedule
     type(output_field_type), allocatable :: fields(:)  !! of every output
     type(measure_list_type) :: measures      !! of the history
@@ -109,6 +112,8 @@ contains
     may_stop = .not. instant%last
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer) &
       & .or. allocated(observer%wish))
+    if (may_stop .and. observer%collector%needed) &
+      & stopping = all_stop(system, instant%step, stopping)
     keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
     keeping = keeping .and. observer%checkpoint%in_files
     ! the history has no row of a load step that has not converged
@@ -130,7 +135,8 @@ contains
       call observer%timer%start('output')
       call write_output(observer, system, instant, v, error)
       ! a restarted run does not have the output that is written because the run stops
-      if (output_due .or. instant%last) then
+      ! what these look for may lie at other ranks' points
+      if ((output_due .or. instant%last) .and. .not. observer%collector%needed) then
         call warn_if_any(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
           & call warn_if_any(observer, 'strain', strain_warning(system, instant%time))
@@ -145,6 +151,18 @@ contains
       & place_of(instant, observer%schedule%relaxation)// &
       & ': this state is the last output'//way_on(observer), status_interrupted)
   end subroutine observe
+
+  !> Whether a run on several ranks stops at this step, because one of them is asked to. They tell
+  !> each other every few steps.
+  logical function all_stop(system, step, here)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: step
+    logical, intent(in) :: here   !! this rank is asked to stop
+    integer, parameter :: every = 8
+
+    all_stop = .false.
+    if (mod(step, every) == 0) all_stop = any_of_ranks(system%body%order, here)
+  end function all_stop
 
   !> Count the load steps that the conjugate gradient leaves to dynamic relaxation, and say so at
   !> the first.
@@ -192,7 +210,7 @@ contains
         & to_text(recorder%output_step)
       return
     end if
-    if (recorder%output_step < instant%step) then
+    if (recorder%output_step < instant%step .and. .not. recorder%collector%needed) then
       call velocities_now(system, instant%time, instant%kick, v)
       call write_output(recorder, system, instant, v, error)
       if (allocated(error)) return
@@ -288,7 +306,7 @@ contains
       call history_row(recorder%columns, now, apart, row)
     end if
     call recorder%results%add_row(row, error)
-    if (.not. recorder%turned) then
+    if (.not. (recorder%turned .or. recorder%collector%needed)) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0
       call warn_if_any(recorder, 'rotation', warning)
@@ -324,7 +342,7 @@ contains
     now%v => v
     call recorder%results%begin_output(instant%time, error)
     if (allocated(error)) return
-    call write_fields(recorder%results, recorder%fields, now, undefined, error)
+    call write_fields(recorder%results, recorder%collector, recorder%fields, now, undefined, error)
     if (.not. allocated(error)) call write_profiles(recorder%results, recorder%profiles, now, error)
     if (allocated(error)) return
     call warn_if_any(recorder, 'gradient', gradient_warning(undefined, instant%time))

@@ -37,7 +37,7 @@ contains
     if (scene%header%title /= '') text = trim(scene%header%title)//newline
     if (scene%header%defaults /= '') &
       & text = text//line('defaults', 'those of version '//trim(scene%header%defaults))
-    text = text//line('points', to_text(system%body%n_points)//' in '// &
+    text = text//line('points', to_text(system%body%order%n_global)//' in '// &
       & to_text(scene%header%dimension)//'D')
     text = text//line('horizon', with_unit(system%family%rule%delta, 'm')//', '// &
       & to_text(system%family%rule%delta/greatest_spacing(system), 5)//' spacings of '// &

@@ -31,13 +31,16 @@ contains
     type(warnings_type), intent(inout) :: warnings
     integer :: i
 
-    call warnings_of_scene(scene, edges_of(system%body), warnings)
-    call warn_of_points(scene, system%body, system%family, warnings)
-    call warn_of_courses(scene, system, plan, warnings)
     if (isolated > 0) call warnings%add('isolated', counted(isolated, 'point')// &
       & ' without a neighbour within the horizon: no bond holds them', tell=.false.)
     if (.not. plan%relaxes .and. plan%step > plan%limit) call warnings%add('step', &
       & 'the time step is above the stable one', tell=.false.)
+    call warn_of_schedule(scene, plan, warnings)
+    ! no rank sees all points: `check` on one rank looks for the rest
+    if (associated(system%body%order%ranks)) return
+    call warnings_of_scene(scene, edges_of(system%body), warnings)
+    call warn_of_points(scene, system%body, system%family, warnings)
+    call warn_of_courses(scene, system, plan, warnings)
     if (plan%lowest < 0.0_wp) call warnings%add('unstable body', &
       & 'the body is unstable before any load: its stiffness has an eigenvalue of '// &
       & to_text(plan%lowest, 2)//' of the largest one. With a strongly negative '// &
@@ -61,7 +64,6 @@ contains
         & ' holds no point', tell=.false.)
     end do
     call measures%warn(system, warnings)
-    call warn_of_schedule(scene, plan, warnings)
   end subroutine warn_before
 
   !> Warn of outputs and rows of the history that lie beyond the end of the run.

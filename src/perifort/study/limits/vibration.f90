@@ -5,7 +5,7 @@ module pd_study_limits_vibration
   use pd_base_kinds, only: wp, i1, i2, i4
   use pd_base_lanes, only: lanes
   use pd_base_error, only: error_type, internal_fault
-  use pd_base_reduce, only: largest_of_ranks, noise, noise_after
+  use pd_base_reduce, only: largest_of_ranks, noise, bring_noise
   use pd_body_body, only: body_type, allocate_points, gather, scatter
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never, new_material
@@ -211,8 +211,8 @@ contains
     integer :: i, c, state
 
     allocate (shape(system%body%n_slots, system%body%dim), source=0.0_wp)
-    state = noise_after(4711, system%body%dim*(system%body%order%first - 1))
-    do i = system%body%first_owned, system%body%last_owned
+    do i = 1, system%body%order%n_owned
+      call bring_noise(system%body%order, i, 4711, system%body%dim, state)
       do c = 1, system%body%dim
         shape(system%body%slot(i), c) = noise(state)
         if (system%held(system%body%slot(i), c) == 1_i1) shape(system%body%slot(i), c) = 0.0_wp

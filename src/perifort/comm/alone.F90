@@ -1,0 +1,60 @@
+!> The program without messages between processes: there is one rank.
+#ifndef PERIFORT_MPI
+submodule(pd_comm_world) alone
+  use pd_base_error, only: internal_fault
+  implicit none (type, external)
+
+contains
+
+  module procedure has_messages
+    has_messages = .false.
+  end procedure has_messages
+
+  module procedure begin_world
+    world%rank = 0
+    world%ranks = 1
+  end procedure begin_world
+
+  module procedure end_world
+  end procedure end_world
+
+  module procedure abort_world
+    if (status >= 0) return  ! who calls ends by itself
+  end procedure abort_world
+
+  module procedure add_all
+    self%sums = self%sums + 1_i8
+    if (size(values) < 0) call internal_fault('sums of no rank')
+  end procedure add_all
+
+  module procedure take_largest
+    self%sums = self%sums + 1_i8
+    if (size(values) < 0) call internal_fault('extremes of no rank')
+  end procedure take_largest
+
+  module procedure share
+    if (self%ranks > 1 .and. size(values) > 0) call internal_fault('there is no other rank')
+  end procedure share
+
+  module procedure join
+    if (size(owner) + size(number) + size(slot) > 0 .or. self%ranks > 1 &
+      & .or. size(owned_number) /= size(owned_slot)) call internal_fault('there is no other rank')
+  end procedure join
+
+  module procedure collect
+    all_values = values
+    if (self%ranks > 1) call internal_fault('there is no other rank')
+  end procedure collect
+
+  module procedure swap
+    if (self%ranks > 1) call internal_fault('there is no other rank')
+    got_number = number
+    got = values
+  end procedure swap
+
+  module procedure wait_for_all
+    if (self%ranks > 1) call internal_fault('there is no other rank')
+  end procedure wait_for_all
+
+end submodule alone
+#endif

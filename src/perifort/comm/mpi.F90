@@ -1,0 +1,194 @@
+!> Messages between processes by MPI.
+#ifdef PERIFORT_MPI
+submodule(pd_comm_world) messages
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+  use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Alltoall, MPI_Alltoallv, MPI_Barrier, &
+    & MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, MPI_Finalize, &
+    & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_Init_thread, MPI_Initialized, &
+    & MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, MPI_Isend, MPI_MAX, MPI_Request, MPI_STATUSES_IGNORE, &
+    & MPI_SUM, MPI_THREAD_FUNNELED, MPI_Waitall
+  use pd_base_error, only: internal_fault
+  implicit none (type, external)
+
+  integer, parameter :: tag = 7
+
+contains
+
+  module procedure has_messages
+    has_messages = .true.
+  end procedure has_messages
+
+  module procedure begin_world
+    logical :: begun
+    integer :: provided
+
+    call MPI_Initialized(begun)
+    if (.not. begun) call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
+    call MPI_Comm_rank(MPI_COMM_WORLD, world%rank)
+    call MPI_Comm_size(MPI_COMM_WORLD, world%ranks)
+  end procedure begin_world
+
+  module procedure end_world
+    logical :: begun, ended
+
+    call MPI_Initialized(begun)
+    call MPI_Finalized(ended)
+    if (begun .and. .not. ended) call MPI_Finalize()
+  end procedure end_world
+
+  module procedure abort_world
+    integer :: ranks
+
+    call MPI_Comm_size(MPI_COMM_WORLD, ranks)
+    if (ranks > 1) call MPI_Abort(MPI_COMM_WORLD, status)
+  end procedure abort_world
+
+  module procedure add_all
+    self%sums = self%sums + 1_i8
+    call MPI_Allreduce(MPI_IN_PLACE, values, size(values), MPI_DOUBLE_PRECISION, MPI_SUM, &
+      & MPI_COMM_WORLD)
+  end procedure add_all
+
+  module procedure take_largest
+    real(wp), parameter :: beyond = 2*(huge(1.0_wp)/2)
+    integer :: i
+
+    self%sums = self%sums + 1_i8
+    ! ranks may reduce in different orders, in which comparisons with NaN would differ
+    do i = 1, size(values)
+      if (ieee_is_nan(values(i))) values(i) = beyond
+    end do
+    call MPI_Allreduce(MPI_IN_PLACE, values, size(values), MPI_DOUBLE_PRECISION, MPI_MAX, &
+      & MPI_COMM_WORLD)
+  end procedure take_largest
+
+  module procedure share
+    real(wp), asynchronous :: sent(size(values, 2)*size(self%send_slot))
+    real(wp), asynchronous :: taken(size(values, 2)*size(self%take_slot))
+    type(MPI_Request) :: request(2*size(self%neighbour))
+    integer :: c, i, n, m, first, number, at
+
+    m = size(values, 2)
+    do n = 1, size(self%neighbour)
+      first = self%take_first(n)
+      number = self%take_first(n + 1) - first
+      at = m*(first - 1)
+      call MPI_Irecv(taken(at + 1:at + m*number), m*number, MPI_DOUBLE_PRECISION, &
+        & self%neighbour(n), tag, MPI_COMM_WORLD, request(n))
+    end do
+    do n = 1, size(self%neighbour)
+      first = self%send_first(n)
+      number = self%send_first(n + 1) - first
+      at = m*(first - 1)
+      do c = 1, m
+        do i = 1, number
+          sent(at + (c - 1)*number + i) = values(self%send_slot(first + i - 1), c)
+        end do
+      end do
+      call MPI_Isend(sent(at + 1:at + m*number), m*number, MPI_DOUBLE_PRECISION, &
+        & self%neighbour(n), tag, MPI_COMM_WORLD, request(size(self%neighbour) + n))
+    end do
+    call MPI_Waitall(size(request), request, MPI_STATUSES_IGNORE)
+    do n = 1, size(self%neighbour)
+      first = self%take_first(n)
+      number = self%take_first(n + 1) - first
+      at = m*(first - 1)
+      do c = 1, m
+        do i = 1, number
+          values(self%take_slot(first + i - 1), c) = taken(at + (c - 1)*number + i)
+        end do
+      end do
+    end do
+    self%messages = self%messages + size(self%neighbour)
+    self%bytes_sent = self%bytes_sent + 8_i8*size(sent)
+  end procedure share
+
+  module procedure join
+    integer :: wanted(0:self%ranks - 1), asked(0:self%ranks - 1)
+    integer :: wanted_at(0:self%ranks), asked_at(0:self%ranks), next(0:self%ranks - 1)
+    integer(i8), allocatable :: want(:), ask(:)
+    integer :: r, i, n, low, high, middle
+
+    wanted = 0
+    do i = 1, size(owner)
+      wanted(owner(i)) = wanted(owner(i)) + 1
+    end do
+    call MPI_Alltoall(wanted, 1, MPI_INTEGER, asked, 1, MPI_INTEGER, MPI_COMM_WORLD)
+    wanted_at(0) = 0
+    asked_at(0) = 0
+    do r = 1, self%ranks
+      wanted_at(r) = wanted_at(r - 1) + wanted(r - 1)
+      asked_at(r) = asked_at(r - 1) + asked(r - 1)
+    end do
+    allocate (want(size(owner)), ask(asked_at(self%ranks)))
+    self%take_slot = slot
+    next = wanted_at(:self%ranks - 1)
+    do i = 1, size(owner)
+      r = owner(i)
+      next(r) = next(r) + 1
+      want(next(r)) = number(i)
+      self%take_slot(next(r)) = slot(i)
+    end do
+    call MPI_Alltoallv(want, wanted, wanted_at(:self%ranks - 1), MPI_INTEGER8, ask, asked, &
+      & asked_at(:self%ranks - 1), MPI_INTEGER8, MPI_COMM_WORLD)
+    if (allocated(self%send_slot)) deallocate (self%send_slot)
+    allocate (self%send_slot(size(ask)))
+    do i = 1, size(ask)
+      low = 1
+      high = size(owned_number)
+      do while (low < high)
+        middle = low + (high - low)/2
+        if (owned_number(middle) < ask(i)) then
+          low = middle + 1
+        else
+          high = middle
+        end if
+      end do
+      if (high < 1) call internal_fault('a rank is asked for a point that it does not own')
+      if (owned_number(low) /= ask(i)) &
+        & call internal_fault('a rank is asked for a point that it does not own')
+      self%send_slot(i) = owned_slot(low)
+    end do
+    self%neighbour = pack([(r, r=0, self%ranks - 1)], wanted + asked > 0)
+    n = size(self%neighbour)
+    self%take_first = [wanted_at(self%neighbour) + 1, size(want) + 1]
+    self%send_first = [asked_at(self%neighbour) + 1, size(ask) + 1]
+  end procedure join
+
+  module procedure collect
+    integer :: numbers(0:self%ranks - 1), at(0:self%ranks - 1), r
+
+    call MPI_Gather([size(values)], 1, MPI_INTEGER, numbers, 1, MPI_INTEGER, 0, MPI_COMM_WORLD)
+    if (self%rank > 0) numbers = 0
+    at(0) = 0
+    do r = 1, self%ranks - 1
+      at(r) = at(r - 1) + numbers(r - 1)
+    end do
+    allocate (all_values(sum(numbers)))
+    call MPI_Gatherv(values, size(values), MPI_DOUBLE_PRECISION, all_values, numbers, at, &
+      & MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
+  end procedure collect
+
+  module procedure swap
+    integer :: at(0:self%ranks - 1), got_at(0:self%ranks - 1), r
+
+    allocate (got_number(0:self%ranks - 1))
+    call MPI_Alltoall(number, 1, MPI_INTEGER, got_number, 1, MPI_INTEGER, MPI_COMM_WORLD)
+    at(0) = 0
+    got_at(0) = 0
+    do r = 1, self%ranks - 1
+      at(r) = at(r - 1) + number(r - 1)
+      got_at(r) = got_at(r - 1) + got_number(r - 1)
+    end do
+    allocate (got(sum(got_number)))
+    call MPI_Alltoallv(values, number, at, MPI_DOUBLE_PRECISION, got, got_number, got_at, &
+      & MPI_DOUBLE_PRECISION, MPI_COMM_WORLD)
+  end procedure swap
+
+  module procedure wait_for_all
+    call MPI_Barrier(MPI_COMM_WORLD)
+    if (self%ranks < 1) call internal_fault('no ranks')
+  end procedure wait_for_all
+
+end submodule messages
+#endif

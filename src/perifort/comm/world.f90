@@ -1,0 +1,124 @@
+!> The processes of a run, its ranks, and what they say to each other. This folder alone knows the
+!> library that carries messages: `mpi.F90` sends them by MPI, `alone.F90` is the program without
+!> it, which is one rank.
+module pd_comm_world
+  use pd_base_clock, only: wall_time
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_order, only: ranks_type
+  implicit none (type, external)
+  private
+  public :: world_type, begin_world, end_world, abort_world, has_messages, &
+    & wait_for_turn
+
+  !> All ranks, and of one body's halo: which values go where.
+  type, extends(ranks_type) :: world_type
+    integer :: rank = 0                            !! of this process, from 0
+    integer :: ranks = 1                           !! how many there are
+    logical :: reproducible = .false.              !! forces must not depend on the ranks
+    integer, allocatable :: neighbour(:)           !! ranks that share points with this one
+    integer, allocatable :: send_first(:)          !! first one of each neighbour in `send_slot`, and
+                                                   !! one past the last
+    integer(i4), allocatable :: send_slot(:)       !! slots of owned points that others have copies of
+    integer, allocatable :: take_first(:)          !! the same of `take_slot`
+    integer(i4), allocatable :: take_slot(:)       !! slots of copies, neighbour by neighbour
+    integer(i8) :: bytes_sent = 0_i8               !! of halos, since the run began
+    integer(i8) :: messages = 0_i8                 !! of halos
+    integer(i8) :: sums = 0_i8                     !! `add_all` and `take_largest`
+  contains
+    procedure :: add_all
+    procedure :: take_largest
+    procedure :: share
+    procedure :: join
+    procedure :: collect
+    procedure :: swap
+    procedure :: wait_for_all
+  end type world_type
+
+  interface
+    !> Whether the program was built with messages between processes.
+    module logical function has_messages()
+    end function has_messages
+
+    !> Begin: the rank of this process and how many there are.
+    module subroutine begin_world(world)
+      type(world_type), intent(inout) :: world  !! knows its ranks on return
+    end subroutine begin_world
+
+    !> End the messages of this process, after its last one.
+    module subroutine end_world()
+    end subroutine end_world
+
+    !> End all processes at once, where one cannot go on and others wait for it. On one rank this
+    !> does nothing.
+    module subroutine abort_world(status)
+      integer, intent(in) :: status  !! exit status of all
+    end subroutine abort_world
+
+    !> Replace `values` by their sums over all ranks.
+    module subroutine add_all(self, values)
+      class(world_type), intent(inout) :: self
+      real(wp), intent(inout) :: values(:)  !! as many on every rank
+    end subroutine add_all
+
+    !> Replace each value by the largest of all ranks; a value that is not a number is larger than
+    !> any, so that all ranks decide alike.
+    module subroutine take_largest(self, values)
+      class(world_type), intent(inout) :: self
+      real(wp), intent(inout) :: values(:)  !! as many on every rank
+    end subroutine take_largest
+
+    !> Copy the values of points that others own from there: one message for each neighbour.
+    module subroutine share(self, values)
+      class(world_type), intent(inout) :: self
+      real(wp), intent(inout) :: values(:, :)  !! (n_slots, components)
+    end subroutine share
+
+    !> Find out what each rank sends: every rank tells the owners of its copies which they are.
+    module subroutine join(self, owner, number, slot, owned_number, owned_slot)
+      class(world_type), intent(inout) :: self
+      integer, intent(in) :: owner(:)            !! rank that owns each copy, from 0
+      integer(i8), intent(in) :: number(:)       !! of each copy's point among all
+      integer(i4), intent(in) :: slot(:)         !! of each copy here
+      integer(i8), intent(in) :: owned_number(:) !! of the points that this rank owns, ascending
+      integer(i4), intent(in) :: owned_slot(:)   !! their slots
+    end subroutine join
+
+    !> Values of all ranks one after another, in the order of ranks, on rank 0; nothing on others.
+    module subroutine collect(self, values, all_values)
+      class(world_type), intent(inout) :: self
+      real(wp), intent(in) :: values(:)                    !! of this rank; any number
+      real(wp), allocatable, intent(out) :: all_values(:)  !! on rank 0; of size 0 elsewhere
+    end subroutine collect
+
+    !> Send values to ranks and take what they send.
+    module subroutine swap(self, number, values, got_number, got)
+      class(world_type), intent(inout) :: self
+      integer, intent(in) :: number(0:)                   !! how many go to each rank
+      real(wp), intent(in) :: values(:)                   !! those, rank by rank
+      integer, allocatable, intent(out) :: got_number(:)  !! (0:ranks - 1) how many came from each
+      real(wp), allocatable, intent(out) :: got(:)        !! those, rank by rank
+    end subroutine swap
+
+    !> Wait until all ranks are here.
+    module subroutine wait_for_all(self)
+      class(world_type), intent(inout) :: self
+    end subroutine wait_for_all
+  end interface
+
+contains
+
+  !> Before an error message: let the rank speak that knows most, which then ends the others. Most
+  !> errors are the same on all ranks, and the first one reports them.
+  subroutine wait_for_turn(world, elsewhere)
+    type(world_type), intent(in) :: world  !! the ranks of the program
+    logical, intent(in) :: elsewhere       !! another rank has found the error
+    real(wp), parameter :: turn = 0.5_wp   ! [s]
+    real(wp) :: start
+
+    if (world%ranks == 1) return
+    start = wall_time()
+    do while (wall_time() - start < turn*(merge(1, 0, world%rank > 0) + merge(2, 0, elsewhere)))
+    end do
+  end subroutine wait_for_turn
+
+end module pd_comm_world

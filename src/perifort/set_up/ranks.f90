@@ -1,0 +1,209 @@
+!> A scene on several ranks: what they can have, which points each of them takes, and what they
+!> count together.
+module pd_set_up_ranks
+  use pd_base_error, only: error_type
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_reduce, only: count_of_ranks
+  use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
+  use pd_body_division, only: divide_space, division_type, take_part, work_of_points
+  use pd_body_lattices, only: coordinate
+  use pd_comm_world, only: world_type
+  use pd_family_family, only: allocate_bonds, bonds_type, family_type
+  use pd_family_volume, only: reach, volume_rule_type
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: scene_type, is_set
+  implicit none (type, external)
+  private
+  public :: check_ranks, divide_body, find_lowest, work_of_body, join_ranks, bonds_of_ranks, &
+    & broken_bonds, reproducible_layer
+
+  character(*), parameter :: one_rank = 'on one rank it can'
+
+contains
+
+  !> An error if the scene has something that is not computed on several ranks.
+  subroutine check_ranks(scene, error)
+    type(scene_type), intent(in) :: scene   !! a checked scene
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    do i = 1, size(scene%bodies)
+      if (scene%bodies(i)%mesh /= '') call refuse('body', i, 'mesh', 'a mesh')
+      if (scene%bodies(i)%surface /= '') call refuse('body', i, 'surface', 'a surface')
+    end do
+    if (scene%time%method /= 'explicit') call refuse('time', 1, 'method', &
+      & "method = '"//trim(scene%time%method)//"'")
+    if (scene%horizon%surface_correction == 'consistent') &
+      & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
+    do i = 1, size(scene%boundaries)
+      if (scene%boundaries(i)%motion == 'pin') call refuse('boundary', i, 'motion', 'a pin')
+      if (scene%boundaries(i)%absorbing) &
+        & call refuse('boundary', i, 'absorbing', 'an absorbing boundary')
+    end do
+    do i = 1, size(scene%loads)
+      if (any(is_set(scene%loads(i)%stiffness))) call refuse('load', i, 'stiffness_x', 'springs')
+    end do
+    do i = 1, size(scene%initial)
+      if (scene%initial(i)%file /= '') call refuse('initial', i, 'file', 'a file of initial values')
+      if (is_set(scene%initial(i)%temperature_change) .or. &
+        & scene%initial(i)%temperature_text /= '') call refuse('initial', i, &
+        & 'temperature_change', 'a temperature change')
+    end do
+    if (size(scene%rigids) > 0) call refuse('rigid', 1, '', '&rigid')
+    if (size(scene%contacts) > 0) call refuse('contact', 1, '', '&contact')
+    if (size(scene%tips) > 0) call refuse('tip', 1, '', '&tip')
+    if (size(scene%sections) > 0) call refuse('section', 1, '', '&section')
+    if (size(scene%lines) > 0) call refuse('line', 1, '', '&line')
+    if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
+    do i = 1, size(scene%probes)
+      if (scene%probes(i)%interpolate) call refuse('probe', i, 'interpolate', 'interpolation')
+    end do
+    if (scene%output%fragments) call refuse('output', 1, 'fragments', 'fragments')
+    if (allocated(scene%output%fields)) then
+      if (any(scene%output%fields == 'fragment')) call refuse('output', 1, 'fields', &
+        & "the field 'fragment'")
+    end if
+    if (scene%output%checkpoint_every > 0) call refuse('output', 1, 'checkpoint_every', &
+      & 'checkpoints')
+
+  contains
+
+    !> Refuse one thing.
+    subroutine refuse(group, number, key, what)
+      character(*), intent(in) :: group, key, what
+      integer, intent(in) :: number
+
+      if (allocated(error)) return
+      call scene_fault(error, scene, group, number, key, 'a run on several ranks cannot have '// &
+        & what, one_rank)
+    end subroutine refuse
+  end subroutine check_ranks
+
+  !> The thickness of the layers between which cuts may lie, where forces must not depend on the
+  !> ranks: loops work on blocks of so many points of a row.
+  pure integer function reproducible_layer(mixed) result(points)
+    logical, intent(in) :: mixed  !! bonds in single precision
+    points = merge(16, 8, mixed)
+  end function reproducible_layer
+
+  !> Reduce a body to the points of this rank and copies of others. An error if some rank would have
+  !> no point.
+  subroutine divide_body(scene, rule, blocks, world, body, owner, error)
+    type(scene_type), intent(in) :: scene
+    type(volume_rule_type), intent(in) :: rule     !! how far bonds reach
+    integer, intent(in) :: blocks                  !! cuts across x lie between so many points of
+                                                   !! a lattice's rows; 1: between any
+    type(world_type), intent(inout), target :: world
+    type(body_type), intent(inout) :: body         !! in point order, with all points
+    integer, allocatable, intent(out) :: owner(:)  !! rank that owns each copy, from 0
+    type(error_type), allocatable, intent(out) :: error
+    type(work_of_points) :: work
+    type(division_type) :: division
+    integer :: i
+    real(wp) :: farthest
+
+    if (world%reproducible) call find_lowest(body)
+    call work_of_body(body, blocks, work)
+    call divide_space(work, world%ranks, division)
+    i = minloc(division%work, dim=1) - 1
+    if (.not. division%work(i) > 0.0_wp) then
+      call scene_fault(error, scene, 'body', 1, 'points', 'the scene has too few points for '// &
+        & to_text(world%ranks)//' ranks: rank '//to_text(i)//' would have none', &
+        & 'use fewer ranks')
+      return
+    end if
+    farthest = 0.0_wp
+    do i = 1, body%n_points
+      farthest = max(farthest, reach(rule, body%spacing(i), body%dim))
+    end do
+    call take_part(division, world%rank, farthest, body, owner)
+    body%order%ranks => world
+  end subroutine divide_body
+
+  !> Note where each grid begins, so that blocks and slabs of lattices are the same on all ranks.
+  subroutine find_lowest(body)
+    type(body_type), intent(inout) :: body  !! in point order, with all points
+    integer :: g, c
+
+    do g = 1, size(body%grids)
+      if (.not. any(body%grid == g)) cycle
+      allocate (body%grids(g)%lowest(body%dim))
+      do c = 1, body%dim
+        body%grids(g)%lowest(c) = minval(coordinate(body%grids(g), body%x, c), mask=body%grid == g)
+      end do
+    end do
+  end subroutine find_lowest
+
+  !> The work of a body's points, all alike.
+  subroutine work_of_body(body, blocks, work)
+    type(body_type), intent(in) :: body              !! with all points, in any slots
+    integer, intent(in) :: blocks                    !! as in `divide_body`
+    type(work_of_points), intent(out) :: work
+    real(wp) :: spacing
+    integer :: c
+
+    work%dim = body%dim
+    work%x = body%x(body%slot, :)
+    allocate (work%weight(body%n_points), source=1.0_wp)
+    spacing = minval(body%spacing(body%slot))
+    do c = 1, body%dim
+      work%lower(c) = minval(work%x(:, c)) - spacing/2
+      work%upper(c) = maxval(work%x(:, c)) + spacing/2
+      work%layer(c) = spacing
+    end do
+    work%layer(1) = blocks*spacing
+  end subroutine work_of_body
+
+  !> Tell all ranks who owns the copies, when the body is arranged in slots.
+  subroutine join_ranks(world, body, owner)
+    type(world_type), intent(inout) :: world
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: owner(:)        !! of the points behind the owned ones
+
+    associate (n => body%order%n_owned)
+      call world%join(owner, body%number(n + 1:), body%slot(n + 1:), body%number(:n), &
+        & body%slot(:n))
+    end associate
+  end subroutine join_ranks
+
+  !> Broken bonds of the owned points of all ranks, each counted once.
+  integer(i8) function broken_bonds(body, family) result(number)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(bonds_type) :: bonds
+    integer :: i
+
+    number = 0_i8
+    call allocate_bonds(family, bonds)
+    do i = 1, body%order%n_owned
+      call family%bonds_of(int(body%slot(i)), bonds)
+      number = number + count(.not. bonds%intact(:bonds%n))
+    end do
+    number = count_of_ranks(body%order, number)/2_i8
+  end function broken_bonds
+
+  !> Bonds of the owned points of all ranks: ordered pairs.
+  integer(i8) function bonds_of_ranks(body, family) result(number)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(bonds_type) :: bonds
+    integer(i4), allocatable :: known(:)
+    integer :: i, k, a
+
+    number = 0_i8
+    allocate (known(body%n_slots), source=-1_i4)
+    call allocate_bonds(family, bonds)
+    do i = 1, body%order%n_owned
+      k = body%slot(i)
+      a = family%alike(k)
+      if (known(a) < 0_i4) then
+        call family%bonds_of(a, bonds)
+        known(a) = int(bonds%n, i4)
+      end if
+      number = number + known(a)
+    end do
+    number = count_of_ranks(body%order, number)
+  end function bonds_of_ranks
+
+end module pd_set_up_ranks
