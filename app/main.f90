@@ -1,7 +1,7 @@
 !> Arguments -> one command -> exit status.
 program main
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
-  use pd_base_error, only: error_type, status_interrupted
+  use pd_base_error, only: error_type
   use pd_base_text, only: printable
   use pd_comm_world, only: abort_world, begin_world, end_world, wait_for_turn, world_type
   use pd_command_line, only: command_line_type, read_command_line
@@ -21,12 +21,16 @@ program main
   if (allocated(error)) then
     status = error%status
     flush (output_unit)
-    ! the rank that speaks first ends the others, except where all have stopped together
-    call wait_for_turn(world, error%elsewhere)
-    if (world%rank == 0 .or. status /= status_interrupted) &
+    ! what all ranks have found together one reports; else the first to speak ends the others
+    if (error%everywhere) then
+      call world%wait_for_all()
+    else
+      call wait_for_turn(world)
+    end if
+    if (.not. (error%everywhere .and. error%elsewhere)) &
       & write (error_unit, '(2a)') 'error: ', printable(error%message)
     flush (error_unit)
-    if (status /= status_interrupted) call abort_world(status)
+    if (.not. error%everywhere) call abort_world(status)
   end if
   call end_world()
   ! Quiet: the notes on floating-point flags that gfortran adds to `stop` say nothing to a user.

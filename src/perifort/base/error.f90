@@ -17,6 +17,7 @@ module pd_base_error
     integer :: status = status_input      !! the program's exit status
     character(:), allocatable :: group    !! the group of a scene that is to blame, if it is known
     integer :: number = 0                 !! which one of that name
+    logical :: everywhere = .false.       !! all ranks have it
     logical :: elsewhere = .false.        !! another rank has found it and knows more
   end type error_type
 

@@ -22,6 +22,7 @@ module pd_base_order
     procedure(all_values), deferred :: take_largest  !! the largest of each value
     procedure(halo_values), deferred :: share         !! values of other ranks' points
     procedure(all_points), deferred :: collect        !! values of all ranks, on the first one
+    procedure(count_before), deferred :: number_before  !! sum over the ranks before this one
   end type ranks_type
 
   abstract interface
@@ -40,6 +41,14 @@ module pd_base_order
       class(ranks_type), intent(inout) :: self
       real(wp), intent(inout) :: values(:, :)  !! (n_slots, components)
     end subroutine halo_values
+
+    !> The sum of what the ranks before this one have; 0 on the first.
+    integer(i8) function count_before(self, number) result(before)
+      import :: ranks_type, i8
+      implicit none (type, external)
+      class(ranks_type), intent(inout) :: self
+      integer(i8), intent(in) :: number  !! of this rank
+    end function count_before
 
     !> Values of all ranks one after another, in the order of ranks, on the first one.
     subroutine all_points(self, values, all_values)
@@ -65,15 +74,21 @@ module pd_base_order
     integer(i4), allocatable :: slot(:)        !! of each owned point
     integer(i8), allocatable :: number(:)      !! of each owned point among those of all ranks,
                                                !! ascending; not allocated: its number here
+    logical :: reproducible = .false.              !! results must not depend on the ranks
     class(ranks_type), pointer :: ranks => null()  !! null: this process owns all points
   end type order_type
+
+  !> The places of integers in ascending order of value; equal ones stay as they stand.
+  interface ascending_order
+    module procedure :: order_of_short, order_of_long
+  end interface ascending_order
 
 contains
 
   !> Note where the owned points are, and their numbers among those of all ranks.
   pure subroutine number_points(slot, order, number, n_global)
     integer(i4), intent(in) :: slot(:)            !! (owned points)
-    type(order_type), intent(inout) :: order      !! `ranks` stays as it is
+    type(order_type), intent(inout) :: order      !! `ranks` and `reproducible` stay as they are
     integer(i8), intent(in), optional :: number(:)  !! (owned points) ascending; if absent, all
                                                     !! points are owned
     integer(i8), intent(in), optional :: n_global   !! points of all ranks
@@ -232,8 +247,8 @@ contains
   end subroutine put_block
 
   !> The places of `values` in ascending order of value; equal ones stay as they stand.
-  pure function ascending_order(values) result(order)
-    integer(i4), intent(in) :: values(:)  !! (n) in any order
+  pure function order_of_long(values) result(order)
+    integer(i8), intent(in) :: values(:)  !! (n) in any order
     integer, allocatable :: order(:)
     integer, allocatable :: other(:)
     integer :: width, i, middle, last, n
@@ -279,6 +294,13 @@ contains
         end if
       end do
     end subroutine merge_parts
-  end function ascending_order
+  end function order_of_long
+
+  !> The same of short integers.
+  pure function order_of_short(values) result(order)
+    integer(i4), intent(in) :: values(:)  !! (n) in any order
+    integer, allocatable :: order(:)
+    order = order_of_long(int(values, i8))
+  end function order_of_short
 
 end module pd_base_order

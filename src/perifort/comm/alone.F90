@@ -46,6 +46,11 @@ contains
     if (self%ranks > 1) call internal_fault('there is no other rank')
   end procedure collect
 
+  module procedure number_before
+    if (self%ranks > 1 .or. number < 0_i8) call internal_fault('there is no other rank')
+    before = 0_i8
+  end procedure number_before
+
   module procedure swap
     if (self%ranks > 1) call internal_fault('there is no other rank')
     got_number = number

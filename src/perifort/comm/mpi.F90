@@ -3,7 +3,8 @@
 submodule(pd_comm_world) messages
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Alltoall, MPI_Alltoallv, MPI_Barrier, &
-    & MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, MPI_Finalize, &
+    & MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, MPI_Exscan, &
+    & MPI_Finalize, &
     & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_Init_thread, MPI_Initialized, &
     & MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, MPI_Isend, MPI_MAX, MPI_Request, MPI_STATUSES_IGNORE, &
     & MPI_SUM, MPI_THREAD_FUNNELED, MPI_Waitall
@@ -168,6 +169,12 @@ contains
     call MPI_Gatherv(values, size(values), MPI_DOUBLE_PRECISION, all_values, numbers, at, &
       & MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
   end procedure collect
+
+  module procedure number_before
+    before = 0_i8
+    call MPI_Exscan(number, before, 1, MPI_INTEGER8, MPI_SUM, MPI_COMM_WORLD)
+    if (self%rank == 0) before = 0_i8
+  end procedure number_before
 
   module procedure swap
     integer :: at(0:self%ranks - 1), got_at(0:self%ranks - 1), r

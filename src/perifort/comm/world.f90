@@ -30,6 +30,7 @@ module pd_comm_world
     procedure :: share
     procedure :: join
     procedure :: collect
+    procedure :: number_before
     procedure :: swap
     procedure :: wait_for_all
   end type world_type
@@ -83,6 +84,13 @@ module pd_comm_world
       integer(i4), intent(in) :: owned_slot(:)   !! their slots
     end subroutine join
 
+    !> The sum of what the ranks before this one have; 0 on the first.
+    module function number_before(self, number) result(before)
+      class(world_type), intent(inout) :: self
+      integer(i8), intent(in) :: number  !! of this rank
+      integer(i8) :: before
+    end function number_before
+
     !> Values of all ranks one after another, in the order of ranks, on rank 0; nothing on others.
     module subroutine collect(self, values, all_values)
       class(world_type), intent(inout) :: self
@@ -107,17 +115,16 @@ module pd_comm_world
 
 contains
 
-  !> Before an error message: let the rank speak that knows most, which then ends the others. Most
-  !> errors are the same on all ranks, and the first one reports them.
-  subroutine wait_for_turn(world, elsewhere)
+  !> Before an error message: let the first rank speak, which then ends the others. Most errors are
+  !> the same on all ranks.
+  subroutine wait_for_turn(world)
     type(world_type), intent(in) :: world  !! the ranks of the program
-    logical, intent(in) :: elsewhere       !! another rank has found the error
     real(wp), parameter :: turn = 0.5_wp   ! [s]
     real(wp) :: start
 
-    if (world%ranks == 1) return
+    if (world%rank == 0) return
     start = wall_time()
-    do while (wall_time() - start < turn*(merge(1, 0, world%rank > 0) + merge(2, 0, elsewhere)))
+    do while (wall_time() - start < turn)
     end do
   end subroutine wait_for_turn
 

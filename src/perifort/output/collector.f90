@@ -11,6 +11,7 @@ module pd_output_collector
   !> Where the first rank puts what ranks send.
   type :: collector_type
     logical :: needed = .false.              !! there are more ranks than one
+    logical :: writes = .true.               !! this is the first one, which writes
     integer :: n = 0                         !! points that this rank writes: all on the first one,
                                              !! else its own
     integer, allocatable, private :: at(:)   !! on the first rank: the point of each value
@@ -32,7 +33,8 @@ contains
     if (.not. self%needed) return
     ! numbers of points are exact as reals
     call body%order%ranks%collect(real(body%number(:body%order%n_owned), wp), numbers)
-    if (size(numbers) == 0) return
+    self%writes = size(numbers) > 0
+    if (.not. self%writes) return
     if (size(numbers, kind=i8) /= body%order%n_global) &
       & call internal_fault('points without a rank, or with two')
     self%at = nint(numbers)

@@ -121,6 +121,7 @@ contains
           & 'family', 'on lists forces depend on the ranks in their last digits: --reproducible '// &
           & 'needs lattice families', reason)
         if (world%reproducible .and. .not. divided) call find_lowest(system%body)
+        system%body%order%reproducible = world%reproducible
       end if
       if (allocated(error)) return
       if (divided) call divide_body(scene, rule, merge(reproducible_layer( &

@@ -32,8 +32,14 @@ contains
       if (scene%bodies(i)%mesh /= '') call refuse('body', i, 'mesh', 'a mesh')
       if (scene%bodies(i)%surface /= '') call refuse('body', i, 'surface', 'a surface')
     end do
-    if (scene%time%method /= 'explicit') call refuse('time', 1, 'method', &
-      & "method = '"//trim(scene%time%method)//"'")
+    if (scene%time%method == 'relaxation') then
+      if (size(scene%cracks) + count(is_set(scene%materials%critical_stretch) .or. &
+        & is_set(scene%materials%critical_energy_release_rate)) > 0 .and. &
+        & scene%relaxation%growth /= 'load_steps') call refuse('relaxation', 1, 'growth', &
+        & 'growth by events', "growth = 'load_steps' it can have")
+    else if (scene%time%method /= 'explicit') then
+      call refuse('time', 1, 'method', "method = '"//trim(scene%time%method)//"'")
+    end if
     if (scene%horizon%surface_correction == 'consistent') &
       & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
     do i = 1, size(scene%boundaries)
@@ -70,13 +76,17 @@ contains
   contains
 
     !> Refuse one thing.
-    subroutine refuse(group, number, key, what)
+    subroutine refuse(group, number, key, what, instead)
       character(*), intent(in) :: group, key, what
       integer, intent(in) :: number
+      character(*), intent(in), optional :: instead  !! what can be done
+      character(:), allocatable :: note
 
       if (allocated(error)) return
+      note = one_rank
+      if (present(instead)) note = instead
       call scene_fault(error, scene, group, number, key, 'a run on several ranks cannot have '// &
-        & what, one_rank)
+        & what, note)
     end subroutine refuse
   end subroutine check_ranks
 

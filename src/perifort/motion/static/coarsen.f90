@@ -49,7 +49,8 @@ contains
     coarse = coarse_type()
     coarse%broken = system%broken
     coarse%dim = system%body%dim
-    if (system%body%n_points < fewest_points .or. associated(system%body%order%ranks)) return
+    if (system%body%n_points < fewest_points .or. associated(system%body%order%ranks) .or. &
+      & system%body%order%reproducible) return
     call choose_grid(system, grid)
     if (all(grid%cells(:coarse%dim) <= 1)) return
     call find_cells(system, grid, cell)

@@ -168,13 +168,12 @@ contains
     points = 0
     first = 0
     do p = 1, rigid%pieces%number
-      associate (piece => rigid%piece(p), start => rigid%pieces%start)
+      associate (piece => rigid%piece(p), of_piece => rigid%pieces%points)
         if (piece%number == 0) cycle
         ! the largest piece of a body without supports is no piece torn off
-        if (.not. any(rigid%piece%held) .and. &
-          & start(p + 1) - start(p) == maxval(start(2:) - start(:rigid%pieces%number))) cycle
+        if (.not. any(rigid%piece%held) .and. of_piece(p) == maxval(of_piece)) cycle
         loose = loose + 1
-        points = points + start(p + 1) - start(p)
+        points = points + int(of_piece(p))
         if (first == 0) first = p
       end associate
     end do

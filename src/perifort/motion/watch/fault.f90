@@ -151,6 +151,7 @@ contains
     end if
     call fail(error, text//newline//'  likely cause: '//likely_cause(), status_no_answer)
     error%elsewhere = .not. mine
+    error%everywhere = .true.
 
   contains
 

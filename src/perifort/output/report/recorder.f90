@@ -147,9 +147,13 @@ contains
     end if
     if (keeping) call observer%keep_state(system, finished=.false.)
     call observer%timer%start(observer%phase())
-    if (stopping) call fail(error, reason_to_stop(observer%most_seconds, observer%wish)//' at '// &
+    if (stopping) then
+      call fail(error, reason_to_stop(observer%most_seconds, observer%wish)//' at '// &
       & place_of(instant, observer%schedule%relaxation)// &
-      & ': this state is the last output'//way_on(observer), status_interrupted)
+        & ': this state is the last output'//way_on(observer), status_interrupted)
+      error%everywhere = .true.
+      error%elsewhere = .not. observer%collector%writes
+    end if
   end subroutine observe
 
   !> Whether a run on several ranks stops at this step, because one of them is asked to. They tell
