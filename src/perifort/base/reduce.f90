@@ -175,8 +175,8 @@ contains
     call order%ranks%add_all(numbers)
   end subroutine add_everywhere
 
-  !> The value of a whole sum. Its digits are first brought below 2^30 in size, so that the value
-  !> depends on the sum alone.
+  !> The value of a whole sum. Its digits but the first are brought between 0 and 2^30, which is
+  !> possible in one way only, so that the value depends on the sum alone.
   pure real(wp) function value_of(whole) result(total)
     type(whole_type), intent(in) :: whole
     integer(i8) :: digit(0:kept)   ! digit(0) is what exceeds the first bin
@@ -191,8 +191,8 @@ contains
       digit(d - 1) = digit(d - 1) + 2*whole%carry(first - d + 1)  ! 2^31 is twice the upper unit
     end do
     do d = kept, 1, -1
-      digit(d - 1) = digit(d - 1) + digit(d)/base
-      digit(d) = mod(digit(d), base)
+      digit(d - 1) = digit(d - 1) + (digit(d) - modulo(digit(d), base))/base
+      digit(d) = modulo(digit(d), base)
     end do
     total = total + (((real(digit(0), wp)*base + real(digit(1), wp))*base + real(digit(2), wp)) &
       & + real(digit(3), wp)/base)*2.0_wp**(bits*(first - 1 - middle))

@@ -38,6 +38,8 @@ module pd_family_lattice
     type(offsets_type), allocatable :: grids(:)
     integer :: words = 0                       !! words of bits of one slot
     logical :: mixed = .false.                 !! bonds are computed in single precision
+    logical :: has_copies = .false.            !! some slots are copies of other ranks' points, whose
+                                               !! bonds are not all here
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
@@ -156,6 +158,7 @@ contains
 
     if (present(key_bits)) family%key_bits = key_bits
     family%dim = body%dim
+    family%has_copies = body%n_points > body%order%n_owned
     family%mixed = mixed .and. body%dim > 1
     if (family%mixed) family%block_length = 2*lanes
     family%rule = rule

@@ -2,7 +2,7 @@
 !> once per pass.
 module pd_force_forces
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i8
   use pd_body_body, only: body_type, share_halo
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
@@ -54,7 +54,7 @@ contains
     else if (options%dilatation) then
       if (now /= after_marks) &
         & call dilatation_pass(family, model, options, workspace, u, p, strained)
-      if (now /= up_to_marks) call share_halo(body, p)
+      if (now /= up_to_marks) call share_dilatation(body, family, workspace, p)
       if (now /= up_to_marks) &
         & call force_pass(family, model, options, workspace, u, p, force, strained)
     else if (now /= after_marks) then
@@ -62,6 +62,49 @@ contains
     end if
     if (now /= up_to_marks) call share_halo(body, force)
   end subroutine internal_force
+
+  !> Take the dilatation of copies from the ranks that own their points. Where results must not
+  !> depend on the ranks, take the range of formulas of lattice blocks from there, too: a rank that
+  !> has a part of a block's bonds alone cannot know which one the whole block needs.
+  subroutine share_dilatation(body, family, workspace, p)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(workspace_type), intent(inout) :: workspace
+    real(wp), intent(inout), contiguous :: p(:)
+    real(wp), allocatable :: both(:, :)
+    integer(i8) :: first, last
+    integer :: b, k
+
+    if (.not. associated(body%order%ranks)) return
+    select type (family)
+    type is (lattice_family_type)
+      if (body%order%reproducible) then
+        allocate (both(size(p), 2))
+        both(:, 1) = p
+        both(:, 2) = 0.0_wp
+        do b = 1, size(family%block)
+          first = family%block(b)
+          last = first + family%block_length - 1
+          both(first:last, 2) = workspace%lattice%formulas_used(b)
+        end do
+        call share_halo(body, both)
+        p = both(:, 1)
+        ! a block belongs to one rank: where this one has a copy of a point, it has no other points
+        do b = 1, size(family%block)
+          first = family%block(b)
+          do k = int(first), int(first) + family%block_length - 1
+            if (body%point(k) <= body%order%n_owned) cycle
+            workspace%lattice%formulas_used(b) = int(nint(both(k, 2)), i1)
+            exit
+          end do
+        end do
+        return
+      end if
+    class default  ! sums over lists depend on the ranks
+      continue
+    end select
+    call share_halo(body, p)
+  end subroutine share_dilatation
 
   !> p_k = 2 a d delta theta_k of all slots from displacements `u` (n_slots, dim) [m]. Where bonds
   !> can break, `strained` becomes 1 for slots with a bond (nearly) beyond its limit, else 0.

@@ -43,6 +43,7 @@ contains
     else if (.not. (model%surface .or. allocated(model%scale))) then
       family%class_of = merge(int(model%material, i4), 0_i4, family%alive == 1_i1)
     end if
+    if (model%surface .and. family%has_copies) call part_by_factors(model, family)
     call find_kinds(family, model%consistent, workspace, first, uses)
     order = most_used_first(uses)
     allocate (table(size(uses)), first_of_table(size(uses)), table_of(0:size(uses)))
@@ -69,6 +70,44 @@ contains
     call compare_surroundings(family, model%consistent, first_of_table, workspace)
     deallocate (family%class_of)  ! no longer needed
   end subroutine build_weights
+
+  !> Classes of slots with the same material and surface factors. Copies of other ranks' points have
+  !> their factors from there, while their surroundings here do not tell them.
+  subroutine part_by_factors(model, family)
+    type(model_type), intent(in) :: model
+    type(lattice_family_type), intent(inout) :: family  !! gets other classes
+    type(lookup_type) :: known
+    integer(i8) :: key
+    integer, allocatable :: first(:)
+    integer :: k, c, number
+    logical :: is_new
+
+    allocate (first(family%n_slots), source=0)
+    do k = 1, int(family%n_slots)
+      if (family%alive(k) == 0_i1) cycle
+      key = int(model%material(k), i8)
+      do c = 1, family%dim
+        key = mix(mix(key, transfer(model%D(k, c), key)), transfer(model%S(k, c), key))
+      end do
+      call known%number_of(key, number, is_new)
+      if (is_new) first(number) = k
+      ! values that have the key of others get a class of their own
+      if (.not. same_factors(model, k, first(number))) then
+        call known%own_number(number)
+        first(number) = k
+      end if
+      family%class_of(k) = int(number, i4)
+    end do
+  end subroutine part_by_factors
+
+  !> Whether two slots have the same material and surface factors, bit by bit.
+  pure logical function same_factors(model, one, other)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: one, other
+    same_factors = model%material(one) == model%material(other) &
+      & .and. all(abs(model%D(one, :) - model%D(other, :)) <= 0.0_wp) &
+      & .and. all(abs(model%S(one, :) - model%S(other, :)) <= 0.0_wp)
+  end function same_factors
 
   !> Room for what is kept of each block, if there is none: blocks make their weights in every pass
   !> as long as nobody has built tables of them.

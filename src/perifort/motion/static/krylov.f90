@@ -6,7 +6,7 @@ module pd_motion_static_krylov
   use pd_base_order, only: block_points, put_block, take_block
   use pd_base_reduce, only: add_block, add_point, inner, largest_of_ranks, largest_over, &
     & new_running, new_sums, running_type, total_of, total_of_running, summed_type => sums_type
-  use pd_body_body, only: share_halo
+  use pd_body_body, only: owned, share_halo
   use pd_force_model, only: force_options_type, options_of
   use pd_motion_coarse, only: add_slow, coarse_type, restrict_to, solve_for
   use pd_motion_loads, only: number_of_loads
@@ -39,13 +39,17 @@ contains
     type(system_type), intent(in) :: system  !! whose constrained components are held
     real(wp), intent(in) :: mass(:, :)       !! (n_slots, dim) [N/m4]
     type(krylov_type), intent(inout) :: krylov
-      !! gets room, and the inverse of `mass`, 0 where held
+      !! gets room, and the inverse of `mass`, 0 where held and where other ranks own the point
+    integer :: k
 
     if (.not. allocated(krylov%residual)) allocate (krylov%residual, krylov%direction, &
       & krylov%origin, source=0.0_wp*mass)
     allocate (krylov%product, krylov%inverse, source=0.0_wp*mass)
     where (mass > 0.0_wp .and. system%held == 0_i1) krylov%inverse = 1/mass
-    call share_halo(system%body, krylov%inverse)
+    ! directions are made where points are owned; copies get them when the forces need them
+    do k = 1, size(krylov%inverse, 1)
+      if (.not. owned(system%body, k)) krylov%inverse(k, :) = 0.0_wp
+    end do
     if (.not. allocated(krylov%of_pins)) allocate (krylov%of_pins(6, &
       & merge(size(system%motions), 0, has_pins(system))), source=0.0_wp)
     if (size(krylov%of_pins) == 0) return

@@ -1,0 +1,261 @@
+"""Runs on several ranks against the run on one: the same bits with --reproducible, the same numbers
+within rounding without; errors, signals and killed ranks end all of them.
+
+Scenes are small versions of other cases'. With --short those of continuous integration run, on three
+ranks.
+"""
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from common import Case, change
+
+PARALLEL = os.environ.get("PERIFORT_MPI", "")
+ONE = ("--reproducible",)
+
+# A scene of another case, its changed keys by group, and groups that are left out.
+SCENES = [
+    ("bar", "bar_vibration/bar.nml",
+     {"body": {"points": "300"}, "time": {"step": "6.0e-7", "steps": "400"},
+      "output": {"every": "100", "history_every": "10"}}),
+    ("bending", "patch/bending.nml", {}),
+    ("block", "block_tension/state_based.nml", {"body": {"points": "40, 4, 4"}}),
+    ("plate", "plate_tension/state_based.nml", {"body": {"points": "60, 30"}}),
+    ("hole", "plate_hole/elastic.nml",
+     {"body": {"points": "60, 60"}, "relaxation": {"solver": "'dynamic_relaxation'",
+                                                   "tolerance": "1.0e-6"}}),
+    ("failure", "plate_hole/failure.nml",
+     {"body": {"points": "50, 50"}, "relaxation": {"load_steps": "20"}, "output": {"every": "5"}}),
+    ("crack", "plate_crack/slow.nml",
+     {"body": {"points": "120, 120"}, "time": {"step": "5.0e-8", "steps": "400"},
+      "output": {"every": "100"}}),
+    ("glass", "fracture/glass.nml",
+     {"body": {"points": "100, 40"}, "time": {"duration": "40.0e-6"}, "material": {"scatter": "20.0"}}),
+    ("kalthoff", "fracture/kalthoff.nml",
+     {"body": {"points": "50, 100"}, "time": {"duration": "60.0e-6"}}),
+    ("mixed", "trade/precision.nml", {"body": {"points": "80, 40"}, "scene": {"precision": "'mixed'"}}),
+    ("block in motion", "trade/steps_block.nml", {}),
+]
+LEFT_OUT = ("tip", "study")
+SHORT = ("bar", "block", "plate", "hole", "failure", "crack", "glass", "mixed")
+# The same points as a list, whose sums depend on the ranks in the last digits: differences grow with
+# the steps, so the runs are short.
+LISTS = ("crack", "glass")
+ROUNDING = 1.0e-12
+
+
+class Mpi(Case):
+    """The case, with runs on ranks."""
+
+    def write(self, name, origin, changes):
+        """A small version of a scene."""
+        text = (self.folder.parent / origin).read_text(encoding="utf-8")
+        for group in LEFT_OUT:
+            text = re.sub(rf"^&{group}\b.*?^/\n", "", text, flags=re.M | re.S)
+        for group, keys in changes.items():
+            text = change(text, group, **keys)
+        path = self.out / (name.replace(" ", "_") + ".nml")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def start(self, path, ranks, *options, folder=None):
+        """Start a run, on one rank by the program without MPI; its folder and process."""
+        folder = folder or path.with_suffix("").parent / f"{path.stem}.{ranks}"
+        shutil.rmtree(folder, ignore_errors=True)
+        words = ["run", str(path), "--output", str(folder), "--quiet", *options]
+        environment = dict(os.environ, OMP_NUM_THREADS="1", OMP_WAIT_POLICY="passive",
+                           OMPI_MCA_rmaps_base_oversubscribe="1",
+                           OMPI_MCA_hwloc_base_binding_policy="none",
+                           OMPI_MCA_mpi_yield_when_idle="1", OMPI_ALLOW_RUN_AS_ROOT="1",
+                           OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+        command = [self.program] if ranks == 1 else \
+            [os.environ.get("MPIRUN", "mpirun"), "-n", str(ranks), PARALLEL]
+        return folder, subprocess.Popen(command + words, env=environment, text=True,
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+    def complete(self, path, ranks, *options):
+        """A run to its end; its folder."""
+        folder, process = self.start(path, ranks, *options)
+        _, errors = process.communicate()
+        if process.returncode:
+            sys.exit(f"error: {path} on {ranks} ranks ended with status {process.returncode}:\n"
+                     f"{errors}")
+        return folder
+
+
+def arrays(folder):
+    """All arrays of a results file by their paths, and the history as text."""
+    found = {}
+    [path] = folder.glob("*.vtkhdf")
+
+    def visit(name, item):
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu":
+            found[name] = item[()]
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    found["history.csv"] = np.frombuffer((folder / "history.csv").read_bytes(), np.uint8)
+    return found
+
+
+def difference(one, other):
+    """The largest difference of two runs' arrays over the largest value of each; infinite where
+    one lacks an array, or has another size or something that is not a number.
+    """
+    a, b = arrays(one), arrays(other)
+    if a.keys() != b.keys():
+        return np.inf
+    worst = 0.0
+    for name, values in a.items():
+        if values.shape != b[name].shape:
+            return np.inf
+        if np.array_equal(values, b[name]) or name == "history.csv":
+            continue
+        scale = np.abs(values).max()
+        found = np.abs(values.astype(float) - b[name]).max() / scale if scale > 0 else np.inf
+        worst = max(worst, found if np.isfinite(found) else np.inf)
+    return worst
+
+
+def same_bits(one, other):
+    """Whether all arrays of two runs, and the history's text, are the same."""
+    a, b = arrays(one), arrays(other)
+    return a.keys() == b.keys() and all(a[k].tobytes() == b[k].tobytes() for k in a)
+
+
+def compare_scenes(case, ranks):
+    for name, origin, changes in SCENES:
+        if case.options.short and name not in SHORT:
+            continue
+        path = case.write(name, origin, changes)
+        one = case.complete(path, 1, *ONE)
+        for n in ranks:
+            other = case.complete(path, n, *ONE)
+            case.equal(f"{name}: {n} ranks, the same bits", same_bits(one, other), True)
+        if name not in LISTS:
+            continue
+        path = case.write(name + " list", origin, {**changes, "horizon": {"family": "'list'"}}
+                          if "&horizon" in path.read_text(encoding="utf-8") else changes)
+        options = [] if "'list'" in path.read_text(encoding="utf-8") else \
+            ["--set", "horizon%family='list'"]
+        options += ["--set", "output%fields='displacement'", "--set", "output%precision='double'"]
+        one = case.complete(path, 1, *options)
+        for n in ranks:
+            other = case.complete(path, n, *options)
+            positions = difference_of_fields(one, other)
+            case.below(f"{name}, list: {n} ranks, of the largest displacement", positions, ROUNDING)
+
+
+def difference_of_fields(one, other):
+    """The largest difference of displacements over the largest one, of all outputs."""
+    name = "VTKHDF/PointData/displacement"
+    a, b = arrays(one)[name], arrays(other)[name]
+    found = np.abs(a - b).max() / np.abs(a).max() if a.shape == b.shape else np.inf
+    return found if np.isfinite(found) else np.inf
+
+
+def check_ends(case):
+    """What ends one rank ends all, once, with the right status."""
+    crack = case.write("end", "plate_crack/slow.nml",
+                       {"body": {"points": "100, 100"}, "time": {"step": "6.0e-8", "steps": "100000"},
+                        "output": {"every": "20"}})
+    # refused by name
+    _, process = case.start(crack, 3, "--set", "time%method='relaxation'")
+    errors = process.communicate()[1]
+    case.equal("refused: status", process.returncode, 1)
+    case.equal("refused: errors", len(re.findall(r"^error:", errors, re.M)), 1)
+    # too few points
+    _, process = case.start(crack, 3, "--set", "body%points=2,1")
+    errors = process.communicate()[1]
+    case.equal("too few points: status", process.returncode, 1)
+    case.equal("too few points: errors", len(re.findall(r"^error:", errors, re.M)), 1)
+    # unstable: the history up to there is kept
+    folder, process = case.start(crack, 3, "--set", "time%step=1.0e-6")
+    errors = process.communicate()[1]
+    case.equal("unstable: status", process.returncode, 3)
+    case.equal("unstable: errors", len(re.findall(r"^error: unstable", errors, re.M)), 1)
+    case.equal("unstable: history", (folder / "history.csv").is_file(), True)
+    # stopped in order; mpirun passes this signal on
+    folder, process = case.start(crack, 3)
+    wait_for(folder / "end.vtkhdf")
+    process.send_signal(signal.SIGUSR1)
+    process.communicate()
+    case.equal("SIGUSR1: status", process.returncode, 4)
+    case.equal("SIGUSR1: results can be read", len(arrays(folder)) > 3, True)
+    folder, process = case.start(crack, 3, "--max-minutes", "0.03")
+    process.communicate()
+    case.equal("--max-minutes: status", process.returncode, 4)
+    # a rank is killed
+    for victim in (0, 2):
+        folder, process = case.start(crack, 3)
+        wait_for(folder / "end.vtkhdf")
+        ranks = children(process.pid)
+        case.equal("ranks found", len(ranks), 3)
+        os.kill(ranks[victim], signal.SIGKILL)
+        begin = time.time()
+        process.communicate()
+        case.below(f"kill -9 of rank {victim}: others end within [s]", time.time() - begin, 10)
+        case.equal("its status is not 0", process.returncode != 0, True)
+        case.equal("results can be read", len(arrays(folder)) > 3, True)
+
+
+def wait_for(path, seconds=60):
+    """Until a file is there, and a little longer."""
+    limit = time.time() + seconds
+    while not path.is_file() and time.time() < limit:
+        time.sleep(0.05)
+    time.sleep(0.5)
+
+
+def children(pid):
+    """The processes of the ranks that a process has started, in the order of their numbers."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            environment = (entry / "environ").read_bytes()
+            parent = (entry / "stat").read_text().rsplit(")", 1)[1].split()[1]
+        except OSError:
+            continue
+        rank = re.search(rb"(?:OMPI_COMM_WORLD_RANK|PMI_RANK)=(\d+)", environment)
+        if rank and b"perifort-mpi" in command_of(entry) and int(parent) in (pid, *below(pid)):
+            found.append((int(rank.group(1)), int(entry.name)))
+    return [process for _, process in sorted(found)]
+
+
+def below(pid):
+    """The processes that a process has started."""
+    try:
+        return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def command_of(entry):
+    try:
+        return (entry / "cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def main():
+    case = Mpi(__file__, __doc__, options=[
+        ("--short", {"action": "store_true", "help": "eight scenes on three ranks"}),
+        ("--ranks", {"default": "", "help": "numbers of ranks (default: 2,3,4,7; --short: 3)"})])
+    if not Path(PARALLEL).is_file():
+        sys.exit("error: PERIFORT_MPI does not name the program with MPI; start this as ./pf verify mpi")
+    ranks = [int(n) for n in (case.options.ranks or ("3" if case.options.short else "2,3,4,7")).split(",")]
+    compare_scenes(case, ranks)
+    check_ends(case)
+    case.finish()
+
+
+if __name__ == "__main__":
+    main()
