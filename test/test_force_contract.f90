@@ -29,6 +29,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('fast loops agree with the theory point by point', test_reference), &
+      & new_unittest('long: fast loops agree with the theory at more strains', test_more_strains), &
       & new_unittest('long: rotated bodies agree with the theory', test_turned), &
       & new_unittest('a heated body has forces without its thermal strain', test_unheated), &
       & new_unittest('net force and moment vanish', test_balance), &
@@ -44,15 +45,28 @@ contains
       & new_unittest('the fast formulas keep their range for any critical stretch', test_critical)]
   end subroutine collect_force_contract
 
-  !> Force, dilatation and energy by both ways, from tiny strains to large ones, since loops may
+  !> Strains at which the fast loops take their narrow formulas, and at which they take the general
+  !> ones for most bonds and the others for some.
+  subroutine test_reference(error)
+    type(error_type), allocatable, intent(out) :: error
+    call compare_with_reference([1.0e-4_wp, 0.5_wp], error)
+  end subroutine test_reference
+
+  !> From tiny strains to those where the wide formulas serve most bonds.
+  subroutine test_more_strains(error)
+    type(error_type), allocatable, intent(out) :: error
+    call compare_with_reference([1.0e-9_wp, 2.0e-3_wp, 0.03_wp], error)
+  end subroutine test_more_strains
+
+  !> Force, dilatation and energy by both ways, at several strains, since loops may
   !> take other formulas for small ones. Each is a sum of some 100 terms, with different order and
   !> forms of the same formula: a few hundred rounding errors of its largest term; temperatures add
   !> theirs. Bonds in single precision have 6e-8 in place of 1e-16, some tens of which make 1e-6.
-  subroutine test_reference(error)
+  subroutine compare_with_reference(strains, error)
+    real(wp), intent(in) :: strains(:)  !! of the bodies; neighbours are shaken by half of it
     type(error_type), allocatable, intent(out) :: error
     type(subject_type) :: subject
     real(wp), allocatable :: u(:, :), force(:, :), p(:), f_ref(:, :), theta(:), w(:), w_ref(:)
-    real(wp), parameter :: strains(*) = [1.0e-9_wp, 1.0e-4_wp, 2.0e-3_wp, 0.03_wp, 0.5_wp]
     real(wp) :: largest
     integer :: kind, number, i, k
     logical :: there
@@ -95,7 +109,7 @@ contains
       end do
       call expect_true(error, number > 50, 'too few subjects')
     end do
-  end subroutine test_reference
+  end subroutine compare_with_reference
 
   !> Forces of a heated body that leave out its thermal strain, as tangents want them, after forces
   !> that had it: those of the theory for the same body without temperatures. Tolerance as above.
