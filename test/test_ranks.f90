@@ -240,7 +240,7 @@ contains
       if (allocated(error)) return
     end do
     ! each term is cut off below 2^-60 of the largest one; the rest is one rounding, or three
-    call expect(error, first_product, real(exact, wp), 2.0_wp**(-60)*n*maxval(abs(a*b)) &
+    call expect(error, first_product, real(exact, wp), 2.0_wp**(-60)*n*max_abs(a*b) &
       & + 3*epsilon(1.0_wp)*abs(first_product), &
       & 'the inner product in higher precision')
   end subroutine test_arrangements
