@@ -414,7 +414,8 @@ contains
     call refused(error, [character(w) :: 'run', 'a', '--ouput', 'b'], "did you mean '--output'?")
     if (allocated(error)) return
     call refused(error, [character(w) :: 'run', 'a', '--frob'], 'known: --output, --threads, '// &
-      & '--overwrite, --restart, --max-minutes, --quiet, --set, --help'//newline)
+      & '--overwrite, --restart, --max-minutes, --quiet, --set, --ranks, --reproducible, '// &
+      & '--help'//newline)
     if (allocated(error)) return
     call refused(error, [character(w) :: 'version', '--frob'], 'known: --help'//newline)
     if (allocated(error)) return

@@ -166,13 +166,14 @@ contains
     type(set_up_type) :: set_up
     real(wp) :: rotation(3)
 
-    ! the force acts at z = +1 cm, the spring at z = -1 cm: force h = k h^2 angle
+    ! the force acts at z = +1 cm, the spring at z = -1 cm: force h = k h^2 angle. Turned by so much,
+    ! rounding leaves a residual of 2e-8
     call run(block//"&boundary region = 'near' motion = 'pin' displacement_x = 0 "// &
       & 'displacement_y = 0 displacement_z = 0 /'//line// &
       & "&boundary region = 'far' motion = 'pin' displacement_y = 0 displacement_z = 0 /"//line// &
       & "&load region = 'top' force_y = 10 /"//line// &
       & "&load region = 'base' stiffness = 0, 1e5, 0 /"//line// &
-      & "&time method = 'relaxation' /"//line//'&relaxation tolerance = 1e-8 /', set_up, error)
+      & "&time method = 'relaxation' /"//line//'&relaxation tolerance = 1e-7 /', set_up, error)
     if (allocated(error)) return
     rotation = rotation_of(set_up%system%motions(1)%pose)
     call expect(error, rotation(1), -force/(0.01_wp*stiffness), 2.0e-3_wp*force/(0.01_wp &

@@ -67,10 +67,11 @@ class Mpi(Case):
         path.write_text(text, encoding="utf-8")
         return path
 
-    def start(self, path, ranks, *options, folder=None):
+    def start(self, path, ranks, *options, folder=None, anew=True):
         """Start a run, on one rank by the program without MPI; its folder and process."""
         folder = folder or path.with_suffix("").parent / f"{path.stem}.{ranks}"
-        shutil.rmtree(folder, ignore_errors=True)
+        if anew:
+            shutil.rmtree(folder, ignore_errors=True)
         words = ["run", str(path), "--output", str(folder), "--quiet", *options]
         environment = dict(os.environ, OMP_NUM_THREADS="1", OMP_WAIT_POLICY="passive",
                            OMPI_MCA_rmaps_base_oversubscribe="1",
@@ -193,6 +194,18 @@ def check_ends(case):
     folder, process = case.start(crack, 3, "--max-minutes", "0.03")
     process.communicate()
     case.equal("--max-minutes: status", process.returncode, 4)
+    # stopped in order, and continued: the end is that of a run in one piece
+    steps = ("--set", "time%steps=3000", "--set", "output%every=500", *ONE)
+    whole = case.complete(crack, 3, *steps)
+    pieces = crack.with_name("pieces")
+    shutil.rmtree(pieces, ignore_errors=True)
+    _, process = case.start(crack, 3, *steps, "--max-minutes", "0.015", folder=pieces)
+    process.communicate()
+    case.equal("to be continued: status", process.returncode, 4)
+    _, process = case.start(crack, 3, *steps, "--restart", folder=pieces, anew=False)
+    process.communicate()
+    case.equal("continued: status", process.returncode, 0)
+    case.equal("continued: the same bits", same_bits(whole, pieces), True)
     # a rank is killed
     for victim in (0, 2):
         folder, process = case.start(crack, 3)

@@ -470,6 +470,8 @@ contains
     if (len(line%output_directory) > 0) text = text//' --output '//quoted(line%output_directory)
     if (line%threads > 0) text = text//' --threads '//to_text(line%threads)
     if (line%max_minutes > 0.0_wp) text = text//' --max-minutes '//to_text(line%max_minutes)
+    if (line%ranks > 0) text = text//' --ranks '//to_text(line%ranks)
+    if (line%reproducible) text = text//' --reproducible'
     if (line%quiet) text = text//' --quiet'
     text = text//' --restart'
   end function restart_command

@@ -1,7 +1,7 @@
 !> From a scene to its results, in the steps of chapter 7.
 module pd_driver
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_base_error, only: error_type, fail, status_usage
+  use pd_base_error, only: error_type
   use pd_base_interrupt, only: handlers_type, let_writes_fail, put_back_handlers, &
     & signal_handlers, watch_for_interrupt
   use pd_comm_world, only: begin_world, world_type
@@ -67,13 +67,8 @@ contains
     call begin_world(world)
     world%reproducible = own%reproducible
     ! the first rank writes and speaks for all
-    own%files = own%files .and. world%rank == 0
     own%quiet = own%quiet .or. world%rank > 0
-    if (own%restart .and. world%ranks > 1) then
-      call fail(error, 'a run on several ranks cannot continue from a checkpoint', status_usage)
-      return
-    end if
-    call output%look_back(scene, own, error)
+    call output%look_back(scene, own, world, error)
     if (allocated(error) .or. output%complete) return
 
     ! points and families (7.1, 7.11), volumes (7.2) and surfaces (7.7), conditions (7.8), cracks

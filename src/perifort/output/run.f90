@@ -1,6 +1,6 @@
 !> The output of one run, from what is there of earlier ones to the last word: the driver's partner.
 !>
-!>     call output%look_back(scene, options, error)   ! earlier results, a checkpoint to start from
+!>     call output%look_back(scene, options, world, error)   ! earlier results, a checkpoint to start from
 !>     call output%foresee(scene, options, set_up, error)      ! measures, schedule, warnings
 !>     call output%open(scene, options, set_up, error)
 !>     ...                                            ! the motion, seen by output%recorder
@@ -12,7 +12,9 @@ module pd_output_run
   use pd_motion_keep, only: checksum_of_start
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_earlier, only: mark_complete, refuse_existing
-  use pd_output_checkpoint_restart, only: find_restart, put_back, restart_type
+  use pd_comm_world, only: world_type
+  use pd_output_checkpoint_checkpoint, only: stem_of_rank
+  use pd_output_checkpoint_restart, only: common_checkpoint, find_restart, put_back, restart_type
   use pd_output_fields_check, only: check_names
   use pd_output_report_after, only: summary_after
   use pd_output_report_before, only: foresee_output
@@ -40,6 +42,8 @@ module pd_output_run
     type(measure_list_type), private :: measures  !! of the history
     character(:), allocatable, private :: directory  !! '' = no files
     character(:), allocatable, private :: stem
+    character(:), allocatable, private :: folder     !! of checkpoints, which all ranks write
+    character(:), allocatable, private :: kept_stem  !! of their names
   contains
     procedure :: look_back
     procedure :: foresee
@@ -52,24 +56,33 @@ contains
 
   !> See to it that the scene's fields are known and that no earlier results are overwritten
   !> unasked, or find the checkpoint from which a run continues.
-  subroutine look_back(self, scene, options, error)
+  subroutine look_back(self, scene, options, world, error)
     class(run_output_type), intent(inout) :: self
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
+    type(world_type), intent(inout) :: world   !! the ranks of the run
     type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: named
 
     call check_names(scene, fields_of(options), error)
     if (allocated(error)) return
     self%stem = stem_of(scene)
-    self%directory = output_directory(scene, options)
-    if (self%directory == '') return
+    self%folder = output_directory(scene, options)
+    self%kept_stem = self%stem
+    if (world%ranks > 1) self%kept_stem = stem_of_rank(self%stem, world%rank)
+    self%directory = self%folder
+    if (world%rank > 0) self%directory = ''
+    if (self%folder == '') return
     if (options%restart) then
-      call find_restart(self%directory, self%stem, text_of(options%checkpoint), scene, &
-        & command_of(options), self%restart, error)
+      named = text_of(options%checkpoint)
+      if (world%ranks > 1) call common_checkpoint(self%folder, self%kept_stem, world, named, error)
+      if (allocated(error)) return
+      call find_restart(self%folder, self%stem, named, scene, command_of(options), self%restart, &
+        & error, self%kept_stem)
       if (allocated(error)) return
       call say(self%restart%note, options%quiet)
       self%complete = self%restart%complete
-    else
+    else if (world%rank == 0) then
       call refuse_existing(self%directory, self%stem, options%overwrite, error)
     end if
   end subroutine look_back
@@ -114,7 +127,7 @@ contains
       call open_recorder(scene, options, system, plan, self%directory, self%stem, self%restart, &
         & recorder, in_memory, error)
       if (allocated(error)) return
-      call keep_checkpoints(scene, options, plan, start, self%directory, self%stem, &
+      call keep_checkpoints(scene, options, plan, start, self%folder, self%kept_stem, &
         & self%restart, recorder)
       call recorder%timer%start(recorder%phase())
     end associate

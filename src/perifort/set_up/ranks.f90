@@ -70,8 +70,6 @@ contains
       if (any(scene%output%fields == 'fragment')) call refuse('output', 1, 'fields', &
         & "the field 'fragment'")
     end if
-    if (scene%output%checkpoint_every > 0) call refuse('output', 1, 'checkpoint_every', &
-      & 'checkpoints')
 
   contains
 

@@ -10,6 +10,7 @@ module pd_output_checkpoint_checkpoint
   use pd_base_warnings, only: warnings_type
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i8
+  use pd_base_text, only: to_text
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_motion_keep, only: keep_system
   use pd_motion_system, only: system_type
@@ -20,7 +21,7 @@ module pd_output_checkpoint_checkpoint
   implicit none (type, external)
   private
   public :: about_type, checkpoint_type, new_about, keep_about, checkpoint_path, older_path, &
-    & remove_checkpoints, checkpoint_bytes
+    & remove_checkpoints, checkpoint_bytes, stem_of_rank
 
   !> Data of a checkpoint besides the system.
   type :: about_type
@@ -112,16 +113,40 @@ contains
     path = newest//'.old'
   end function older_path
 
-  !> Remove the checkpoints of an earlier run.
+  !> What the names of a rank's checkpoints begin with where there are several ranks.
+  pure function stem_of_rank(stem, rank) result(of_rank)
+    character(*), intent(in) :: stem  !! name of the results' files without their endings
+    integer, intent(in) :: rank       !! from 0
+    character(:), allocatable :: of_rank
+    of_rank = trim(stem)//'.rank-'//to_text(rank)
+  end function stem_of_rank
+
+  !> Remove the checkpoints of an earlier run, on whatever number of ranks.
   subroutine remove_checkpoints(directory, stem)
     character(*), intent(in) :: directory  !! folder of the results; '' for the current one
     character(*), intent(in) :: stem       !! name of the results' files without their endings
     character(:), allocatable :: newest
+    integer :: rank
 
     newest = checkpoint_path(directory, stem)
-    call remove_file(newest//'.part')
-    call remove_file(older_path(newest))
-    call remove_file(newest)
+    call remove_all_of(newest)
+    rank = 0
+    do
+      newest = checkpoint_path(directory, stem_of_rank(stem, rank))
+      if (.not. (file_exists(newest) .or. file_exists(older_path(newest)))) exit
+      call remove_all_of(newest)
+      rank = rank + 1
+    end do
+
+  contains
+
+    !> The newest one, that before it, and one that is just written.
+    subroutine remove_all_of(path)
+      character(*), intent(in) :: path
+      call remove_file(path//'.part')
+      call remove_file(older_path(path))
+      call remove_file(path)
+    end subroutine remove_all_of
   end subroutine remove_checkpoints
 
   !> Bytes of a checkpoint.

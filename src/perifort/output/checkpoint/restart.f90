@@ -4,6 +4,7 @@ module pd_output_checkpoint_restart
   use pd_base_error, only: error_type, fail, internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: newline, to_text, with_unit
+  use pd_comm_world, only: world_type
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_motion_keep, only: checksum_of_start, keep_system
   use pd_set_up_plan, only: plan_type, steps_of
@@ -23,7 +24,7 @@ module pd_output_checkpoint_restart
     & change_refused
   implicit none (type, external)
   private
-  public :: restart_type, find_restart, put_back
+  public :: restart_type, find_restart, put_back, common_checkpoint
 
   !> The state from which a run continues.
   type :: restart_type
@@ -46,7 +47,7 @@ contains
   !>
   !> An error if the checkpoint cannot be read or is damaged, if the scene has changed in what may
   !> not change, or if there are results of another scene.
-  subroutine find_restart(directory, stem, named, scene, command, restart, error)
+  subroutine find_restart(directory, stem, named, scene, command, restart, error, kept_stem)
     character(*), intent(in) :: directory       !! folder of the results; '' for the current one
     character(*), intent(in) :: stem            !! name of the results' files without their endings
     character(*), intent(in) :: named  !! path of a checkpoint, '' = the run's newest
@@ -55,10 +56,12 @@ contains
     type(restart_type), intent(out) :: restart  !! where to start, with its file open at the system
                                                 !! if one is found
     type(error_type), allocatable, intent(out) :: error
+    character(*), intent(in), optional :: kept_stem  !! of the checkpoints' names; `stem` if absent
     character(:), allocatable :: path, newest
 
     restart%note = ''
     newest = checkpoint_path(directory, stem)
+    if (present(kept_stem)) newest = checkpoint_path(directory, kept_stem)
     path = named
     if (path == '') then
       path = newest
@@ -86,6 +89,63 @@ contains
     restart%note = restart%note//newline//'  complete        the run is finished; '// &
       & 'increase &time steps or duration to continue it'
   end subroutine find_restart
+
+  !> The checkpoint of this rank from which all ranks can go on: that of the last step of which all
+  !> have one. An error if the ranks have none in common, though some have one, or if one is named:
+  !> each rank has its own.
+  subroutine common_checkpoint(directory, stem, world, named, error)
+    character(*), intent(in) :: directory        !! of the checkpoints
+    character(*), intent(in) :: stem             !! of this rank's names
+    type(world_type), intent(inout) :: world     !! the ranks
+    character(:), allocatable, intent(inout) :: named
+      !! path that the user names, which must be empty; that of the checkpoint on return, empty
+      !! where no rank has any
+    type(error_type), allocatable, intent(out) :: error
+    real(wp) :: steps(2), newest(1), most(1), missing(1)
+    integer :: step
+
+    if (named /= '') then
+      call fail(error, 'a run on several ranks finds its checkpoints by itself: give --restart '// &
+        & 'without a path')
+      return
+    end if
+    steps = [step_of(checkpoint_path(directory, stem)), &
+      & step_of(older_path(checkpoint_path(directory, stem)))]
+    ! the newest that each rank has, of which the oldest counts
+    newest = -max(steps(1), steps(2))
+    most = -newest
+    call world%take_largest(newest)
+    call world%take_largest(most)
+    step = -nint(newest(1))
+    if (nint(most(1)) < 0) return
+    missing = 0.0_wp
+    if (all(nint(steps) /= step) .or. step < 0) missing = 1.0_wp
+    call world%take_largest(missing)
+    if (missing(1) > 0.5_wp) then
+      call fail(error, 'the checkpoints in '//directory//' do not belong together: has the run '// &
+        & 'another number of ranks than '//to_text(world%ranks)//', or is one damaged?'//newline// &
+        & '  --overwrite without --restart starts again')
+      error%everywhere = .true.
+      error%elsewhere = world%rank > 0
+      return
+    end if
+    named = checkpoint_path(directory, stem)
+    if (nint(steps(1)) /= step) named = older_path(named)
+  end subroutine common_checkpoint
+
+  !> The step of a checkpoint; -1 if there is none that can be read.
+  real(wp) function step_of(path) result(step)
+    character(*), intent(in) :: path
+    type(restart_type) :: restart
+    type(error_type), allocatable :: ignored
+
+    step = -1.0_wp
+    if (.not. file_exists(path)) return
+    call open_checkpoint(path, restart, ignored)
+    if (allocated(ignored)) return
+    step = restart%about%step
+    call restart%reader%close()
+  end function step_of
 
   !> No checkpoint: from the beginning, or nothing to do, or results that must not go.
   subroutine find_nothing(directory, stem, scene, restart, error)

@@ -4,6 +4,7 @@ module pd_output_report_begin
   use pd_base_clock, only: output_is_terminal
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_reduce, only: any_of_ranks
   use pd_base_version, only: program_version
   use pd_scene_content_types, only: scene_type
   use pd_scene_content_write, only: scene_text
@@ -99,7 +100,9 @@ contains
         & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))], cells)
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
-      if (.not. recorder%results%resumes()) call put_points(scene, body, recorder, error)
+      ! the first rank alone has files that can go on
+      if (.not. any_of_ranks(body%order, recorder%results%resumes())) &
+        & call put_points(scene, body, recorder, error)
       if (allocated(error)) then
         call recorder%results%close(ignored)
         return
@@ -141,10 +144,8 @@ contains
     if (directory /= '') recorder%command = command_of(options)
     recorder%quiet = options%quiet
     recorder%most_seconds = 60*options%max_minutes
-    ! a checkpoint has the data of one process
-    if (recorder%collector%needed) recorder%command = ''
     path = ''
-    if (directory /= '' .and. .not. recorder%collector%needed) path = checkpoint_path(directory, stem)
+    if (directory /= '') path = checkpoint_path(directory, stem)
     call recorder%checkpoint%start(path, &
       & scene%output%checkpoint_every, scene%output%checkpoint_minutes, resumed=restart%found, &
       & keep_newest=restart%newest)

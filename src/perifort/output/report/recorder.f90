@@ -112,10 +112,10 @@ contains
     may_stop = .not. instant%last
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer) &
       & .or. allocated(observer%wish))
+    keeping = may_stop .and. observer%checkpoint%is_due(instant%step)
     if (may_stop .and. observer%collector%needed) &
-      & stopping = all_stop(system, instant%step, stopping)
-    keeping = stopping .or. (may_stop .and. observer%checkpoint%is_due(instant%step))
-    keeping = keeping .and. observer%checkpoint%in_files
+      & call agree(system, instant%step, stopping, keeping)
+    keeping = (keeping .or. stopping) .and. observer%checkpoint%in_files
     ! the history has no row of a load step that has not converged
     row = row_due .or. ((stopping .or. instant%last) .and. instant%settled)
     output = output_due .or. stopping .or. instant%last
@@ -156,17 +156,22 @@ contains
     end if
   end subroutine observe
 
-  !> Whether a run on several ranks stops at this step, because one of them is asked to. They tell
-  !> each other every few steps.
-  logical function all_stop(system, step, here)
+  !> Whether all ranks of a run stop at this step, or write a checkpoint, because one of them is
+  !> asked to or finds that it is time. They tell each other every few steps.
+  subroutine agree(system, step, stopping, keeping)
     type(system_type), intent(in) :: system
     integer, intent(in) :: step
-    logical, intent(in) :: here   !! this rank is asked to stop
+    logical, intent(inout) :: stopping, keeping   !! of this rank, and then of all
     integer, parameter :: every = 8
 
-    all_stop = .false.
-    if (mod(step, every) == 0) all_stop = any_of_ranks(system%body%order, here)
-  end function all_stop
+    if (mod(step, every) == 0) then
+      stopping = any_of_ranks(system%body%order, stopping)
+      keeping = any_of_ranks(system%body%order, keeping)
+    else
+      stopping = .false.
+      keeping = .false.
+    end if
+  end subroutine agree
 
   !> Count the load steps that the conjugate gradient leaves to dynamic relaxation, and say so at
   !> the first.
