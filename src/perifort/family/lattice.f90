@@ -77,6 +77,10 @@ contains
       reason = 'some points are a cloud, a mesh or cut cells'
       return
     end if
+    if (rule%ratio > 0.0_wp) then
+      reason = 'horizons differ from point to point'
+      return
+    end if
     if (any(body%grid /= body%grid(1))) then
       allocate (half_reach(body%n_points))
       do k = 1, body%n_points
