@@ -7,6 +7,7 @@ module pd_family_surface
   use pd_law_material, only: material_type
   use pd_law_weighted, only: weighted_law_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_volume, only: horizon_of_bond
   implicit none (type, external)
   private
   public :: surface_factors, bond_factor
@@ -31,7 +32,7 @@ contains
     integer :: k, i, c
     logical :: weighted
 
-    weighted = has_factors(laws)
+    weighted = has_factors(laws) .or. family%rule%ratio > 0.0_wp
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
     !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted, axes) &
     !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, k, i, c)
@@ -53,7 +54,9 @@ contains
           if (weighted) then
             do i = 1, bonds%n
               strain = (bonds%xi(i, c)/bonds%length(i))**2
-              call law_factors(laws, int(body%material(k)), bonds%length(i), gb, gd)
+              call law_factors(laws, int(body%material(k)), family%rule%ratio > 0.0_wp, &
+                & horizon_of_bond(family%rule, body%spacing(k), body%spacing(bonds%j(i))), &
+                & bonds%length(i), gb, gd)
               dilatation = dilatation + gd*strain*bonds%weight(i)
               energy = energy + gb*strain**2*bonds%length(i)*bonds%weight(i)
               scale = scale + bonds%length(i)*bonds%weight(i)
@@ -101,11 +104,12 @@ contains
   end function has_factors
 
   !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1 without laws
-  !> and for laws with a force of their own.
-  pure subroutine law_factors(laws, material, length, gb, gd)
+  !> and for laws with a force of their own. `own`: the bond has a horizon of its own, `delta`.
+  pure subroutine law_factors(laws, material, own, delta, length, gb, gd)
     type(law_item_type), intent(in), optional :: laws(:)
     integer, intent(in) :: material
-    real(wp), intent(in) :: length
+    logical, intent(in) :: own
+    real(wp), intent(in) :: delta, length
     real(wp), intent(out) :: gb, gd
 
     gb = 1.0_wp
@@ -113,7 +117,11 @@ contains
     if (.not. present(laws)) return
     select type (law => laws(material)%law)
     class is (weighted_law_type)
-      if (law%has_factors()) call law%bond_factors(length/law%delta, gb, gd)
+      if (own) then
+        call law%factors_at(delta, length, gb, gd)
+      else if (law%has_factors()) then
+        call law%bond_factors(length/law%delta, gb, gd)
+      end if
     class default  ! it says itself what it does with a factor
       continue
     end select

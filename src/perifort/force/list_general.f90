@@ -6,7 +6,7 @@ module pd_force_list_general
   use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
-  use pd_family_volume, only: volume_none, volume_exact
+  use pd_family_volume, only: horizon_of_bond, volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
   use pd_force_model, only: bond_factors_of, force_options_type, model_type
@@ -86,7 +86,7 @@ contains
     logical, intent(in) :: own          !! 2 q_k in place of q_k + q_j
     type(work_type), intent(inout) :: work
       !! of the cluster it has taken up; gets the tables of its bonds
-    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c, gb, gd
+    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, delta, a, b, c, gb, gd
     logical :: there(lanes), from(lanes)
     integer(i8) :: e, place(lanes)
     integer :: i, j, m, f, l
@@ -127,7 +127,15 @@ contains
       case default
         spacing = work%own(:, at_p + given_half) &
           & + merge(workspace%given(given_half, j), workspace%given(given_half, m), from)
-        weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
+        if (family%rule%ratio > 0.0_wp) then
+          do l = 1, lanes
+            delta(l) = horizon_of_bond(family%rule, family%spacing(work%first + l - 1), &
+              & family%spacing(merge(j, m, from(l))))
+          end do
+          weight = weight*max(0.0_wp, min(1.0_wp, (delta + spacing/2 - length)/spacing))
+        else
+          weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
+        end if
       end select
       work%geometry(:, i) = 1/length**2
       work%dilatation(:, i) = weight
@@ -136,7 +144,8 @@ contains
         do l = 1, lanes
           gb(l) = 0.0_wp
           gd(l) = 0.0_wp
-          if (there(l)) call bond_factors_of(model, work%first + l - 1, length(l), gb(l), gd(l))
+          if (there(l)) call bond_factors_of(model, work%first + l - 1, merge(j, m, from(l)), &
+            & length(l), gb(l), gd(l))
         end do
         work%stretch(:, i) = work%stretch(:, i)*gb
         work%dilatation(:, i) = weight*gd

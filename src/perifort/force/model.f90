@@ -12,7 +12,7 @@ module pd_force_model
   implicit none (type, external)
   private
   public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early
-  public :: bond_factors_of, q_of, t_of, p_of, has_scales
+  public :: bond_factors_of, q_of, t_of, p_of, has_scales, give_horizons
   public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
@@ -48,6 +48,7 @@ module pd_force_model
     type(law_item_type), allocatable :: laws(:)  !! of the materials; not allocated: the chapter's
     integer(i2), allocatable :: material(:)  !! of each slot
     real(wp), allocatable :: scale(:)        !! of q, t and p of each slot, if some law has scales
+    real(wp), allocatable :: horizon(:)      !! of each slot, if points have their own [m]
     real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
     real(wp), allocatable :: axes(:, :)      !! axes of D and S in columns, none: x, y, z
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
@@ -134,18 +135,34 @@ contains
     model%dilatation = .false.  ! the laws have it
   end subroutine choose_pass
 
-  !> Factors of the stretch and of the dilatation of a bond of slot `k`, by its length
-  !> (doc/theory.md, 15).
-  pure subroutine bond_factors_of(model, k, length, gb, gd)
+  !> Give points horizons of their own. The constants of the laws stay those of the largest one;
+  !> bonds of shorter ones have factors (doc/theory.md, 1).
+  pure subroutine give_horizons(body, ratio, model)
+    type(body_type), intent(in) :: body      !! arranged in slots, with its spacings
+    real(wp), intent(in) :: ratio            !! horizon over spacing of each point [-]
+    type(model_type), intent(inout) :: model
+      !! of weighted laws without scales; gets `horizon` and is `weighted`
+
+    model%horizon = ratio*body%spacing
+    model%weighted = .true.
+  end subroutine give_horizons
+
+  !> Factors of the stretch and of the dilatation of the bond k-j, by its length and its horizon
+  !> (doc/theory.md, 1 and 15).
+  pure subroutine bond_factors_of(model, k, j, length, gb, gd)
     type(model_type), intent(in) :: model  !! with weighted laws
-    integer, intent(in) :: k               !! slot
+    integer, intent(in) :: k, j            !! slots of the bond's ends
     real(wp), intent(in) :: length         !! |xi| [m]
     real(wp), intent(out) :: gb            !! factor of the stretch's force [-]
     real(wp), intent(out) :: gd            !! factor of the dilatation [-]
 
     select type (law => model%laws(model%material(k))%law)
     class is (weighted_law_type)
-      call law%bond_factors(length/law%delta, gb, gd)
+      if (allocated(model%horizon)) then
+        call law%factors_at(max(model%horizon(k), model%horizon(j)), length, gb, gd)
+      else
+        call law%bond_factors(length/law%delta, gb, gd)
+      end if
     class default
       call internal_fault('a law without weights on the fast loops')
     end select
@@ -216,7 +233,7 @@ contains
     real(wp), intent(out) :: lower  !! < 0; -`never` if the bond does not break in compression [-]
     real(wp), intent(out) :: upper  !! > 0; `never` if one end is in a no-fail zone [-]
 
-    upper = min(model%critical(k), model%critical(j))
+    upper = min(critical_of(model, k, j), critical_of(model, j, k))
     if (upper < 0.0_wp) upper = never
     if (allocated(model%number) .and. upper < never) upper = upper*scatter_of(model, k, j)
     lower = -never
@@ -224,6 +241,20 @@ contains
       if (model%compressed(k) == 1_i1 .and. model%compressed(j) == 1_i1) lower = -upper
     end if
   end subroutine bond_limit
+
+  !> Critical stretch of slot `k`'s material for the horizon of the bond k-j: that of Gc goes with
+  !> one over the root of the horizon (doc/theory.md, 8).
+  pure real(wp) function critical_of(model, k, j) result(s_c)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, j
+
+    s_c = model%critical(k)
+    if (.not. allocated(model%horizon)) return
+    associate (m => model%material(k))
+      if (s_c > 0.0_wp .and. s_c < never .and. model%materials(m)%from_toughness) &
+        & s_c = s_c*sqrt(model%laws(m)%law%delta/max(model%horizon(k), model%horizon(j)))
+    end associate
+  end function critical_of
 
   !> The factor of the critical stretch of the bond k-j, by the material whose critical stretch it
   !> has; of two alike the first one.
@@ -233,9 +264,9 @@ contains
     integer :: m
 
     m = model%material(k)
-    if (model%critical(j) < model%critical(k)) then
+    if (critical_of(model, j, k) < critical_of(model, k, j)) then
       m = model%material(j)
-    else if (.not. model%critical(k) < model%critical(j)) then
+    else if (.not. critical_of(model, k, j) < critical_of(model, j, k)) then
       m = min(m, int(model%material(j)))
     end if
     factor = 1.0_wp
