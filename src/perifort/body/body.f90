@@ -57,7 +57,7 @@ module pd_body_body
     integer :: last_owned = 0
     type(order_type) :: order               !! where the owned points are, for sums over them
     type(grid_type), allocatable :: grids(:)
-    real(wp) :: delta = 0.0_wp              !! the horizon [m]
+    real(wp) :: delta = 0.0_wp              !! the horizon, the largest one of all points [m]
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
     type(skin_type), allocatable :: skins(:)  !! bodies that fill surfaces
     type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)

@@ -39,7 +39,7 @@ contains
   subroutine generate_body(scene, body, delta, error, counts, warnings)
     type(scene_type), intent(in) :: scene  !! checked, with its files' names
     type(body_type), intent(out) :: body   !! all points, layers last, in point order
-    real(wp), intent(out) :: delta                          !! the horizon [m]
+    real(wp), intent(out) :: delta                          !! the (largest) horizon [m]
     type(error_type), allocatable, intent(out) :: error
     type(layer_count_type), allocatable, intent(out), optional :: counts(:)  !! what the columns
                                                             !! of each layer came to
@@ -92,11 +92,14 @@ contains
     do i = 1, size(body%parts)
       body%parts(i)%first = findloc(int(body%body), body%parts(i)%body, dim=1)
     end do
-    ! of a mesh counts the median; the scene has one horizon
+    ! of a mesh counts the median, where the scene has one horizon
     spacing = max(spacing, maxval(body%spacing, mask=.not. of_mesh(scene, body)))
+    ! or each point has its own, of which this is the largest
+    if (scene%horizon%local) spacing = maxval(body%spacing)
     delta = horizon_of(scene, spacing)
     body%delta = delta
-    call check_family_size(scene, body, delta, minval(body%spacing), error)
+    if (scene%horizon%local) spacing = minval(body%spacing)
+    call check_family_size(scene, body, horizon_of(scene, spacing), minval(body%spacing), error)
     if (allocated(error)) return
     call add_layers(scene, delta, depth, body, counted, error)
     if (allocated(error)) return

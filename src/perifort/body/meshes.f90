@@ -271,7 +271,12 @@ contains
     associate (part => body%parts(part_named(scene, body, name)))
       call facets_named(part, trim(name(index(name, ':') + 1:)), facets, error)
       if (allocated(error)) call internal_fault('a set without facets')
-      call points_near(part, positions_of(body, part), facets, body%delta, near)
+      if (scene%horizon%local) then
+        call points_near(part, positions_of(body, part), facets, body%delta, near, &
+          & scene%horizon%ratio*body%spacing(body%slot(part%first:part%first + part%n_points - 1)))
+      else
+        call points_near(part, positions_of(body, part), facets, body%delta, near)
+      end if
       mask = to_slots(body, part, near)
     end associate
   end function facet_mask

@@ -460,7 +460,13 @@ contains
     if (allocated(error)) return
     slots = slots_of(body, body%skins(number))
     if (size(slots) == 0) return
-    call points_near_facets(body%skins(number)%surface, chosen, body%x(slots, :), body%delta, near)
+    if (scene%horizon%local) then
+      call points_near_facets(body%skins(number)%surface, chosen, body%x(slots, :), body%delta, &
+        & near, scene%horizon%ratio*body%spacing(slots))
+    else
+      call points_near_facets(body%skins(number)%surface, chosen, body%x(slots, :), body%delta, &
+        & near)
+    end if
     mask(slots) = near
   end subroutine near_side
 

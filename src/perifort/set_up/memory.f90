@@ -70,7 +70,8 @@ contains
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking
-    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies))) then
+    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies)) .or. &
+      & (scene%horizon%local .and. size(scene%bodies) > 1)) then
       bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
         & + per_list_bond*members)
       if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members

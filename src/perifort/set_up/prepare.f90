@@ -18,10 +18,9 @@ module pd_set_up_prepare
   use pd_family_cracks, only: cut_bonds, part_bodies
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
-  use pd_family_volume, only: volume_rule_type, volume_rule_number
   use pd_force_breaking, only: damage_of, find_weakest
   use pd_force_generic_bonds, only: begin_laws, refresh_bonds
-  use pd_force_model, only: new_model
+  use pd_force_model, only: give_horizons, new_model
   use pd_force_terms, only: term_list_type
   use pd_motion_loads, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system, explain_condition
@@ -35,6 +34,7 @@ module pd_set_up_prepare
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
     & gravity_of_scene, leave_uncorrected, sides_of_contact
   use pd_set_up_families, only: axes_of_factors, make_family, finish_family
+  use pd_set_up_horizons, only: check_horizons, rule_of_scene
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
   use pd_set_up_plan, only: plan_type, make_plan
@@ -101,8 +101,7 @@ contains
       call timer%stop('lattice toughness')
 
       call timer%start('families')
-      call make_family(scene, volume_rule_type(volume_rule_number( &
-        & trim(scene%horizon%volume_correction)), delta), system, error)
+      call make_family(scene, rule_of_scene(scene, system%body, delta), system, error)
       if (allocated(error)) return
       call check_overlap(system%body, system%family, set_up%isolated, error)
       call place_fault(error, scene, 'body', 1, 'points')
@@ -123,6 +122,11 @@ contains
         & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
       if (system%model%thermal) call heating_of_scene(scene, system%body, heated_by, &
         & system%model%expansion, system%heating)
+      if (system%family%rule%ratio > 0.0_wp) then
+        call check_horizons(scene, system, error)
+        if (allocated(error)) return
+        call give_horizons(system%body, system%family%rule%ratio, system%model)
+      end if
       call check_laws(scene, system, error)
       if (allocated(error)) return
       call check_consistent(scene, system, error)

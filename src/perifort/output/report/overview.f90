@@ -109,10 +109,10 @@ contains
     character(:), allocatable :: text
     real(wp), allocatable :: extents(:), along(:)
     logical, allocatable :: mine(:)
-    real(wp) :: edges(3)
+    real(wp) :: edges(3), delta
     integer :: i, c, g
 
-    associate (body => system%body, delta => system%family%rule%delta)
+    associate (body => system%body, rule => system%family%rule)
       text = ''
       do i = 1, size(scene%bodies)
         mine = body%body == i .and. body%layer == 0 .and. body%point > 0
@@ -127,9 +127,14 @@ contains
           edges(c) = maxval(along + body%spacing/2, mask=mine) &
             & - minval(along - body%spacing/2, mask=mine)
         end do
+        delta = rule%delta
+        if (rule%ratio > 0.0_wp) delta = rule%ratio*maxval(body%spacing, mask=mine)
         text = text//line('body '//to_text(i), with_unit(minval(edges(:body%dim)), 'm', 4)// &
           & ' in its thinnest direction: '//to_text(minval(edges(:body%dim))/delta, 3)// &
-          & ' horizons')
+          & trim(merge(' of its largest horizons', ' horizons               ', &
+          & rule%ratio > 0.0_wp)))
+        if (rule%ratio > 0.0_wp) text = text//line('', 'horizons of '//with_unit(rule%ratio* &
+          & minval(body%spacing, mask=mine), 'm', 4)//' to '//with_unit(delta, 'm', 4))
       end do
       do i = 1, size(scene%cracks)
         if (scene%cracks(i)%surface /= '') cycle
@@ -137,7 +142,8 @@ contains
         text = text//line('crack '//to_text(i), with_unit(minval(extents), 'm', 4)// &
           & trim(merge(' long                    ', ' in its shorter direction', &
           & size(extents) == 1))//': '// &
-          & to_text(minval(extents)/delta, 3)//' horizons')
+          & to_text(minval(extents)/rule%delta, 3)//trim(merge(' of the largest horizons', &
+          & ' horizons               ', rule%ratio > 0.0_wp)))
       end do
     end associate
   end function lengths

@@ -179,6 +179,9 @@ contains
     else if (given('horizon', 1, 'ratio', source) .and. is_set(scene%horizon%length)) then
       call rule_fault(error, 'horizon', 1, 'length', "'ratio' and 'length' are both given", &
         & 'give one of them', source)
+    else if (scene%horizon%local .and. is_set(scene%horizon%length)) then
+      call rule_fault(error, 'horizon', 1, 'length', "'local' and 'length' are both given", &
+        & "'length' is one horizon for all points; give 'ratio' with 'local'", source)
     else if (given('time', 1, 'safety', source) .and. is_set(scene%time%step)) then
       call rule_fault(error, 'time', 1, 'step', "'step' and 'safety' are both given", &
         & 'give one of them', source)

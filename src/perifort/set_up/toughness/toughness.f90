@@ -71,7 +71,9 @@ contains
       subject%rule = volume_rule_type(volume_rule_number(trim(scene%horizon%volume_correction)), &
         & delta/spacing)
       subject%corrected = scene%horizon%surface_correction /= 'none'
-      if (spacing - minval(body%spacing) > same_spacing*spacing) then
+      ! lattices with horizons of their own are all alike in spacings
+      if (.not. scene%horizon%local .and. spacing - minval(body%spacing) > same_spacing*spacing) &
+        & then
         reason = 'spacings differ'
       else if (subject%rule%delta > longest(subject%dim)) then
         reason = 'the lattice is solved for horizons of at most '// &
