@@ -120,6 +120,7 @@ program main
   use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_set_up_consistent_weights, only: collect_set_up_consistent_weights
+  use test_set_up_horizons, only: collect_set_up_horizons
   use test_set_up_toughness, only: collect_set_up_toughness
   use test_set_up_terms, only: collect_set_up_terms
   use test_study_limits_limits, only: collect_study_limits_limits
@@ -247,6 +248,7 @@ program main
   call register('study_bench_bench', collect_study_bench_bench)
   call register('set_up_consistent_weights', collect_set_up_consistent_weights)
   call register('set_up_terms', collect_set_up_terms)
+  call register('set_up_horizons', collect_set_up_horizons)
   call register('set_up_toughness', collect_set_up_toughness)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)
