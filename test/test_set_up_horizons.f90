@@ -394,7 +394,8 @@ contains
         & repeat(' ', 18), n == 2), 'ratio = 2.015', relaxes), both, error)
       do b = 1, 2
         text = '&scene dimension = 2 thickness = 1.0 /'//line// &
-          & '&material youngs_modulus = 2e11 density = 8e3 '//material//merge("influence='linear'", repeat(' ', 18), n == 2)// &
+          & '&material youngs_modulus = 2e11 density = 8e3 '//material// &
+          & merge("influence='linear'", repeat(' ', 18), n == 2)// &
           & ' /'//line//'&horizon ratio = 2.015 /'//line//relaxes//'&body lower = '// &
           & to_text(b - 2)//', 0 upper = '//to_text(b - 1)//', 1 points = 2*'//to_text(16*b)//' /'
         call ready_text(text, alone, error)

@@ -9,7 +9,7 @@ module pd_body_layers
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: adds_layer, scene_type
+  use pd_scene_content_types, only: adds_layer, has_own_horizons, scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_lattices, only: box_of_cells, cell_of, place_in
   implicit none (type, external)
@@ -41,6 +41,7 @@ module pd_body_layers
     integer :: rows = 0                !! of the layer
     real(wp) :: delta = 0.0_wp         !! horizon of its points [m]
     integer, allocatable :: top(:, :)  !! level of each column's outermost cell, or `nothing`
+    integer, allocatable :: fine(:, :) !! of its outermost divided cell (`&refine`), or `nothing`
     logical, allocatable :: has(:, :)  !! whether the column gets the layer
   end type side_type
 
@@ -102,6 +103,13 @@ contains
       outward = merge(-1, 1, boundary%side(3:5) == 'min')
       call find_sides(scene, boundary%body, body, n_body, axis, outward, delta, sides)
       call choose_columns(body%dim, axis, outward, sides, tally)
+      do i = 1, size(sides)
+        if (.not. any(sides(i)%has .and. sides(i)%fine >= sides(i)%top)) cycle
+        call scene_fault(error, scene, 'boundary', tally%boundary, 'side', 'the layer at side '''// &
+          & trim(boundary%side)//''' joins refined cells', '&refine does not serve layers there: '// &
+          & 'refine at a distance from the side, or move the points of a region')
+        return
+      end do
       call allocate_points(layer, body%dim, 0)
       do i = 1, size(sides)
         if (.not. any(sides(i)%has)) cycle
@@ -167,14 +175,17 @@ contains
           side%body = b
           side%grid = body%lattices(b)%grid
           side%delta = delta
-          if (scene%horizon%local) side%delta = scene%horizon%ratio*side%grid%spacing
+          if (has_own_horizons(scene)) side%delta = scene%horizon%ratio*side%grid%spacing
           side%rows = layer_rows(side%delta, side%grid%spacing)
           points = body%lattices(b)%cells
           allocate (side%top(points(c(1)), points(c(2))), source=nothing)
+          allocate (side%fine(points(c(1)), points(c(2))), source=nothing)
           allocate (side%has(points(c(1)), points(c(2))), source=.false.)
         end if
         cell = cell_of(side%grid, body%x(k, :))
         side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), outward*cell(axis))
+        if (body%spacing(k) < 0.75_wp*side%grid%spacing) side%fine(cell(c(1)), cell(c(2))) &
+          & = max(side%fine(cell(c(1)), cell(c(2))), outward*cell(axis))
       end associate
     end do
     allocate (sides(count(all_sides%number /= 0_i2)))

@@ -7,7 +7,7 @@ module pd_set_up_horizons
   use pd_law_weighted, only: weighted_law_type
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: has_own_horizons, scene_type
   implicit none (type, external)
   private
   public :: rule_of_scene, check_horizons
@@ -27,7 +27,7 @@ contains
 
     rule%kind = volume_rule_number(trim(scene%horizon%volume_correction))
     rule%delta = delta
-    if (.not. scene%horizon%local) return
+    if (.not. has_own_horizons(scene)) return
     if (maxval(body%spacing) - minval(body%spacing) > same*maxval(body%spacing)) &
       & rule%ratio = scene%horizon%ratio
   end function rule_of_scene
@@ -67,7 +67,8 @@ contains
       character(*), intent(in) :: group, key, what, why
       integer, intent(in) :: number
       call scene_fault(error, scene, group, number, key, &
-        & '&horizon local does not serve '//what, why)
+        & trim(merge('&horizon local', '&refine       ', scene%horizon%local))// &
+        & ' does not serve '//what, why)
     end subroutine refuse
 
   end subroutine check_horizons

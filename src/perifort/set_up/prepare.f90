@@ -25,7 +25,7 @@ module pd_set_up_prepare
   use pd_motion_loads, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system, explain_condition
   use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_consistent_rules, only: check_consistent, prepare_surface, weigh_bonds
@@ -88,6 +88,8 @@ contains
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
       call generate_body(scene, system%body, delta, error, layers, set_up%warnings)
+      if (allocated(error)) return
+      if (has_refinement(scene)) call check_memory(scene, error, system%body%n_points)
       if (allocated(error)) return
       do i = 1, size(layers)
         if (layer_count_text(scene, layers(i)) /= '') call set_up%warnings%add('layer '// &

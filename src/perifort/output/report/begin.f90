@@ -5,7 +5,8 @@ module pd_output_report_begin
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_version, only: program_version
-  use pd_scene_content_types, only: scene_type
+  use pd_body_refine, only: level_of
+  use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_content_write, only: scene_text
   use pd_body_body, only: body_type, gather
   use pd_body_regions, only: region_mask
@@ -205,7 +206,7 @@ contains
     real(wp), allocatable :: volume(:)
     integer(i4), allocatable :: number(:)
     logical, allocatable :: of_points(:)
-    integer :: r
+    integer :: r, k
 
     allocate (volume(body%n_points), number(body%n_points), of_points(body%n_points))
     call gather(body, body%volume, volume)
@@ -219,6 +220,13 @@ contains
     if (allocated(error)) return
     call gather(body, body%layer, number)
     call recorder%results%put_points('layer', number, error)
+    if (allocated(error)) return
+    if (has_refinement(scene)) then
+      do k = body%first_owned, body%last_owned
+        number(k - body%first_owned + 1) = level_of(body, int(body%slot(k)))
+      end do
+      call recorder%results%put_points('level', number, error)
+    end if
     do r = 1, size(scene%regions)
       if (allocated(error)) return
       call gather(body, region_mask(scene, body, trim(scene%regions(r)%name)), of_points)
