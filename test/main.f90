@@ -20,6 +20,7 @@ program main
   use test_base_threads, only: collect_base_threads
   use test_base_version, only: collect_base_version
   use test_body_shapes, only: collect_body_shapes
+  use test_body_refine, only: collect_body_refine
   use test_body_turned, only: collect_body_turned
   use test_body_generate, only: collect_body_generate
   use test_body_layers, only: collect_body_layers
@@ -148,6 +149,7 @@ program main
   call register('base_threads', collect_base_threads)
   call register('base_version', collect_base_version)
   call register('body_shapes', collect_body_shapes)
+  call register('body_refine', collect_body_refine)
   call register('body_turned', collect_body_turned)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)

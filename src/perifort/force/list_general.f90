@@ -6,7 +6,7 @@ module pd_force_list_general
   use pd_base_lanes, only: lanes
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
-  use pd_family_volume, only: horizon_of_bond, volume_none, volume_exact
+  use pd_family_volume, only: volume_none, volume_exact
   use pd_force_list_fast, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
   use pd_force_model, only: bond_factors_of, force_options_type, model_type
@@ -128,10 +128,9 @@ contains
         spacing = work%own(:, at_p + given_half) &
           & + merge(workspace%given(given_half, j), workspace%given(given_half, m), from)
         if (family%rule%ratio > 0.0_wp) then
-          do l = 1, lanes
-            delta(l) = horizon_of_bond(family%rule, family%spacing(work%first + l - 1), &
-              & family%spacing(merge(j, m, from(l))))
-          end do
+          ! the bits of `horizon_of_bond`: halves are exact
+          delta = family%rule%ratio*(2*max(work%own(:, at_p + given_half), &
+            & merge(workspace%given(given_half, j), workspace%given(given_half, m), from)))
           weight = weight*max(0.0_wp, min(1.0_wp, (delta + spacing/2 - length)/spacing))
         else
           weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))

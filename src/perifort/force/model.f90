@@ -5,6 +5,7 @@ module pd_force_model
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_body_body, only: body_type
   use pd_family_bond_weights, only: bond_weights_type
+  use pd_family_volume, only: volume_rule_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never
   use pd_law_strength, only: strength_factor
@@ -49,6 +50,9 @@ module pd_force_model
     integer(i2), allocatable :: material(:)  !! of each slot
     real(wp), allocatable :: scale(:)        !! of q, t and p of each slot, if some law has scales
     real(wp), allocatable :: horizon(:)      !! of each slot, if points have their own [m]
+    real(wp), allocatable :: of_stretch(:)   !! factor of the stretches for that horizon,
+    real(wp), allocatable :: of_dilatation(:) !! and of the dilatation
+    logical :: influenced = .false.          !! and bonds have factors of their length, too
     real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
     real(wp), allocatable :: axes(:, :)      !! axes of D and S in columns, none: x, y, z
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
@@ -137,14 +141,22 @@ contains
 
   !> Give points horizons of their own. The constants of the laws stay those of the largest one;
   !> bonds of shorter ones have factors (doc/theory.md, 1).
-  pure subroutine give_horizons(body, ratio, model)
-    type(body_type), intent(in) :: body      !! arranged in slots, with its spacings
-    real(wp), intent(in) :: ratio            !! horizon over spacing of each point [-]
+  pure subroutine give_horizons(body, rule, model)
+    type(body_type), intent(in) :: body         !! arranged in slots, with its spacings
+    type(volume_rule_type), intent(in) :: rule  !! with its ratio; the laws have its horizon
     type(model_type), intent(inout) :: model
-      !! of weighted laws without scales; gets `horizon` and is `weighted`
+      !! of weighted laws without scales; gets horizons with their factors and is `weighted`
+    integer :: k
 
-    model%horizon = ratio*body%spacing
+    model%influenced = model%weighted
     model%weighted = .true.
+    model%horizon = rule%ratio*body%spacing
+    allocate (model%of_stretch(body%n_slots), model%of_dilatation(body%n_slots), source=1.0_wp)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      model%of_stretch(k) = (rule%delta/model%horizon(k))**(body%dim + 1)
+      model%of_dilatation(k) = (rule%delta/model%horizon(k))**body%dim
+    end do
   end subroutine give_horizons
 
   !> Factors of the stretch and of the dilatation of the bond k-j, by its length and its horizon
@@ -156,16 +168,30 @@ contains
     real(wp), intent(out) :: gb            !! factor of the stretch's force [-]
     real(wp), intent(out) :: gd            !! factor of the dilatation [-]
 
+    real(wp) :: shorter, delta
+
+    gb = 1.0_wp
+    gd = 1.0_wp
+    if (allocated(model%horizon)) then
+      ! the larger horizon has the smaller factors
+      shorter = min(model%of_stretch(k), model%of_stretch(j))
+      if (.not. model%influenced) then
+        gb = shorter
+        gd = min(model%of_dilatation(k), model%of_dilatation(j))
+        return
+      end if
+    end if
     select type (law => model%laws(model%material(k))%law)
     class is (weighted_law_type)
-      if (allocated(model%horizon)) then
-        call law%factors_at(max(model%horizon(k), model%horizon(j)), length, gb, gd)
-      else
-        call law%bond_factors(length/law%delta, gb, gd)
-      end if
+      delta = law%delta
+      if (allocated(model%horizon)) delta = max(model%horizon(k), model%horizon(j))
+      call law%bond_factors(length/delta, gb, gd)
     class default
       call internal_fault('a law without weights on the fast loops')
     end select
+    if (.not. allocated(model%horizon)) return
+    gb = gb*shorter
+    gd = gd*min(model%of_dilatation(k), model%of_dilatation(j))
   end subroutine bond_factors_of
 
   !> Whether some law in use has points of different scales.

@@ -21,7 +21,6 @@ module pd_law_weighted
   contains
     procedure :: find_constants
     procedure :: bond_factors
-    procedure, non_overridable :: factors_at
     procedure :: has_factors
     procedure :: forces
     procedure :: energy
@@ -102,23 +101,6 @@ contains
     gb = self%omega(ratio)*ratio
     gd = gb
   end subroutine bond_factors
-
-  !> Factors of a bond with another horizon than the law's: those of its length, and those by which
-  !> q and t of that horizon differ from the law's: they go with 1/delta^(dim + 1) and 1/delta^dim
-  !> (doc/theory.md, 1).
-  pure subroutine factors_at(self, delta, length, gb, gd)
-    class(weighted_law_type), intent(in) :: self  !! the law, set up
-    real(wp), intent(in) :: delta                 !! horizon of the bond [m]
-    real(wp), intent(in) :: length                !! |xi| [m]
-    real(wp), intent(out) :: gb                   !! of its stretch's force [-]
-    real(wp), intent(out) :: gd                   !! of its part of the dilatation [-]
-
-    gb = 1.0_wp
-    gd = 1.0_wp
-    if (self%has_factors()) call self%bond_factors(length/delta, gb, gd)
-    gb = gb*(self%delta/delta)**(self%dim + 1)
-    gd = gd*(self%delta/delta)**self%dim
-  end subroutine factors_at
 
   !> Whether some factor differs from 1.
   pure logical function has_factors(self)

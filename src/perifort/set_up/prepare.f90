@@ -127,7 +127,7 @@ contains
       if (system%family%rule%ratio > 0.0_wp) then
         call check_horizons(scene, system, error)
         if (allocated(error)) return
-        call give_horizons(system%body, system%family%rule%ratio, system%model)
+        call give_horizons(system%body, system%family%rule, system%model)
       end if
       call check_laws(scene, system, error)
       if (allocated(error)) return

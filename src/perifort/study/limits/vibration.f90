@@ -82,7 +82,7 @@ contains
     call new_model(twin%body, materials, system%model%projected, &
       & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), &
       & twin%model, laws)
-    if (rule%ratio > 0.0_wp) call give_horizons(twin%body, rule%ratio, twin%model)
+    if (rule%ratio > 0.0_wp) call give_horizons(twin%body, rule, twin%model)
     twin%model%surface = system%model%surface
     if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
       & twin%model%S, laws, system%model%axes)
