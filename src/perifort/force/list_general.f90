@@ -139,7 +139,15 @@ contains
       work%geometry(:, i) = 1/length**2
       work%dilatation(:, i) = weight
       work%stretch(:, i) = q*weight/length
-      if (model%weighted) then
+      if (allocated(model%horizon) .and. .not. model%influenced) then
+        ! `bond_factors_of` without its calls
+        associate (first => work%first, last => work%first + lanes - 1)
+          work%stretch(:, i) = work%stretch(:, i)*min(model%of_stretch(first:last), &
+            & merge(model%of_stretch(j), model%of_stretch(m), from))
+          work%dilatation(:, i) = weight*min(model%of_dilatation(first:last), &
+            & merge(model%of_dilatation(j), model%of_dilatation(m), from))
+        end associate
+      else if (model%weighted) then
         do l = 1, lanes
           gb(l) = 0.0_wp
           gd(l) = 0.0_wp
