@@ -69,7 +69,8 @@ contains
 
   !> Each cell with its centre in the ball becomes (2^levels)^dim ones, at the places that those
   !> have; the others keep theirs or, in the rim, are divided less. Volume and centre are those of
-  !> the box, to the rounding of some thousand terms; levels follow each other, and each is sorted by z, y and x.
+  !> the box, to the rounding of some thousand terms; levels follow each other, and each is
+  !> sorted by z, y and x.
   subroutine test_cells(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
@@ -357,9 +358,9 @@ contains
     if (allocated(error)) return
     ! the coarse points come first
     n = 180
-    call expect_true(error, maxval(plain) > 1.5e-5_wp, 'no pulse')
-    call expect_close(error, refined(:n, 1), plain(:n, 1), 0.02_wp*maxval(plain), 'reflected')
-    call expect_true(error, maxval(abs(refined(:n, 1) - plain(:n, 1))) > 0.001_wp*maxval(plain), &
+    call expect_true(error, max_abs(plain) > 1.5e-5_wp, 'no pulse')
+    call expect_close(error, refined(:n, 1), plain(:n, 1), 0.02_wp*max_abs(plain), 'reflected')
+    call expect_true(error, max_abs(refined(:n, 1) - plain(:n, 1)) > 0.001_wp*max_abs(plain), &
       & 'nothing comes back: are the horizons different?')
 
   contains
@@ -391,8 +392,8 @@ contains
       & '9 levels|there may be 8')
     call expect_fault(error, plate//relaxes//ball//'&horizon length = 0.3 /', &
       & "'length' is given with &refine|give 'ratio'")
-    call expect_fault(error, '&scene dimension = 2 thickness = 1.0 /'//line//solid//relaxes//ball// &
-      & "&body shape = 'sphere' radius = 1 spacing = 0.1 /", &
+    call expect_fault(error, '&scene dimension = 2 thickness = 1.0 /'//line//solid//relaxes// &
+      & ball//"&body shape = 'sphere' radius = 1 spacing = 0.1 /", &
       & '&refine in a scene whose body number 1 is no lattice|cut them out of a box by &keep')
     call refuse(error, plate//relaxes//"&refine shape = 'sphere' centre = 5, 0 radius = 0.5 /", &
       & '&refine number 1 refines no cell')

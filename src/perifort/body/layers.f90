@@ -105,9 +105,10 @@ contains
       call choose_columns(body%dim, axis, outward, sides, tally)
       do i = 1, size(sides)
         if (.not. any(sides(i)%has .and. sides(i)%fine >= sides(i)%top)) cycle
-        call scene_fault(error, scene, 'boundary', tally%boundary, 'side', 'the layer at side '''// &
-          & trim(boundary%side)//''' joins refined cells', '&refine does not serve layers there: '// &
-          & 'refine at a distance from the side, or move the points of a region')
+        call scene_fault(error, scene, 'boundary', tally%boundary, 'side', &
+          & 'the layer at side '''//trim(boundary%side)//''' joins refined cells', &
+          & '&refine does not serve layers there: refine at a distance from the side, or move '// &
+          & 'the points of a region')
         return
       end do
       call allocate_points(layer, body%dim, 0)

@@ -137,9 +137,11 @@ contains
     do i = 1, size(points)
       at = cell_of(cells%grid, body%x(points(i), :))
       associate (there => cells%point(at(1), at(2), at(3)))
-        if (there > 0_i4 .and. .not. (is_refined(int(there)) .and. is_refined(points(i)))) then
-          call report(scene, body, int(there), points(i), error)
-          return
+        if (there > 0_i4) then
+          if (.not. (is_refined(int(there)) .and. is_refined(points(i)))) then
+            call report(scene, body, int(there), points(i), error)
+            return
+          end if
         end if
         there = int(points(i), i4)
       end associate

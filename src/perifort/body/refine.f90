@@ -17,16 +17,16 @@ module pd_body_refine
 
 contains
 
-  !> The points of a lattice that fills a box, with its refined cells: the others in the order of the
-  !> lattice, then level 1, level 2 and so on, x fastest within a level. A cell has the level of the
-  !> finest `&refine` that its centre lies in, or what its neighbours need (`spread_levels`). An
+  !> The points of a lattice that fills a box, with its refined cells: the others in the order of
+  !> the lattice, then level 1, level 2 and so on, x fastest within a level. A cell has the level of
+  !> the finest `&refine` that its centre lies in, or what its neighbours need (`spread_levels`). An
   !> error, with its place, if there would be too many points.
   subroutine refine_lattice(scene, lattice, depth, used, body, level, error)
     type(scene_type), intent(in) :: scene         !! a checked scene, with its `&refine` groups
     type(lattice_type), intent(in) :: lattice     !! cells of the body, a whole box of them
     real(wp), intent(in) :: depth                 !! what makes dx^dim a volume: thickness, area, 1
     logical, intent(inout) :: used(:)             !! (groups) whether it has refined some cell
-    type(body_type), intent(inout) :: body        !! points of the cells; those of all levels on return
+    type(body_type), intent(inout) :: body        !! points of the cells; of all levels on return
     integer(i4), allocatable, intent(out) :: level(:)  !! (n_points) of each point then
     type(error_type), allocatable, intent(out) :: error
     integer(i4), allocatable :: levels(:, :, :)

@@ -36,7 +36,8 @@ contains
     weighted = influenced .or. family%rule%ratio > 0.0_wp
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
     !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted, axes) &
-    !$omp shared(influenced) private(bonds, strain, dilatation, energy, scale, gb, gd, delta, k, i, c)
+    !$omp shared(influenced) &
+    !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, delta, k, i, c)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots

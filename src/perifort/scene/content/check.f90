@@ -278,8 +278,8 @@ contains
       end associate
       call rule_fault(error, 'refine', number, '', '&refine in a scene whose body number '// &
         & to_text(b)//' is no lattice that fills a box along x, y and z', "bodies with "// &
-        & "'surface', 'axis_1', or a sphere or cylinder for 'shape' cannot be refined; cut them "// &
-        & 'out of a box by &keep', source)
+        & "'surface', 'axis_1', or a sphere or cylinder for 'shape' cannot be refined; cut "// &
+        & 'them out of a box by &keep', source)
       return
     end do
     if (all(scene%bodies%file /= '' .or. scene%bodies%mesh /= '')) then

@@ -42,7 +42,8 @@ module pd_scene_content_types
     & section_group, line_group, j_integral_group, side_group, study_group, contact_group, &
     & rigid_group, refine_group, name_length, path_length, text_length, unset, is_set, is_given
   public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned
-  public :: has_refinement, has_own_horizons, laws_of, added_type, group_entry, group_table, group_interface, groups_interface
+  public :: has_refinement, has_own_horizons, laws_of, added_type, group_entry, group_table, &
+    & group_interface, groups_interface
 
   !> A group that the scene has no component for.
   type :: added_type
