@@ -35,7 +35,7 @@ def hole(case):
     case.near("hole: stress over 1 mm beside it over the load [-]", ahead(refined), ahead(fine),
               relative=0.01)
     times(case, "hole", "plate_hole", "fine_hole", 0.2,
-          "the surroundings of the hole are a fifth of the points, and lists take longer for a bond")
+          "lists take longer for a bond than lattices")
     return refined
 
 
@@ -52,7 +52,7 @@ def crack(case):
     case.near("crack: dissipated energy [J]", refined.history["dissipated_energy"][-1],
               fine.history["dissipated_energy"][-1], relative=0.05)
     times(case, "crack", "plate_crack", "fine_crack", 0.2,
-          "all points take the step of the finest; energies are formed by general formulas")
+          "lists take longer for a bond, and all points take the step of the finest")
     return refined
 
 
@@ -97,7 +97,7 @@ def pulse(case, dim, levels):
         order = before[np.lexsort((x[before, 0].round(9), x[before, 1].round(9)))]
         parts.append((u[order], np.abs(u[middle]).max()))
     back = np.abs(parts[0][0] - parts[1][0]).max() / parts[1][1]
-    case.below(f"pulse in {dim}D, {levels} levels: reflected part of the displacement [-]", back, 0.03)
+    case.below(f"pulse in {dim}D, levels = {levels}: reflected part of the displacement [-]", back, 0.03)
 
 
 def main():
