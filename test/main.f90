@@ -20,6 +20,7 @@ program main
   use test_base_threads, only: collect_base_threads
   use test_base_version, only: collect_base_version
   use test_body_shapes, only: collect_body_shapes
+  use test_body_refine, only: collect_body_refine
   use test_body_turned, only: collect_body_turned
   use test_body_division, only: collect_body_division
   use test_body_generate, only: collect_body_generate
@@ -121,6 +122,7 @@ program main
   use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_set_up_consistent_weights, only: collect_set_up_consistent_weights
+  use test_set_up_horizons, only: collect_set_up_horizons
   use test_set_up_toughness, only: collect_set_up_toughness
   use test_set_up_terms, only: collect_set_up_terms
   use test_study_limits_limits, only: collect_study_limits_limits
@@ -148,6 +150,7 @@ program main
   call register('base_threads', collect_base_threads)
   call register('base_version', collect_base_version)
   call register('body_shapes', collect_body_shapes)
+  call register('body_refine', collect_body_refine)
   call register('body_turned', collect_body_turned)
   call register('body_division', collect_body_division)
   call register('body_generate', collect_body_generate)
@@ -249,6 +252,7 @@ program main
   call register('study_bench_bench', collect_study_bench_bench)
   call register('set_up_consistent_weights', collect_set_up_consistent_weights)
   call register('set_up_terms', collect_set_up_terms)
+  call register('set_up_horizons', collect_set_up_horizons)
   call register('set_up_toughness', collect_set_up_toughness)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)

@@ -43,8 +43,8 @@ contains
     body%spacing = 0.05_wp
   end subroutine cloud
 
-  !> The parts of all ranks are the whole, each point once; a rank has all points within the distance
-  !> of its own, and knows who owns them.
+  !> The parts of all ranks are the whole, each point once; a rank has all points within the
+  !> distance of its own, and knows who owns them.
   subroutine test_owners(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: distance = 0.12_wp

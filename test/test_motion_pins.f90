@@ -166,8 +166,8 @@ contains
     type(set_up_type) :: set_up
     real(wp) :: rotation(3)
 
-    ! the force acts at z = +1 cm, the spring at z = -1 cm: force h = k h^2 angle. Turned by so much,
-    ! rounding leaves a residual of 2e-8
+    ! the force acts at z = +1 cm, the spring at z = -1 cm: force h = k h^2 angle. Turned by so
+    ! much, rounding leaves a residual of 2e-8
     call run(block//"&boundary region = 'near' motion = 'pin' displacement_x = 0 "// &
       & 'displacement_y = 0 displacement_z = 0 /'//line// &
       & "&boundary region = 'far' motion = 'pin' displacement_y = 0 displacement_z = 0 /"//line// &

@@ -83,7 +83,7 @@ contains
     if (allocated(error)) return
     call check(error, index(text, '## &horizon') == 1 .and. index(text, '&body') == 0, text)
     if (allocated(error)) return
-    call check(error, index(text, '| real | -    | 3.015         | horizon over') > 0, text)
+    call check(error, index(text, '| real    | -    | 3.015         | horizon over') > 0, text)
     if (allocated(error)) return
     call check(error, index(text, "'linear', 'linear_extended', 'exact', 'none' |") > 0, text)
   end subroutine test_group

@@ -56,7 +56,7 @@ contains
       if (allocated(error)) return
     end do
     call list_groups(table)
-    call check(error, table%count, 25)
+    call check(error, table%count, 26)
   end subroutine test_comments
 
   subroutine test_default(error)

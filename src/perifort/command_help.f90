@@ -41,7 +41,7 @@ contains
         & '  --max-minutes M stop after M minutes with a checkpoint (status 4)', &
         & '  --ranks N       number of processes; ./pf starts them, elsewhere', &
         & '                  mpirun -n N perifort-mpi run FILE does', &
-        & '  --reproducible  forces, and so all results, have the same bits on any number of ranks', &
+        & '  --reproducible  all results have the same bits on any number of ranks', &
         & '  --quiet         print errors only'], newline)
     case ('check')
       text = join([character(w) :: &

@@ -106,7 +106,8 @@ contains
     else if (line%ranks > 0 .and. line%ranks /= world%ranks) then
       call fail(error, "'--ranks "//to_text(line%ranks)//"' needs so many processes, found "// &
         & to_text(world%ranks)//newline//'  start them by ./pf run FILE --ranks '// &
-        & to_text(line%ranks)//', or by mpirun -n '//to_text(line%ranks)//' perifort-mpi run FILE', &
+        & to_text(line%ranks)//', or by mpirun -n '//to_text(line%ranks)// &
+        & ' perifort-mpi run FILE', &
         & status_usage)
     end if
   end subroutine check_ranks

@@ -1,12 +1,12 @@
 !> Global sums, extremes, first places and random starts over the points of a body.
 !>
-!> Sums have the same bits in any order of the terms: for any arrangement of the slots, any number of
-!> threads and any split of the points among ranks. Each term is cut into digits of 30 bits, whole
-!> multiples of 2^(30 i), from the first one down, each the part towards 0 of what the digits above
-!> leave. Sums of digits are sums of integers. Where the largest term begins with the digit i, the
-!> sum is that of the digits i, i - 1 and i - 2 of all terms: what is left out is below 2^-60 of the
-!> largest term for each. (Demmel and Nguyen, Parallel reproducible summation, IEEE Transactions on
-!> Computers 64, 2015, cut terms in this way.)
+!> Sums have the same bits in any order of the terms: for any arrangement of the slots, any number
+!> of threads and any split of the points among ranks. Each term is cut into digits of 30 bits,
+!> whole multiples of 2^(30 i), from the first one down, each the part towards 0 of what the digits
+!> above leave. Sums of digits are sums of integers. Where the largest term begins with the digit i,
+!> the sum is that of the digits i, i - 1 and i - 2 of all terms: what is left out is below 2^-60 of
+!> the largest term for each. Terms beyond 9e288 are added as they come. (Demmel and Nguyen, Parallel
+!> reproducible summation, IEEE Transactions on Computers 64, 2015, cut terms in this way.)
 !>
 !> What ranks exchange (`pd_base_order`) is one `add_all` or `take_largest` for some sums or an
 !> extreme. The sums of digits are exact there, too.
@@ -19,7 +19,8 @@ module pd_base_reduce
   public :: sums_type, running_type
   public :: new_sums, add_block, total_of, new_running, add_point, total_of_running
   public :: inner, sum_over, sum_listed, largest_over, least_over, first_where, first_largest
-  public :: largest_of_ranks, sum_of_ranks, count_of_ranks, any_of_ranks, noise, noise_after, bring_noise
+  public :: largest_of_ranks, sum_of_ranks, count_of_ranks, any_of_ranks
+  public :: noise, noise_after, bring_noise
 
   integer, parameter :: most_running = 6    !! sums that one `running_type` forms
   integer, parameter :: worth_threads = 4096 !! terms of a list that threads share
@@ -38,8 +39,8 @@ module pd_base_reduce
     real(wp) :: beyond = 0.0_wp           !! the plain sum of terms without digits
   end type digits_type
 
-  !> The sum of many blocks: digits of all bins, how many blocks begin in each bin, and the plain sum
-  !> of terms without digits.
+  !> The sum of many blocks: digits of all bins, how many blocks begin in each bin, and the plain
+  !> sum of terms without digits.
   type :: whole_type
     integer(i8) :: digit(bins) = 0_i8
     integer(i8) :: carry(bins) = 0_i8     !! of the digits of several ranks, in units of 2^31 of

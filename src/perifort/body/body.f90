@@ -61,7 +61,7 @@ module pd_body_body
     integer(i8), allocatable :: number(:)   !! of each point among those of all processes; not
                                             !! allocated: its number here
     type(grid_type), allocatable :: grids(:)
-    real(wp) :: delta = 0.0_wp              !! the horizon [m]
+    real(wp) :: delta = 0.0_wp              !! the horizon, the largest one of all points [m]
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
     type(skin_type), allocatable :: skins(:)  !! bodies that fill surfaces
     type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)

@@ -35,8 +35,8 @@ module pd_body_division
     integer :: dim = 0
     real(wp) :: lower(3) = 0.0_wp            !! box around all points [m]
     real(wp) :: upper(3) = 0.0_wp
-    real(wp) :: layer(3) = 0.0_wp            !! thickness of layers along each axis, from `lower` on,
-                                             !! between which cuts may lie [m]
+    real(wp) :: layer(3) = 0.0_wp            !! thickness of layers along each axis, from `lower`
+                                             !! on, between which cuts may lie [m]
   contains
     procedure(add_work), deferred :: add_to
   end type work_type

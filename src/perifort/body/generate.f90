@@ -8,7 +8,8 @@ module pd_body_generate
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: body_group, has_cut_cells, is_lattice, scene_type, is_set, unset
+  use pd_scene_content_types, only: body_group, has_cut_cells, has_own_horizons, has_refinement, &
+    & is_lattice, scene_type, is_set, unset
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
@@ -19,6 +20,7 @@ module pd_body_generate
   use pd_body_lattices, only: lattice_points, lattice_of, place_in
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
+  use pd_body_refine, only: finer, refine_lattice
   use pd_body_choice, only: choose_points
   use pd_body_shapes, only: inside_body, touch
   use pd_body_surfaces, only: keep_skin, surface_body
@@ -39,7 +41,7 @@ contains
   subroutine generate_body(scene, body, delta, error, counts, warnings)
     type(scene_type), intent(in) :: scene  !! checked, with its files' names
     type(body_type), intent(out) :: body   !! all points, layers last, in point order
-    real(wp), intent(out) :: delta                          !! the horizon [m]
+    real(wp), intent(out) :: delta                          !! the (largest) horizon [m]
     type(error_type), allocatable, intent(out) :: error
     type(layer_count_type), allocatable, intent(out), optional :: counts(:)  !! what the columns
                                                             !! of each layer came to
@@ -47,6 +49,7 @@ contains
     type(part_type) :: part
     type(skin_type) :: skin
     type(lattice_type), allocatable :: lattices(:)
+    logical, allocatable :: used(:)
     real(wp) :: spacing, largest
     type(layer_count_type), allocatable :: counted(:)
     type(body_type) :: one
@@ -79,6 +82,8 @@ contains
         if (scene%bodies(i)%shape /= '') call keep_shape(scene%bodies(i), depth, one)
         lattices(i) = lattice_of(scene%bodies(i), body%dim)
         one%grid = number_of_grid(body, lattices(i)%grid)
+        if (has_refinement(scene)) call refine(scene, lattices(i), depth, used, body, one, error)
+        if (allocated(error)) return
       end if
       one%body = int(i, i2)
       if (scene%bodies(i)%mesh == '') one%material = material_number(scene, &
@@ -87,22 +92,56 @@ contains
       call append_points(body, one)
     end do
     call move_alloc(lattices, body%lattices)
+    if (allocated(used)) then
+      if (.not. all(used)) then
+        i = findloc(used, .false., dim=1)
+        call scene_fault(error, scene, 'refine', i, '', '&refine number '//to_text(i)// &
+          & ' refines no cell', 'expected a place that holds the centre of a cell of a lattice')
+        return
+      end if
+    end if
     call cut_shapes(scene, body, error)
     if (allocated(error)) return
     do i = 1, size(body%parts)
       body%parts(i)%first = findloc(int(body%body), body%parts(i)%body, dim=1)
     end do
-    ! of a mesh counts the median; the scene has one horizon
+    ! of a mesh counts the median, where the scene has one horizon
     spacing = max(spacing, maxval(body%spacing, mask=.not. of_mesh(scene, body)))
+    ! or each point has its own, of which this is the largest
+    if (has_own_horizons(scene)) spacing = maxval(body%spacing)
     delta = horizon_of(scene, spacing)
     body%delta = delta
-    call check_family_size(scene, body, delta, minval(body%spacing), error)
+    if (has_own_horizons(scene)) spacing = minval(body%spacing)
+    call check_family_size(scene, body, horizon_of(scene, spacing), minval(body%spacing), error)
     if (allocated(error)) return
     call add_layers(scene, delta, depth, body, counted, error)
     if (allocated(error)) return
     if (present(counts)) call move_alloc(counted, counts)
     call check_lattices(scene, body, error)
   end subroutine generate_body
+
+  !> Divide the cells of a lattice that `&refine` names; each level has a grid of its own.
+  subroutine refine(scene, lattice, depth, used, body, one, error)
+    type(scene_type), intent(in) :: scene
+    type(lattice_type), intent(in) :: lattice
+    real(wp), intent(in) :: depth
+    logical, allocatable, intent(inout) :: used(:)  ! which groups have refined something
+    type(body_type), intent(inout) :: body          ! gets the grids
+    type(body_type), intent(inout) :: one           ! the body's cells; all its points on return
+    type(error_type), allocatable, intent(out) :: error
+    integer(i4), allocatable :: level(:)
+    integer(i2) :: number
+    integer :: n
+
+    if (.not. allocated(used)) allocate (used(size(scene%refines)), source=.false.)
+    call refine_lattice(scene, lattice, depth, used, one, level, error)
+    if (allocated(error)) return
+    do n = 0, maxval(level)
+      if (.not. any(level == n)) cycle
+      number = number_of_grid(body, finer(lattice%grid, n))
+      where (level == n) one%grid = number
+    end do
+  end subroutine refine
 
   !> Leave out the points of a lattice that do not lie in its shape, which is turned with it.
   pure subroutine keep_shape(group, depth, body)

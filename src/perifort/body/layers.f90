@@ -9,7 +9,7 @@ module pd_body_layers
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: adds_layer, scene_type
+  use pd_scene_content_types, only: adds_layer, has_own_horizons, scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_lattices, only: box_of_cells, cell_of, place_in
   implicit none (type, external)
@@ -39,7 +39,9 @@ module pd_body_layers
     integer(i2) :: material = 0_i2     !! number of its material
     integer :: body = 0                !! number of the body
     integer :: rows = 0                !! of the layer
+    real(wp) :: delta = 0.0_wp         !! horizon of its points [m]
     integer, allocatable :: top(:, :)  !! level of each column's outermost cell, or `nothing`
+    integer, allocatable :: fine(:, :) !! of its outermost divided cell (`&refine`), or `nothing`
     logical, allocatable :: has(:, :)  !! whether the column gets the layer
   end type side_type
 
@@ -58,7 +60,7 @@ contains
   !> for a layer without a point.
   subroutine add_layers(scene, delta, depth, body, counts, error)
     type(scene_type), intent(in) :: scene  !! gives the boundaries
-    real(wp), intent(in) :: delta            !! horizon [m]
+    real(wp), intent(in) :: delta            !! horizon, the largest one of all points [m]
     real(wp), intent(in) :: depth            !! what makes dx^dim a volume: thickness, area or 1
     type(body_type), intent(inout) :: body   !! in point order, with its lattices, without layers
     type(layer_count_type), allocatable, intent(out) :: counts(:)
@@ -100,7 +102,15 @@ contains
       axis = index('xyz', boundary%side(1:1))
       outward = merge(-1, 1, boundary%side(3:5) == 'min')
       call find_sides(scene, boundary%body, body, n_body, axis, outward, delta, sides)
-      call choose_columns(body%dim, axis, outward, delta, sides, tally)
+      call choose_columns(body%dim, axis, outward, sides, tally)
+      do i = 1, size(sides)
+        if (.not. any(sides(i)%has .and. sides(i)%fine >= sides(i)%top)) cycle
+        call scene_fault(error, scene, 'boundary', tally%boundary, 'side', &
+          & 'the layer at side '''//trim(boundary%side)//''' joins refined cells', &
+          & '&refine does not serve layers there: refine at a distance from the side, or move '// &
+          & 'the points of a region')
+        return
+      end do
       call allocate_points(layer, body%dim, 0)
       do i = 1, size(sides)
         if (.not. any(sides(i)%has)) cycle
@@ -131,8 +141,8 @@ contains
       if (size(sides) == 0) then
         text = 'every point of the body was removed'
       else if (all(sides%rows == 0)) then
-        text = 'the horizon of '//with_unit(delta, 'm')//' is shorter than the spacing of '// &
-          & with_unit(sides(1)%grid%spacing, 'm')
+        text = 'the horizon of '//with_unit(sides(1)%delta, 'm')// &
+          & ' is shorter than the spacing of '//with_unit(sides(1)%grid%spacing, 'm')
       else
         text = 'all its cells belong to the layers of earlier &boundary groups'
       end if
@@ -165,13 +175,18 @@ contains
           side%material = body%material(k)
           side%body = b
           side%grid = body%lattices(b)%grid
-          side%rows = layer_rows(delta, side%grid%spacing)
+          side%delta = delta
+          if (has_own_horizons(scene)) side%delta = scene%horizon%ratio*side%grid%spacing
+          side%rows = layer_rows(side%delta, side%grid%spacing)
           points = body%lattices(b)%cells
           allocate (side%top(points(c(1)), points(c(2))), source=nothing)
+          allocate (side%fine(points(c(1)), points(c(2))), source=nothing)
           allocate (side%has(points(c(1)), points(c(2))), source=.false.)
         end if
         cell = cell_of(side%grid, body%x(k, :))
         side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), outward*cell(axis))
+        if (body%spacing(k) < 0.75_wp*side%grid%spacing) side%fine(cell(c(1)), cell(c(2))) &
+          & = max(side%fine(cell(c(1)), cell(c(2))), outward*cell(axis))
       end associate
     end do
     allocate (sides(count(all_sides%number /= 0_i2)))
@@ -191,10 +206,9 @@ contains
   end function across
 
   !> Mark the columns that get the layer, and count.
-  subroutine choose_columns(dim, axis, outward, delta, sides, tally)
+  subroutine choose_columns(dim, axis, outward, sides, tally)
     integer, intent(in) :: dim                      !! of the scene
     integer, intent(in) :: axis, outward            !! as in `find_sides`
-    real(wp), intent(in) :: delta                   !! horizon [m]
     type(side_type), intent(inout) :: sides(:)      !! `has` is set
     type(layer_count_type), intent(inout) :: tally  !! columns are added
     logical, allocatable :: hidden(:, :)
@@ -209,7 +223,7 @@ contains
       associate (side => sides(i), h => sides(i)%grid%spacing)
         allocate (hidden(size(side%top, 1), size(side%top, 2)), source=.false.)
         do j = 1, size(sides)
-          if (j == i .or. outermost - outer(i) > delta + same_place*h) cycle
+          if (j == i .or. outermost - outer(i) > side%delta + same_place*h) cycle
           ! flat sides at one level, the usual case, hide nothing of each other
           if (outer(j) <= face_of(side, axis, outward, minval(side%top, &
             & mask=side%top /= nothing)) + same_place*h) cycle
@@ -237,7 +251,7 @@ contains
           else if (hidden(m, n)) then
             covered = covered + 1
           else if (outermost - face_of(side, axis, outward, side%top(m, n)) &
-            & > delta + same_place*side%grid%spacing) then
+            & > side%delta + same_place*side%grid%spacing) then
             farther = farther + 1
           else
             side%has(m, n) = .true.

@@ -14,7 +14,7 @@ module pd_body_meshes
   use pd_body_mesh_shares, only: balance_areas, share_areas
   use pd_body_surfaces, only: facets_of_side, near_side, side_areas, skin_named
   use pd_scene_content_rules, only: place_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: has_own_horizons, scene_type
   use pd_scene_format_file, only: resolve_path
   implicit none (type, external)
   private
@@ -271,7 +271,12 @@ contains
     associate (part => body%parts(part_named(scene, body, name)))
       call facets_named(part, trim(name(index(name, ':') + 1:)), facets, error)
       if (allocated(error)) call internal_fault('a set without facets')
-      call points_near(part, positions_of(body, part), facets, body%delta, near)
+      if (has_own_horizons(scene)) then
+        call points_near(part, positions_of(body, part), facets, body%delta, near, &
+          & scene%horizon%ratio*body%spacing(body%slot(part%first:part%first + part%n_points - 1)))
+      else
+        call points_near(part, positions_of(body, part), facets, body%delta, near)
+      end if
       mask = to_slots(body, part, near)
     end associate
   end function facet_mask

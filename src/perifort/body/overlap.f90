@@ -138,12 +138,23 @@ contains
       at = cell_of(cells%grid, body%x(points(i), :))
       associate (there => cells%point(at(1), at(2), at(3)))
         if (there > 0_i4) then
-          call report(scene, body, int(there), points(i), error)
-          return
+          if (.not. (is_refined(int(there)) .and. is_refined(points(i)))) then
+            call report(scene, body, int(there), points(i), error)
+            return
+          end if
         end if
         there = int(points(i), i4)
       end associate
     end do
+
+  contains
+
+    !> Whether a point is one of several in a cell that is divided.
+    pure logical function is_refined(k)
+      integer, intent(in) :: k
+      is_refined = body%layer(k) == 0 .and. body%spacing(k) < 0.75_wp*cells%grid%spacing
+    end function is_refined
+
   end subroutine place_points
 
   !> An error if one of these points of another body lies in the cells; points of clouds must not

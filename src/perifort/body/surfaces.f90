@@ -18,7 +18,7 @@ module pd_body_surfaces
     & surface_type
   use pd_scene_content_expressions, only: expression_of
   use pd_scene_content_rules, only: place_fault
-  use pd_scene_content_types, only: scene_type, has_cut_cells, is_set
+  use pd_scene_content_types, only: scene_type, has_cut_cells, has_own_horizons, is_set
   use pd_scene_format_file, only: resolve_path
   use pd_scene_format_given, only: name_length
   implicit none (type, external)
@@ -460,7 +460,13 @@ contains
     if (allocated(error)) return
     slots = slots_of(body, body%skins(number))
     if (size(slots) == 0) return
-    call points_near_facets(body%skins(number)%surface, chosen, body%x(slots, :), body%delta, near)
+    if (has_own_horizons(scene)) then
+      call points_near_facets(body%skins(number)%surface, chosen, body%x(slots, :), body%delta, &
+        & near, scene%horizon%ratio*body%spacing(slots))
+    else
+      call points_near_facets(body%skins(number)%surface, chosen, body%x(slots, :), body%delta, &
+        & near)
+    end if
     mask(slots) = near
   end subroutine near_side
 

@@ -16,9 +16,9 @@ module pd_comm_world
     integer :: ranks = 1                           !! how many there are
     logical :: reproducible = .false.              !! forces must not depend on the ranks
     integer, allocatable :: neighbour(:)           !! ranks that share points with this one
-    integer, allocatable :: send_first(:)          !! first one of each neighbour in `send_slot`, and
-                                                   !! one past the last
-    integer(i4), allocatable :: send_slot(:)       !! slots of owned points that others have copies of
+    integer, allocatable :: send_first(:)          !! first one of each neighbour in `send_slot`,
+                                                   !! and one past the last
+    integer(i4), allocatable :: send_slot(:)       !! slots of points that others have copies of
     integer, allocatable :: take_first(:)          !! the same of `take_slot`
     integer(i4), allocatable :: take_slot(:)       !! slots of copies, neighbour by neighbour
     integer(i8) :: bytes_sent = 0_i8               !! of halos, since the run began
@@ -38,25 +38,30 @@ module pd_comm_world
   interface
     !> Whether the program was built with messages between processes.
     module logical function has_messages()
+      implicit none (type, external)
     end function has_messages
 
     !> Begin: the rank of this process and how many there are.
     module subroutine begin_world(world)
+      implicit none (type, external)
       type(world_type), intent(inout) :: world  !! knows its ranks on return
     end subroutine begin_world
 
     !> End the messages of this process, after its last one.
     module subroutine end_world()
+      implicit none (type, external)
     end subroutine end_world
 
     !> End all processes at once, where one cannot go on and others wait for it. On one rank this
     !> does nothing.
     module subroutine abort_world(status)
+      implicit none (type, external)
       integer, intent(in) :: status  !! exit status of all
     end subroutine abort_world
 
     !> Replace `values` by their sums over all ranks.
     module subroutine add_all(self, values)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       real(wp), intent(inout) :: values(:)  !! as many on every rank
     end subroutine add_all
@@ -64,18 +69,21 @@ module pd_comm_world
     !> Replace each value by the largest of all ranks; a value that is not a number is larger than
     !> any, so that all ranks decide alike.
     module subroutine take_largest(self, values)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       real(wp), intent(inout) :: values(:)  !! as many on every rank
     end subroutine take_largest
 
     !> Copy the values of points that others own from there: one message for each neighbour.
     module subroutine share(self, values)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       real(wp), intent(inout) :: values(:, :)  !! (n_slots, components)
     end subroutine share
 
     !> Find out what each rank sends: every rank tells the owners of its copies which they are.
     module subroutine join(self, owner, number, slot, owned_number, owned_slot)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       integer, intent(in) :: owner(:)            !! rank that owns each copy, from 0
       integer(i8), intent(in) :: number(:)       !! of each copy's point among all
@@ -86,6 +94,7 @@ module pd_comm_world
 
     !> The sum of what the ranks before this one have; 0 on the first.
     module function number_before(self, number) result(before)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       integer(i8), intent(in) :: number  !! of this rank
       integer(i8) :: before
@@ -93,6 +102,7 @@ module pd_comm_world
 
     !> Values of all ranks one after another, in the order of ranks, on rank 0; nothing on others.
     module subroutine collect(self, values, all_values)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       real(wp), intent(in) :: values(:)                    !! of this rank; any number
       real(wp), allocatable, intent(out) :: all_values(:)  !! on rank 0; of size 0 elsewhere
@@ -100,6 +110,7 @@ module pd_comm_world
 
     !> Send values to ranks and take what they send.
     module subroutine swap(self, number, values, got_number, got)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
       integer, intent(in) :: number(0:)                   !! how many go to each rank
       real(wp), intent(in) :: values(:)                   !! those, rank by rank
@@ -109,6 +120,7 @@ module pd_comm_world
 
     !> Wait until all ranks are here.
     module subroutine wait_for_all(self)
+      implicit none (type, external)
       class(world_type), intent(inout) :: self
     end subroutine wait_for_all
   end interface

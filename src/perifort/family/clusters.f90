@@ -83,11 +83,13 @@ contains
 
   !> The members of all clusters of the points `x` (n, dim), which are in the order of `rows`: those
   !> of cluster c stand from `start(c)` to `start(c+1) - 1`, ascending, each with the bits of the
-  !> lanes whose family it is in. Two points are neighbours if they are no further
-  !> apart than the sum of their `half_reach` [m].
-  subroutine collect_members(x, half_reach, rows, start, member, bits)
+  !> lanes whose family it is in. Two points are neighbours if they are no further apart than the
+  !> sum of their `half_reach` and the larger one of their `own` [m].
+  subroutine collect_members(x, half_reach, own, rows, start, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)  !! (n, dim) positions in the order of `rows` [m]
     real(wp), intent(in), contiguous :: half_reach(:)   !! (n) half of the reach of each point [m]
+    real(wp), intent(in), contiguous :: own(:)
+      !! (n) what reaches farther by the larger one of both ends [m]
     type(rows_type), intent(in) :: rows                 !! as `order_in_rows` made them
     integer(i8), allocatable, intent(out) :: start(:)
       !! (clusters + 1) first member of each cluster
@@ -99,14 +101,14 @@ contains
     real(wp) :: most
     integer :: c, found
 
-    most = maxval(half_reach)
+    most = maxval(half_reach) + maxval(own)
     allocate (start((size(x, 1) + lanes - 1)/lanes + 1))
     start(1) = 1_i8
     ! searching twice, first to count, needs no room but that of the result
     !$omp parallel do schedule(dynamic, 64) default(none) private(c, found, no_member, no_bits) &
-    !$omp shared(x, half_reach, rows, start, most)
+    !$omp shared(x, half_reach, own, rows, start, most)
     do c = 1, size(start) - 1
-      call visit(x, half_reach, most, rows, c, found, no_member, no_bits)
+      call visit(x, half_reach, own, most, rows, c, found, no_member, no_bits)
       start(c + 1) = found
     end do
     do c = 1, size(start) - 1
@@ -114,9 +116,9 @@ contains
     end do
     allocate (member(start(size(start)) - 1), bits(start(size(start)) - 1))
     !$omp parallel do schedule(dynamic, 64) default(none) private(c, found) &
-    !$omp shared(x, half_reach, rows, start, member, bits, most)
+    !$omp shared(x, half_reach, own, rows, start, member, bits, most)
     do c = 1, size(start) - 1
-      call visit(x, half_reach, most, rows, c, found, member(start(c):start(c + 1) - 1), &
+      call visit(x, half_reach, own, most, rows, c, found, member(start(c):start(c + 1) - 1), &
         & bits(start(c):start(c + 1) - 1))
     end do
   end subroutine collect_members
@@ -218,10 +220,11 @@ contains
 
   !> Search the cells around cluster `c`: the number of its members, and as many of them as
   !> there is room for.
-  pure subroutine visit(x, half_reach, most, rows, c, found, member, bits)
+  pure subroutine visit(x, half_reach, own, most, rows, c, found, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)
     real(wp), intent(in), contiguous :: half_reach(:)
-    real(wp), intent(in) :: most               !! largest half reach [m]
+    real(wp), intent(in), contiguous :: own(:)
+    real(wp), intent(in) :: most               !! largest half reach and largest own one [m]
     type(rows_type), intent(in) :: rows
     integer, intent(in) :: c
     integer, intent(out) :: found
@@ -251,7 +254,8 @@ contains
           to = rows%count(1)*(row + 1) - low(1)
         end if
         do j = rows%first(from), rows%first(to + 1) - 1, piece
-          call compare(x, half_reach, first, last, j, min(j + piece, rows%first(to + 1)) - 1, code)
+          call compare(x, half_reach, own, first, last, j, min(j + piece, rows%first(to + 1)) &
+            & - 1, code)
           do i = 1, min(piece, rows%first(to + 1) - j)
             if (code(i) <= 0.0_wp) cycle
             found = found + 1
@@ -266,9 +270,10 @@ contains
   end subroutine visit
 
   !> The bits of the cluster's lanes `first:last` for each of the points `from:to`, as numbers.
-  pure subroutine compare(x, half_reach, first, last, from, to, code)
+  pure subroutine compare(x, half_reach, own, first, last, from, to, code)
     real(wp), intent(in), contiguous :: x(:, :)
     real(wp), intent(in), contiguous :: half_reach(:)
+    real(wp), intent(in), contiguous :: own(:)
     integer, intent(in) :: first, last, from, to
     real(wp), intent(inout) :: code(:)
     real(wp) :: d2, bit
@@ -284,21 +289,24 @@ contains
         do j = from, to
           d2 = (x(j, 1) - x(k, 1))**2 + (x(j, 2) - x(k, 2))**2 + (x(j, 3) - x(k, 3))**2
           code(j - from + 1) = code(j - from + 1) &
-            & + merge(bit, 0.0_wp, d2 <= (half_reach(k) + half_reach(j))**2)
+            & + merge(bit, 0.0_wp, d2 <= (max(own(k), own(j)) &
+            & + (half_reach(k) + half_reach(j)))**2)
         end do
       case (2)
         !$omp simd private(d2)
         do j = from, to
           d2 = (x(j, 1) - x(k, 1))**2 + (x(j, 2) - x(k, 2))**2
           code(j - from + 1) = code(j - from + 1) &
-            & + merge(bit, 0.0_wp, d2 <= (half_reach(k) + half_reach(j))**2)
+            & + merge(bit, 0.0_wp, d2 <= (max(own(k), own(j)) &
+            & + (half_reach(k) + half_reach(j)))**2)
         end do
       case default
         !$omp simd private(d2)
         do j = from, to
           d2 = (x(j, 1) - x(k, 1))**2
           code(j - from + 1) = code(j - from + 1) &
-            & + merge(bit, 0.0_wp, d2 <= (half_reach(k) + half_reach(j))**2)
+            & + merge(bit, 0.0_wp, d2 <= (max(own(k), own(j)) &
+            & + (half_reach(k) + half_reach(j)))**2)
         end do
       end select
       ! a point is no member of its own family

@@ -38,8 +38,8 @@ module pd_family_lattice
     type(offsets_type), allocatable :: grids(:)
     integer :: words = 0                       !! words of bits of one slot
     logical :: mixed = .false.                 !! bonds are computed in single precision
-    logical :: has_copies = .false.            !! some slots are copies of other ranks' points, whose
-                                               !! bonds are not all here
+    logical :: has_copies = .false.            !! some slots are copies of other ranks' points,
+                                               !! whose bonds are not all here
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
@@ -77,6 +77,10 @@ contains
     reason = ''
     if (any(body%grid == 0)) then
       reason = 'some points are a cloud, a mesh or cut cells'
+      return
+    end if
+    if (rule%ratio > 0.0_wp) then
+      reason = 'horizons differ from point to point'
       return
     end if
     if (any(body%grid /= body%grid(1))) then

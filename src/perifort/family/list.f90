@@ -15,7 +15,7 @@ module pd_family_list
   use pd_family_clusters, only: rows_type, order_in_rows, collect_members, pair_members, lane_bit
   use pd_family_family, only: family_type, bonds_type
   use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact, &
-    & volume_none
+    & volume_none, horizon_of_bond, rule_of_bond
   implicit none (type, external)
   private
   public :: list_family_type, new_list_family
@@ -45,32 +45,45 @@ module pd_family_list
 contains
 
   !> Families of all points of `body`, which is sorted, and filled with dead slots up to whole
-  !> clusters. Members are those within the rule's reach for the bond's mean spacing.
+  !> clusters. Members are those within the rule's reach for the bond's mean spacing and, where
+  !> points have their own horizons, the larger one of both ends.
   subroutine new_list_family(body, rule, family)
     type(body_type), intent(inout) :: body
       !! in point order; arranged in the slots of the family on return
     type(volume_rule_type), intent(in) :: rule     !! volume correction and horizon
     type(list_family_type), intent(out) :: family  !! whole, all bonds intact
     type(rows_type) :: rows
-    real(wp), allocatable :: half_reach(:)
+    type(volume_rule_type) :: beyond
+    real(wp), allocatable :: half_reach(:), own(:)
     integer(i4), allocatable :: order(:), point(:), member(:)
+    real(wp) :: spacing
     integer :: k, n, edges
 
     n = body%n_points
     ! eight points of a lattice fill a square of three or a cube of two spacings
     edges = nint(real(lanes, wp)**(1.0_wp/body%dim))
-    call order_in_rows(body%x, edges*maxval(body%spacing), rows, order)
+    spacing = maxval(body%spacing)
+    ! cells for the finest points: in cells for the coarsest ones, eight fine points in a row along
+    ! x would not lie close together
+    if (rule%ratio > 0.0_wp) spacing = minval(body%spacing)
+    call order_in_rows(body%x, edges*spacing, rows, order)
     allocate (point(lanes*((n + lanes - 1)/lanes)), source=0_i4)
     point(:n) = body%point(order)
     call arrange(body, point)
     family%dim = body%dim
     family%n_slots = body%n_slots
     family%rule = rule
-    allocate (half_reach(n))
+    allocate (half_reach(n), own(n))
+    beyond = rule
+    if (rule%ratio > 0.0_wp) beyond%delta = 0.0_wp
     do k = 1, n
-      half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
+      half_reach(k) = reach(beyond, body%spacing(k), body%dim)/2
+      own(k) = 0.0_wp
+      associate (h => body%spacing(k))
+        if (rule%ratio > 0.0_wp) own(k) = reach(rule_of_bond(rule, h, h), 0.0_wp, body%dim)
+      end associate
     end do
-    call collect_members(body%x(:n, :), half_reach, rows, family%start, member, family%bits)
+    call collect_members(body%x(:n, :), half_reach, own, rows, family%start, member, family%bits)
     call pair_members(family%start, member, family%bits, family%member, family%first)
     allocate (family%intact, source=family%bits)
     call count_bonds(family)
@@ -131,8 +144,8 @@ contains
           k = lanes*(c - 1) + l
           j = other_end(family, e, l)
           xi = family%x(:, j) - family%x(:, k)
-          family%fraction(l, e) = volume_correction(family%rule, xi, norm2(xi), &
-            & (family%spacing(k) + family%spacing(j))/2)
+          family%fraction(l, e) = volume_correction(rule_of_bond(family%rule, family%spacing(k), &
+            & family%spacing(j)), xi, norm2(xi), (family%spacing(k) + family%spacing(j))/2)
         end do
       end do
     end do
@@ -152,7 +165,7 @@ contains
     integer, intent(in) :: k                       !! slot; a dead one has no bonds
     type(bonds_type), intent(inout) :: bonds
       !! made by `allocate_bonds`; the first `bonds%n` entries are set
-    real(wp) :: spacing
+    real(wp) :: spacing, delta
     integer(i8) :: e
     integer :: i, n, c, l, d
 
@@ -179,6 +192,15 @@ contains
       bonds%length(i) = sqrt(bonds%length(i))
     end do
     if (size(family%fraction) > 0 .or. family%rule%kind == volume_none) return
+    if (family%rule%ratio > 0.0_wp) then
+      do i = 1, n
+        spacing = (family%spacing(k) + family%spacing(bonds%j(i)))/2
+        delta = horizon_of_bond(family%rule, family%spacing(k), family%spacing(bonds%j(i)))
+        bonds%weight(i) = bonds%weight(i) &
+          & *max(0.0_wp, min(1.0_wp, (delta + spacing/2 - bonds%length(i))/spacing))
+      end do
+      return
+    end if
     do i = 1, n
       spacing = (family%spacing(k) + family%spacing(bonds%j(i)))/2
       bonds%weight(i) = bonds%weight(i) &

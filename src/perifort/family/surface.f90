@@ -7,6 +7,7 @@ module pd_family_surface
   use pd_law_material, only: material_type
   use pd_law_weighted, only: weighted_law_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
+  use pd_family_volume, only: horizon_of_bond
   implicit none (type, external)
   private
   public :: surface_factors, bond_factor
@@ -27,14 +28,16 @@ contains
     real(wp), intent(in), optional :: axes(:, :)
       !! (dim, dim) directions of the factors in columns, absent: x, y, z
     type(bonds_type) :: bonds
-    real(wp) :: strain, dilatation, energy, scale, gb, gd
+    real(wp) :: strain, dilatation, energy, scale, gb, gd, delta
     integer :: k, i, c
-    logical :: weighted
+    logical :: weighted, influenced
 
-    weighted = has_factors(laws)
+    influenced = has_factors(laws)
+    weighted = influenced .or. family%rule%ratio > 0.0_wp
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
     !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted, axes) &
-    !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, k, i, c)
+    !$omp shared(influenced) &
+    !$omp private(bonds, strain, dilatation, energy, scale, gb, gd, delta, k, i, c)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots
@@ -53,7 +56,15 @@ contains
           if (weighted) then
             do i = 1, bonds%n
               strain = (bonds%xi(i, c)/bonds%length(i))**2
-              call law_factors(laws, int(body%material(k)), bonds%length(i), gb, gd)
+              gb = 1.0_wp
+              gd = 1.0_wp
+              delta = horizon_of_bond(family%rule, body%spacing(k), body%spacing(bonds%j(i)))
+              if (influenced) call law_factors(laws, int(body%material(k)), bonds%length(i)/delta, &
+                & gb, gd)
+              if (family%rule%ratio > 0.0_wp) then
+                gb = gb*(family%rule%delta/delta)**(body%dim + 1)
+                gd = gd*(family%rule%delta/delta)**body%dim
+              end if
               dilatation = dilatation + gd*strain*bonds%weight(i)
               energy = energy + gb*strain**2*bonds%length(i)*bonds%weight(i)
               scale = scale + bonds%length(i)*bonds%weight(i)
@@ -103,11 +114,11 @@ contains
   end function has_factors
 
   !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1 without laws
-  !> and for laws with a force of their own.
-  pure subroutine law_factors(laws, material, length, gb, gd)
+  !> and for laws with a force of their own. `ratio`: |xi|/delta.
+  pure subroutine law_factors(laws, material, ratio, gb, gd)
     type(law_item_type), intent(in), optional :: laws(:)
     integer, intent(in) :: material
-    real(wp), intent(in) :: length
+    real(wp), intent(in) :: ratio
     real(wp), intent(out) :: gb, gd
 
     gb = 1.0_wp
@@ -115,7 +126,7 @@ contains
     if (.not. present(laws)) return
     select type (law => laws(material)%law)
     class is (weighted_law_type)
-      if (law%has_factors()) call law%bond_factors(length/law%delta, gb, gd)
+      if (law%has_factors()) call law%bond_factors(ratio, gb, gd)
     class default  ! it says itself what it does with a factor
       continue
     end select

@@ -5,7 +5,8 @@ module pd_family_volume
   use pd_base_error, only: internal_fault
   implicit none (type, external)
   private
-  public :: volume_rule_type, volume_correction, reach, covered_fraction
+  public :: volume_rule_type, volume_correction, reach, covered_fraction, horizon_of_bond, &
+    & rule_of_bond
   public :: volume_none, volume_linear, volume_linear_extended, volume_exact, volume_rule_number
 
   integer, parameter :: volume_none = 1, volume_linear = 2, volume_linear_extended = 3, &
@@ -15,7 +16,8 @@ module pd_family_volume
 
   type :: volume_rule_type
     integer :: kind = volume_linear
-    real(wp) :: delta = 0.0_wp  !! horizon [m]
+    real(wp) :: delta = 0.0_wp  !! horizon, the largest one where points have their own [m]
+    real(wp) :: ratio = 0.0_wp  !! horizon over spacing of each point; 0: all have `delta` [-]
   end type volume_rule_type
 
 contains
@@ -32,6 +34,25 @@ contains
       call internal_fault('unknown volume correction')
     end select
   end function volume_rule_number
+
+  !> The horizon of a bond: of two points with their own the larger one [m]. Both ends get the same
+  !> bits.
+  pure real(wp) function horizon_of_bond(rule, one, other) result(delta)
+    type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
+    real(wp), intent(in) :: one, other          !! spacings of the bond's ends [m]
+
+    delta = rule%delta
+    if (rule%ratio > 0.0_wp) delta = rule%ratio*max(one, other)
+  end function horizon_of_bond
+
+  !> The rule of a bond: with its horizon for `delta`.
+  pure type(volume_rule_type) function rule_of_bond(rule, one, other) result(own)
+    type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
+    real(wp), intent(in) :: one, other          !! spacings of the bond's ends [m]
+
+    own = rule
+    own%delta = horizon_of_bond(rule, one, other)
+  end function rule_of_bond
 
   !> Largest |xi| of a family [m] for a spacing [m]: delta, or further where the rule counts
   !> members whose centres lie outside but whose cells don't.

@@ -11,7 +11,7 @@ module pd_family_warnings
   use pd_family_cracks, only: points_on
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_family_joints, only: joint_type, count_joints
-  use pd_family_volume, only: reach
+  use pd_family_volume, only: horizon_of_bond, reach, rule_of_bond, volume_rule_type
   implicit none (type, external)
   private
   public :: warn_of_points
@@ -92,14 +92,16 @@ contains
     integer, intent(in) :: number        !! of the body
     character(*), intent(in) :: name     !! of the body, as in messages
     type(warnings_type), intent(inout) :: warnings
+    type(volume_rule_type) :: rule
     real(wp) :: spacing
 
     if (body%dim == 1) return
     if (.not. any(body%body == number .and. body%point > 0)) return
     spacing = maxval(body%spacing, mask=body%body == number .and. body%point > 0)
-    if (reach(family%rule, spacing, body%dim) >= sqrt(2.0_wp)*spacing) return
+    rule = rule_of_bond(family%rule, spacing, spacing)
+    if (reach(rule, spacing, body%dim) >= sqrt(2.0_wp)*spacing) return
     call warnings%add('short horizon '//to_text(number), 'the horizon of '// &
-      & with_unit(family%rule%delta, 'm', 4)//' is shorter than 1.4142 spacings of '// &
+      & with_unit(rule%delta, 'm', 4)//' is shorter than 1.4142 spacings of '// &
       & with_unit(spacing, 'm', 4)//': '//name//' has no diagonal bonds and no shear '// &
       & 'stiffness; use a &horizon ratio of 2 to 4', tell=.false.)
   end subroutine warn_of_horizon
@@ -113,13 +115,13 @@ contains
     type(warnings_type), intent(inout) :: warnings
     real(wp), parameter :: ball(3) = [2.0_wp, pi, 4*pi/3]  ! volume of the unit ball
     type(bonds_type) :: bonds
-    real(wp) :: filled
+    real(wp) :: filled, reached
     integer :: points, far, full, k
 
     points = 0
     far = 0
     full = 0
-    !$omp parallel default(none) shared(body, family, number) private(bonds, filled, k) &
+    !$omp parallel default(none) shared(body, family, number) private(bonds, filled, reached, k) &
     !$omp reduction(+:points, far, full)
     call allocate_bonds(family, bonds)
     !$omp do schedule(static)
@@ -129,7 +131,9 @@ contains
       points = points + 1
       if (.not. any(bonds%length(:bonds%n) <= most_distance*body%spacing(k))) far = far + 1
       filled = body%spacing(k)**body%dim + sum(body%spacing(bonds%j(:bonds%n))**body%dim)
-      if (filled > most_filled*ball(body%dim)*family%rule%delta**body%dim) full = full + 1
+      reached = horizon_of_bond(family%rule, body%spacing(k), max(body%spacing(k), &
+        & maxval(body%spacing(bonds%j(:bonds%n)))))
+      if (filled > most_filled*ball(body%dim)*reached**body%dim) full = full + 1
     end do
     !$omp end parallel
     if (points == 0) return

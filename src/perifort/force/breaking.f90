@@ -4,7 +4,8 @@ module pd_force_breaking
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_order, only: ascending_order, owns
-  use pd_base_reduce, only: add_point, count_of_ranks, largest_of_ranks, new_running, running_type, total_of_running
+  use pd_base_reduce, only: add_point, count_of_ranks, largest_of_ranks, new_running, &
+    & running_type, total_of_running
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_family_family, only: family_type, bonds_type, allocate_bonds

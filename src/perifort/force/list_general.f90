@@ -86,7 +86,7 @@ contains
     logical, intent(in) :: own          !! 2 q_k in place of q_k + q_j
     type(work_type), intent(inout) :: work
       !! of the cluster it has taken up; gets the tables of its bonds
-    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, a, b, c, gb, gd
+    real(wp), dimension(lanes) :: x, y, z, q, length, weight, spacing, delta, a, b, c, gb, gd
     logical :: there(lanes), from(lanes)
     integer(i8) :: e, place(lanes)
     integer :: i, j, m, f, l
@@ -127,16 +127,32 @@ contains
       case default
         spacing = work%own(:, at_p + given_half) &
           & + merge(workspace%given(given_half, j), workspace%given(given_half, m), from)
-        weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
+        if (family%rule%ratio > 0.0_wp) then
+          ! the bits of `horizon_of_bond`: halves are exact
+          delta = family%rule%ratio*(2*max(work%own(:, at_p + given_half), &
+            & merge(workspace%given(given_half, j), workspace%given(given_half, m), from)))
+          weight = weight*max(0.0_wp, min(1.0_wp, (delta + spacing/2 - length)/spacing))
+        else
+          weight = weight*max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - length)/spacing))
+        end if
       end select
       work%geometry(:, i) = 1/length**2
       work%dilatation(:, i) = weight
       work%stretch(:, i) = q*weight/length
-      if (model%weighted) then
+      if (allocated(model%horizon) .and. .not. model%influenced) then
+        ! `bond_factors_of` without its calls
+        associate (first => work%first, last => work%first + lanes - 1)
+          work%stretch(:, i) = work%stretch(:, i)*min(model%of_stretch(first:last), &
+            & merge(model%of_stretch(j), model%of_stretch(m), from))
+          work%dilatation(:, i) = weight*min(model%of_dilatation(first:last), &
+            & merge(model%of_dilatation(j), model%of_dilatation(m), from))
+        end associate
+      else if (model%weighted) then
         do l = 1, lanes
           gb(l) = 0.0_wp
           gd(l) = 0.0_wp
-          if (there(l)) call bond_factors_of(model, work%first + l - 1, length(l), gb(l), gd(l))
+          if (there(l)) call bond_factors_of(model, work%first + l - 1, merge(j, m, from(l)), &
+            & length(l), gb(l), gd(l))
         end do
         work%stretch(:, i) = work%stretch(:, i)*gb
         work%dilatation(:, i) = weight*gd

@@ -6,6 +6,7 @@ module pd_force_model
   use pd_base_kinds, only: wp, i1, i2, i8
   use pd_body_body, only: body_type, number_at
   use pd_family_bond_weights, only: bond_weights_type
+  use pd_family_volume, only: volume_rule_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never
   use pd_law_strength, only: strength_factor
@@ -13,7 +14,7 @@ module pd_force_model
   implicit none (type, external)
   private
   public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early
-  public :: bond_factors_of, q_of, t_of, p_of, has_scales
+  public :: bond_factors_of, q_of, t_of, p_of, has_scales, give_horizons
   public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
@@ -49,6 +50,10 @@ module pd_force_model
     type(law_item_type), allocatable :: laws(:)  !! of the materials; not allocated: the chapter's
     integer(i2), allocatable :: material(:)  !! of each slot
     real(wp), allocatable :: scale(:)        !! of q, t and p of each slot, if some law has scales
+    real(wp), allocatable :: horizon(:)      !! of each slot, if points have their own [m]
+    real(wp), allocatable :: of_stretch(:)   !! factor of the stretches for that horizon,
+    real(wp), allocatable :: of_dilatation(:) !! and of the dilatation
+    logical :: influenced = .false.          !! and bonds have factors of their length, too
     real(wp), allocatable :: D(:, :)         !! surface factor of the dilatation (n_slots, dim)
     real(wp), allocatable :: axes(:, :)      !! axes of D and S in columns, none: x, y, z
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
@@ -141,21 +146,59 @@ contains
     model%dilatation = .false.  ! the laws have it
   end subroutine choose_pass
 
-  !> Factors of the stretch and of the dilatation of a bond of slot `k`, by its length
-  !> (doc/theory.md, 15).
-  pure subroutine bond_factors_of(model, k, length, gb, gd)
+  !> Give points horizons of their own. The constants of the laws stay those of the largest one;
+  !> bonds of shorter ones have factors (doc/theory.md, 1).
+  pure subroutine give_horizons(body, rule, model)
+    type(body_type), intent(in) :: body         !! arranged in slots, with its spacings
+    type(volume_rule_type), intent(in) :: rule  !! with its ratio; the laws have its horizon
+    type(model_type), intent(inout) :: model
+      !! of weighted laws without scales; gets horizons with their factors and is `weighted`
+    integer :: k
+
+    model%influenced = model%weighted
+    model%weighted = .true.
+    model%horizon = rule%ratio*body%spacing
+    allocate (model%of_stretch(body%n_slots), model%of_dilatation(body%n_slots), source=1.0_wp)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      model%of_stretch(k) = (rule%delta/model%horizon(k))**(body%dim + 1)
+      model%of_dilatation(k) = (rule%delta/model%horizon(k))**body%dim
+    end do
+  end subroutine give_horizons
+
+  !> Factors of the stretch and of the dilatation of the bond k-j, by its length and its horizon
+  !> (doc/theory.md, 1 and 15).
+  pure subroutine bond_factors_of(model, k, j, length, gb, gd)
     type(model_type), intent(in) :: model  !! with weighted laws
-    integer, intent(in) :: k               !! slot
+    integer, intent(in) :: k, j            !! slots of the bond's ends
     real(wp), intent(in) :: length         !! |xi| [m]
     real(wp), intent(out) :: gb            !! factor of the stretch's force [-]
     real(wp), intent(out) :: gd            !! factor of the dilatation [-]
 
+    real(wp) :: shorter, delta
+
+    gb = 1.0_wp
+    gd = 1.0_wp
+    if (allocated(model%horizon)) then
+      ! the larger horizon has the smaller factors
+      shorter = min(model%of_stretch(k), model%of_stretch(j))
+      if (.not. model%influenced) then
+        gb = shorter
+        gd = min(model%of_dilatation(k), model%of_dilatation(j))
+        return
+      end if
+    end if
     select type (law => model%laws(model%material(k))%law)
     class is (weighted_law_type)
-      call law%bond_factors(length/law%delta, gb, gd)
+      delta = law%delta
+      if (allocated(model%horizon)) delta = max(model%horizon(k), model%horizon(j))
+      call law%bond_factors(length/delta, gb, gd)
     class default
       call internal_fault('a law without weights on the fast loops')
     end select
+    if (.not. allocated(model%horizon)) return
+    gb = gb*shorter
+    gd = gd*min(model%of_dilatation(k), model%of_dilatation(j))
   end subroutine bond_factors_of
 
   !> Whether some law in use has points of different scales.
@@ -223,7 +266,7 @@ contains
     real(wp), intent(out) :: lower  !! < 0; -`never` if the bond does not break in compression [-]
     real(wp), intent(out) :: upper  !! > 0; `never` if one end is in a no-fail zone [-]
 
-    upper = min(model%critical(k), model%critical(j))
+    upper = min(critical_of(model, k, j), critical_of(model, j, k))
     if (upper < 0.0_wp) upper = never
     if (allocated(model%number) .and. upper < never) upper = upper*scatter_of(model, k, j)
     lower = -never
@@ -231,6 +274,20 @@ contains
       if (model%compressed(k) == 1_i1 .and. model%compressed(j) == 1_i1) lower = -upper
     end if
   end subroutine bond_limit
+
+  !> Critical stretch of slot `k`'s material for the horizon of the bond k-j: that of Gc goes with
+  !> one over the root of the horizon (doc/theory.md, 8).
+  pure real(wp) function critical_of(model, k, j) result(s_c)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, j
+
+    s_c = model%critical(k)
+    if (.not. allocated(model%horizon)) return
+    associate (m => model%material(k))
+      if (s_c > 0.0_wp .and. s_c < never .and. model%materials(m)%from_toughness) &
+        & s_c = s_c*sqrt(model%laws(m)%law%delta/max(model%horizon(k), model%horizon(j)))
+    end associate
+  end function critical_of
 
   !> The factor of the critical stretch of the bond k-j, by the material whose critical stretch it
   !> has; of two alike the first one.
@@ -240,9 +297,9 @@ contains
     integer :: m
 
     m = model%material(k)
-    if (model%critical(j) < model%critical(k)) then
+    if (critical_of(model, j, k) < critical_of(model, k, j)) then
       m = model%material(j)
-    else if (.not. model%critical(k) < model%critical(j)) then
+    else if (.not. critical_of(model, k, j) < critical_of(model, j, k)) then
       m = min(m, int(model%material(j)))
     end if
     factor = 1.0_wp

@@ -52,7 +52,7 @@ contains
       end associate
     end if
     if (model%weighted) then
-      call bond_factors_of(model, k, length, gb, gd)
+      call bond_factors_of(model, k, j, length, gb, gd)
       state%Gd = state%Gd*gd
       state%Gb = state%Gb*gb
     end if

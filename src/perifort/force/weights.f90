@@ -354,7 +354,7 @@ contains
           end if
           if (model%dilatation) weights%dilatation(l, m) = weight
           if (model%weighted) then
-            call bond_factors_of(model, int(k), grid%length(o), gb, gd)
+            call bond_factors_of(model, int(k), int(j), grid%length(o), gb, gd)
             weights%stretch(l, m) = weights%stretch(l, m)*gb
             if (model%dilatation) weights%dilatation(l, m) = weight*gd
           end if

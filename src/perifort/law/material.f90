@@ -25,6 +25,7 @@ module pd_law_material
     real(wp) :: t = 0.0_wp                   !! d delta: theta_k = t sum(...)
     real(wp) :: uniaxial_energy = 0.0_wp     !! W/zeta^2 at uniaxial strain zeta (theory.md, 4) [Pa]
     real(wp) :: critical_stretch = never     !! s_c [-]
+    logical :: from_toughness = .false.      !! s_c follows from Gc, and so from the horizon
     !> Energy release rates at which a crack grows through the lattice, over the Gc of the formula
     !> for s_c: the largest within a period of the lattice, by which s_c has been chosen, the mean,
     !> and the largest of a crack along diagonals [-]. 0: s_c is given, or the formula's.

@@ -1,6 +1,6 @@
 !> The output of one run, from what is there of earlier ones to the last word: the driver's partner.
 !>
-!>     call output%look_back(scene, options, world, error)   ! earlier results, a checkpoint to start from
+!>     call output%look_back(scene, options, world, error)   ! earlier results, a checkpoint
 !>     call output%foresee(scene, options, set_up, error)      ! measures, schedule, warnings
 !>     call output%open(scene, options, set_up, error)
 !>     ...                                            ! the motion, seen by output%recorder

@@ -51,6 +51,7 @@ contains
           if (is_set(group%critical_stretch)) m%critical_stretch = group%critical_stretch
           if (is_set(group%critical_energy_release_rate)) m%critical_stretch = &
             & law%critical_stretch(group%critical_energy_release_rate)
+          m%from_toughness = is_set(group%critical_energy_release_rate)
           if (m%critical_stretch < 0.0_wp) then
             call scene_fault(error, scene, 'material', i, 'critical_energy_release_rate', &
               & "model = '"//trim(group%model)//"' has no critical stretch for an energy "// &

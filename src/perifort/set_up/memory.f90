@@ -6,7 +6,8 @@ module pd_set_up_memory
   use pd_base_text, only: to_text, with_unit
   use pd_law_laws, only: law_table_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: has_grid, is_lattice, is_set, laws_of, scene_type
+  use pd_scene_content_types, only: has_grid, has_refinement, is_lattice, is_set, laws_of, &
+    & scene_type
   use pd_body_generate, only: horizon_of
   implicit none (type, external)
   private
@@ -15,17 +16,20 @@ module pd_set_up_memory
 contains
 
   !> An error if the lattice bodies of a scene need more memory than there is, at the body with the
-  !> most points.
-  subroutine check_memory(scene, error)
+  !> most points. Refined cells are known when `points` are.
+  subroutine check_memory(scene, error, points)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(error_type), allocatable, intent(out) :: error  !! too many points
-    real(wp) :: need, there
+    integer, intent(in), optional :: points  !! number of them; absent: those of the lattices
+    real(wp) :: need, there, number
 
-    need = predicted_memory(scene)
+    number = sum(numbers_of_points(scene))
+    if (present(points)) number = points
+    need = predicted_memory(scene, points)
     there = real(available_memory(), wp)
     if (need <= there) return
     call scene_fault(error, scene, 'body', largest_body(scene), 'points', 'the scene has '// &
-      & to_text(int(sum(numbers_of_points(scene)), i8))//' points and needs about '// &
+      & to_text(int(number, i8))//' points and needs about '// &
       & with_unit(need, 'B', 3)//' of memory', 'only '//with_unit(there, 'B', 3)//' are available')
   end subroutine check_memory
 
@@ -35,8 +39,9 @@ contains
   !> with horizons of 3 to 5 spacings: both kinds of families, bonds that break, and the generic
   !> pass with two laws and with laws that have a history. The prediction is 0.9 to 1.2 times what
   !> they took.
-  real(wp) function predicted_memory(scene) result(bytes)
+  real(wp) function predicted_memory(scene, number) result(bytes)
     type(scene_type), intent(in) :: scene  !! a checked scene
+    integer, intent(in), optional :: number  !! of points; absent: those of the lattices
     real(wp), parameter :: program = 18.5e6_wp                          !! without points
     real(wp), parameter :: per_point(3) = [165.0_wp, 280.0_wp, 500.0_wp]  !! in 1D, 2D, 3D
     real(wp), parameter :: per_list_point = 175.0_wp, per_list_bond = 1.6_wp  !! members, tables
@@ -58,6 +63,7 @@ contains
     bytes = 0.0_wp
     dim = scene%header%dimension
     points = sum(numbers_of_points(scene))
+    if (present(number)) points = number
     if (points <= 0.0_wp) return
     ratio = max(1.0_wp, horizon_ratio(scene))
     select case (dim)
@@ -70,7 +76,8 @@ contains
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking
-    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies))) then
+    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies)) .or. &
+      & (scene%horizon%local .and. size(scene%bodies) > 1) .or. has_refinement(scene)) then
       bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
         & + per_list_bond*members)
       if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members

@@ -19,15 +19,15 @@ module pd_set_up_prepare
   use pd_family_cracks, only: cut_bonds, part_bodies
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
-  use pd_family_volume, only: volume_rule_type, volume_rule_number
+  use pd_family_volume, only: volume_rule_type
   use pd_force_breaking, only: damage_of, find_weakest
   use pd_force_generic_bonds, only: begin_laws, refresh_bonds
-  use pd_force_model, only: new_model
+  use pd_force_model, only: give_horizons, new_model
   use pd_force_terms, only: term_list_type
   use pd_motion_loads, only: add_loads_to, load_type
   use pd_motion_system, only: system_type, start_system, explain_condition
   use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_consistent_rules, only: check_consistent, prepare_surface, weigh_bonds
@@ -36,6 +36,7 @@ module pd_set_up_prepare
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
     & gravity_of_scene, leave_uncorrected, sides_of_contact
   use pd_set_up_families, only: axes_of_factors, choose_family, make_family, finish_family
+  use pd_set_up_horizons, only: check_horizons, rule_of_scene
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
   use pd_set_up_ranks, only: bonds_of_ranks, broken_bonds, check_ranks, divide_body, &
@@ -101,6 +102,8 @@ contains
       call timer%start('points')
       call generate_body(scene, system%body, delta, error, layers, set_up%warnings)
       if (allocated(error)) return
+      if (has_refinement(scene)) call check_memory(scene, error, system%body%n_points)
+      if (allocated(error)) return
       do i = 1, size(layers)
         if (layer_count_text(scene, layers(i)) /= '') call set_up%warnings%add('layer '// &
           & to_text(i), layer_count_text(scene, layers(i)), tell=.false.)
@@ -113,13 +116,13 @@ contains
       call timer%stop('lattice toughness')
 
       call timer%start('families')
-      rule = volume_rule_type(volume_rule_number(trim(scene%horizon%volume_correction)), delta)
+      rule = rule_of_scene(scene, system%body, delta)
       call choose_family(scene, rule, system%body, suits, reason, error)
       if (allocated(error)) return
       if (present(world)) then
         if (world%reproducible .and. .not. suits) call scene_fault(error, scene, 'horizon', 1, &
-          & 'family', 'on lists forces depend on the ranks in their last digits: --reproducible '// &
-          & 'needs lattice families', reason)
+          & 'family', '--reproducible needs lattice families: on lists forces depend on the '// &
+          & 'ranks in their last digits', reason)
         if (world%reproducible .and. .not. divided) call find_lowest(system%body)
         system%body%order%reproducible = world%reproducible
       end if
@@ -151,10 +154,15 @@ contains
         & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
       if (system%model%thermal) call heating_of_scene(scene, system%body, heated_by, &
         & system%model%expansion, system%heating)
+      if (system%family%rule%ratio > 0.0_wp) then
+        call check_horizons(scene, system, error)
+        if (allocated(error)) return
+        call give_horizons(system%body, system%family%rule, system%model)
+      end if
       call check_laws(scene, system, error)
       if (.not. allocated(error) .and. divided .and. system%model%generic) &
-        & call scene_fault(error, scene, 'material', 1, 'model', 'a run on several ranks cannot '// &
-        & 'have the bond laws of this scene, which the generic pass computes', &
+        & call scene_fault(error, scene, 'material', 1, 'model', 'a run on several ranks '// &
+        & 'cannot have the bond laws of this scene, which the generic pass computes', &
         & 'on one rank it can')
       if (allocated(error)) return
       call check_consistent(scene, system, error)

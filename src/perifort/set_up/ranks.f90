@@ -12,7 +12,7 @@ module pd_set_up_ranks
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_volume, only: reach, volume_rule_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: scene_type, is_set
+  use pd_scene_content_types, only: has_refinement, scene_type, is_set
   implicit none (type, external)
   private
   public :: check_ranks, divide_body, find_lowest, work_of_body, join_ranks, bonds_of_ranks, &
@@ -40,6 +40,8 @@ contains
     else if (scene%time%method /= 'explicit') then
       call refuse('time', 1, 'method', "method = '"//trim(scene%time%method)//"'")
     end if
+    if (has_refinement(scene)) call refuse('refine', 1, '', '&refine')
+    if (scene%horizon%local) call refuse('horizon', 1, 'local', 'horizons of points')
     if (scene%horizon%surface_correction == 'consistent') &
       & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
     do i = 1, size(scene%boundaries)

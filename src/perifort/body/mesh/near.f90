@@ -14,12 +14,15 @@ contains
 
   !> Whether each point of a part is within a distance of some facets, taken as flat between their
   !> corners. Points are found in cells of that distance.
-  subroutine points_near(part, x, facets, reach, near)
+  subroutine points_near(part, x, facets, reach, near, own)
     type(part_type), intent(in) :: part           !! with its faces
     real(wp), intent(in) :: x(:, :)               !! (n_points, dim) its points [m]
     type(facets_type), intent(in) :: facets       !! of the part
     real(wp), intent(in) :: reach                 !! the distance, larger than 0 [m]
     logical, allocatable, intent(out) :: near(:)  !! (n_points)
+    real(wp), intent(in), optional :: own(:)
+      !! (n_points) the distance for each point, at most `reach`; absent: `reach` for all [m]
+    real(wp) :: within
     type(shape_type) :: shapes(n_shapes), of_face
     type(lookup_type) :: cells
     integer(i4), allocatable :: last(:), before(:), nodes(:)
@@ -63,7 +66,9 @@ contains
             do while (p > 0)
               if (.not. near(p)) then
                 place = place_of(p)
-                near(p) = distance(place, corners(:, :n)) <= reach*(1 + 1.0e-9_wp)
+                within = reach
+                if (present(own)) within = own(p)
+                near(p) = distance(place, corners(:, :n)) <= within*(1 + 1.0e-9_wp)
               end if
               p = before(p)
             end do

@@ -77,14 +77,16 @@ contains
   end subroutine points_within
 
   !> Whether each point is within a distance of some chosen facets.
-  subroutine points_near_facets(surface, chosen, x, reach, near)
+  subroutine points_near_facets(surface, chosen, x, reach, near, own)
     type(surface_type), intent(in) :: surface     !! finished
     logical, intent(in) :: chosen(:)              !! (facets)
     real(wp), intent(in) :: x(:, :)               !! (points, 3), one or more [m]
     real(wp), intent(in) :: reach                 !! the distance, larger than 0 [m]
     logical, allocatable, intent(out) :: near(:)  !! (points)
+    real(wp), intent(in), optional :: own(:)
+      !! (points) the distance for each point, at most `reach`; absent: `reach` for all [m]
     type(bins_type) :: bins
-    real(wp) :: corners(3, 3)
+    real(wp) :: corners(3, 3), within
     integer :: f, i, j, k, low(3), high(3)
     integer(i4) :: p
 
@@ -100,7 +102,9 @@ contains
           do i = low(1), high(1)
             p = bins%head(i, j, k)
             do while (p > 0_i4)
-              if (.not. near(p)) near(p) = distance(x(p, :), corners) <= reach*(1 + 1.0e-9_wp)
+              within = reach
+              if (present(own)) within = own(p)
+              if (.not. near(p)) near(p) = distance(x(p, :), corners) <= within*(1 + 1.0e-9_wp)
               p = bins%next(p)
             end do
           end do

@@ -286,7 +286,8 @@ contains
             if (.not. Gb > 0.0_wp) cycle
           end if
           if (model%weighted) then
-            call bond_factors_of(model, k, bonds%length(i), stretch_factor, dilatation_factor)
+            call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), stretch_factor, &
+              & dilatation_factor)
             Gd = dilatation_factor*merge(Gd, 1.0_wp, model%surface)
             Gb = stretch_factor*merge(Gb, 1.0_wp, model%surface)
             if (.not. Gb > 0.0_wp) cycle

@@ -63,7 +63,7 @@ contains
             inverse(k) = inverse(k) + bond_size(model, k, i, .true.)*bonds%weight(i)/bonds%length(i)
           else if (model%weighted) then
             inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
-              & *law_factor(model, k, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
+              & *law_factor(model, k, j, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
           else
             inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
               & /bonds%length(i)
@@ -102,9 +102,9 @@ contains
         end if
         bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j)) &
           & *surface_factor(model, model%S, n, k, j) &
-          & *law_factor(model, k, bonds%length(i), .false.) &
+          & *law_factor(model, k, j, bonds%length(i), .false.) &
           & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j) &
-          & *law_factor(model, k, bonds%length(i), .true.))*bonds%weight(i)/bonds%length(i)
+          & *law_factor(model, k, j, bonds%length(i), .true.))*bonds%weight(i)/bonds%length(i)
       end do
     end do
     !$omp end parallel
@@ -132,16 +132,16 @@ contains
   end function bond_size
 
   !> The size of a law's factor of a bond: that of the dilatation or of the stretch.
-  pure real(wp) function law_factor(model, k, length, of_dilatation) result(factor)
+  pure real(wp) function law_factor(model, k, j, length, of_dilatation) result(factor)
     type(model_type), intent(in) :: model
-    integer, intent(in) :: k
+    integer, intent(in) :: k, j
     real(wp), intent(in) :: length
     logical, intent(in) :: of_dilatation
     real(wp) :: gb, gd
 
     factor = 1.0_wp
     if (.not. model%weighted) return
-    call bond_factors_of(model, k, length, gb, gd)
+    call bond_factors_of(model, k, j, length, gb, gd)
     factor = abs(merge(gd, gb, of_dilatation))
   end function law_factor
 

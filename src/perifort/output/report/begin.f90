@@ -6,7 +6,8 @@ module pd_output_report_begin
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_reduce, only: any_of_ranks
   use pd_base_version, only: program_version
-  use pd_scene_content_types, only: scene_type
+  use pd_body_refine, only: level_of
+  use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_content_write, only: scene_text
   use pd_body_body, only: body_type, gather
   use pd_body_regions, only: region_mask
@@ -211,7 +212,7 @@ contains
     type(recorder_type), intent(inout) :: recorder
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: values(:)
-    integer :: r
+    integer :: r, k
 
     call collect(recorder, body, body%volume, values)
     call recorder%results%put_points('volume', values, error)
@@ -224,6 +225,11 @@ contains
     if (allocated(error)) return
     call collect(recorder, body, real(body%layer, wp), values)
     call recorder%results%put_points('layer', nint(values, i4), error)
+    if (allocated(error)) return
+    if (has_refinement(scene)) then
+      call collect(recorder, body, [(real(level_of(body, k), wp), k=1, body%n_slots)], values)
+      call recorder%results%put_points('level', nint(values, i4), error)
+    end if
     do r = 1, size(scene%regions)
       if (allocated(error)) return
       call collect(recorder, body, merge(1.0_wp, 0.0_wp, region_mask(scene, body, &

@@ -5,10 +5,12 @@ module pd_output_report_overview
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp
   use pd_base_text, only: counted, line => labelled_line, to_text, with_unit
-  use pd_scene_content_types, only: is_set, scene_type
+  use pd_scene_content_types, only: has_refinement, is_set, scene_type
   use pd_law_law, only: bond_law_type
   use pd_law_material, only: material_type, never
+  use pd_body_body, only: body_type
   use pd_body_lattices, only: coordinate
+  use pd_body_refine, only: level_of
   use pd_body_waves, only: longitudinal_speed, rayleigh_speed, shear_speed
   use pd_family_cracks, only: extents_of
   use pd_body_regions, only: region_mask
@@ -109,10 +111,10 @@ contains
     character(:), allocatable :: text
     real(wp), allocatable :: extents(:), along(:)
     logical, allocatable :: mine(:)
-    real(wp) :: edges(3)
+    real(wp) :: edges(3), delta
     integer :: i, c, g
 
-    associate (body => system%body, delta => system%family%rule%delta)
+    associate (body => system%body, rule => system%family%rule)
       text = ''
       do i = 1, size(scene%bodies)
         mine = body%body == i .and. body%layer == 0 .and. body%point > 0
@@ -127,9 +129,16 @@ contains
           edges(c) = maxval(along + body%spacing/2, mask=mine) &
             & - minval(along - body%spacing/2, mask=mine)
         end do
+        delta = rule%delta
+        if (rule%ratio > 0.0_wp) delta = rule%ratio*maxval(body%spacing, mask=mine)
         text = text//line('body '//to_text(i), with_unit(minval(edges(:body%dim)), 'm', 4)// &
           & ' in its thinnest direction: '//to_text(minval(edges(:body%dim))/delta, 3)// &
-          & ' horizons')
+          & trim(merge(' of its largest horizons', ' horizons               ', &
+          & rule%ratio > 0.0_wp)))
+        if (rule%ratio > 0.0_wp) text = text//line('', 'horizons of '//with_unit(rule%ratio* &
+          & minval(body%spacing, mask=mine), 'm', 4)//' to '//with_unit(delta, 'm', 4))
+        if (g > 0 .and. has_refinement(scene)) text = text//line('', 'points of its levels: '// &
+          & levels(body, mine))
       end do
       do i = 1, size(scene%cracks)
         if (scene%cracks(i)%surface /= '') cycle
@@ -137,10 +146,27 @@ contains
         text = text//line('crack '//to_text(i), with_unit(minval(extents), 'm', 4)// &
           & trim(merge(' long                    ', ' in its shorter direction', &
           & size(extents) == 1))//': '// &
-          & to_text(minval(extents)/delta, 3)//' horizons')
+          & to_text(minval(extents)/rule%delta, 3)//trim(merge(' of the largest horizons', &
+          & ' horizons               ', rule%ratio > 0.0_wp)))
       end do
     end associate
   end function lengths
+
+  !> The numbers of points of the levels of a refined body, from level 0 on.
+  function levels(body, mine) result(text)
+    type(body_type), intent(in) :: body
+    logical, intent(in) :: mine(:)  !! slots of its points
+    character(:), allocatable :: text
+    integer, allocatable :: level(:)
+    integer :: k, n
+
+    level = [(merge(level_of(body, k), -1, mine(k)), k=1, body%n_slots)]
+    text = ''
+    do n = 0, maxval(level)
+      if (n > 0) text = text//', '
+      text = text//to_text(count(level == n))
+    end do
+  end function levels
 
   !> Points of each region, boundary, load, line and no-fail zone.
   function counts(scene, system) result(text)

@@ -39,9 +39,16 @@ contains
       & text = text//line('defaults', 'those of version '//trim(scene%header%defaults))
     text = text//line('points', to_text(system%body%order%n_global)//' in '// &
       & to_text(scene%header%dimension)//'D')
-    text = text//line('horizon', with_unit(system%family%rule%delta, 'm')//', '// &
-      & to_text(system%family%rule%delta/greatest_spacing(system), 5)//' spacings of '// &
-      & with_unit(greatest_spacing(system), 'm', 4))
+    associate (rule => system%family%rule)
+      if (rule%ratio > 0.0_wp) then
+        text = text//line('horizons', with_unit(rule%ratio*least_spacing(system), 'm')//' to '// &
+          & with_unit(rule%delta, 'm')//', '//to_text(rule%ratio, 5)//' spacings of each point')
+      else
+        text = text//line('horizon', with_unit(rule%delta, 'm')//', '// &
+          & to_text(rule%delta/greatest_spacing(system), 5)//' spacings of '// &
+          & with_unit(greatest_spacing(system), 'm', 4))
+      end if
+    end associate
     text = text//line('bonds', to_text(system%family%n_bonds/2)//' pairs of points ('// &
       & to_text(system%family%n_bonds)//' if both directions count)')
     text = text//line('', 'at most '//to_text(system%family%most_bonds)//' at a point')
@@ -70,6 +77,12 @@ contains
     type(system_type), intent(in) :: system
     spacing = largest_over(system%body%order, system%body%spacing)
   end function greatest_spacing
+
+  !> The smallest spacing of all points [m].
+  real(wp) function least_spacing(system) result(spacing)
+    type(system_type), intent(in) :: system
+    spacing = -largest_over(system%body%order, -system%body%spacing)
+  end function least_spacing
 
   !> How static equilibrium is found.
   pure function statics(scene, plan, breaking) result(text)

@@ -18,7 +18,8 @@ module pd_scene_content_check
     & check_unique, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_relaxation, only: safety_of
-  use pd_scene_content_types, only: group_table, scene_type, shape_group, is_set, name_length
+  use pd_scene_content_types, only: group_table, is_box, scene_type, shape_group, is_set, &
+    & name_length
   implicit none (type, external)
   private
   public :: check_scene, allocate_groups
@@ -62,6 +63,10 @@ contains
       end do
       do i = 1, size(scene%removed)
         call check_cut(scene, scene%removed(i), 'remove', i, error, source)
+        if (allocated(error)) return
+      end do
+      do i = 1, size(scene%refines)
+        call check_refine(scene, i, error, source)
         if (allocated(error)) return
       end do
       do i = 1, size(scene%regions)
@@ -179,6 +184,9 @@ contains
     else if (given('horizon', 1, 'ratio', source) .and. is_set(scene%horizon%length)) then
       call rule_fault(error, 'horizon', 1, 'length', "'ratio' and 'length' are both given", &
         & 'give one of them', source)
+    else if (scene%horizon%local .and. is_set(scene%horizon%length)) then
+      call rule_fault(error, 'horizon', 1, 'length', "'local' and 'length' are both given", &
+        & "'length' is one horizon for all points; give 'ratio' with 'local'", source)
     else if (given('time', 1, 'safety', source) .and. is_set(scene%time%step)) then
       call rule_fault(error, 'time', 1, 'step', "'step' and 'safety' are both given", &
         & 'give one of them', source)
@@ -228,7 +236,7 @@ contains
   !> One `&keep` or `&remove`: a region of space, an expression or a shape, or several of them.
   subroutine check_cut(scene, cut, group, number, error, source)
     type(scene_type), intent(in) :: scene
-    type(shape_group), intent(in) :: cut
+    class(shape_group), intent(in) :: cut
     character(*), intent(in) :: group
     integer, intent(in) :: number
     type(error_type), allocatable, intent(out) :: error
@@ -247,6 +255,42 @@ contains
     if (cut%shape /= '' .or. cut%surface /= '' .or. (cut%region == '' .and. cut%where == '')) &
       & call check_shape(cut, scene%header%dimension, scene%file, group, number, error, source)
   end subroutine check_cut
+
+  !> One `&refine`: where, and how far; bodies that it may not divide are refused.
+  subroutine check_refine(scene, number, error, source)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: number
+    type(error_type), allocatable, intent(out) :: error
+    type(source_type), intent(in), optional :: source
+    integer, parameter :: most_levels = 8
+    integer :: b
+
+    call check_cut(scene, scene%refines(number), 'refine', number, error, source)
+    if (allocated(error)) return
+    if (scene%refines(number)%levels > most_levels) then
+      call rule_fault(error, 'refine', number, 'levels', to_text(scene%refines(number)%levels)// &
+        & ' levels', 'there may be '//to_text(most_levels)//': spacings of 1/256', source)
+      return
+    end if
+    do b = 1, size(scene%bodies)
+      associate (body => scene%bodies(b))
+        if (is_box(body) .or. body%file /= '' .or. body%mesh /= '') cycle
+      end associate
+      call rule_fault(error, 'refine', number, '', '&refine in a scene whose body number '// &
+        & to_text(b)//' is no lattice that fills a box along x, y and z', "bodies with "// &
+        & "'surface', 'axis_1', or a sphere or cylinder for 'shape' cannot be refined; cut "// &
+        & 'them out of a box by &keep', source)
+      return
+    end do
+    if (all(scene%bodies%file /= '' .or. scene%bodies%mesh /= '')) then
+      call rule_fault(error, 'refine', number, '', '&refine without a lattice', 'clouds and '// &
+        & "meshes have the spacings that they are made with; '&horizon local' gives them "// &
+        & 'horizons by these', source)
+    else if (is_set(scene%horizon%length)) then
+      call rule_fault(error, 'horizon', 1, 'length', "'length' is given with &refine", &
+        & "the horizon is halved with the spacing: give 'ratio'", source)
+    end if
+  end subroutine check_refine
 
   !> One `&no_fail`: a region or a shape.
   subroutine check_no_fail(scene, number, error, source)

@@ -8,7 +8,7 @@ module pd_scene_content_groups
     & shape_group, region_group, no_fail_group, material_group, horizon_group, crack_group, &
     & initial_group, boundary_group, load_group, time_group, relaxation_group, output_group, &
     & probe_group, tip_group, section_group, line_group, j_integral_group, study_group, &
-    & side_group, contact_group, rigid_group, group_table
+    & side_group, contact_group, rigid_group, refine_group, group_table
   use pd_scene_groups_course, only: sides
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_output, only: default_fields
@@ -37,6 +37,9 @@ contains
       & 'groups are left out. `&remove` comes after it.', repeated, shape_group(), all=kept)
     call table%add('remove', 'A shape cut out of the bodies: points whose centres lie inside '// &
       & 'it are left out.', repeated, shape_group(), all=removed)
+    call table%add('refine', 'Where lattices are finer: cells whose centres lie inside are '// &
+      & 'divided in half along every direction, `levels` times.', repeated, refine_group(), &
+      & all=refines)
     call table%add('region', 'A named part of space, by a shape or an expression; other '// &
       & 'groups use the points inside it by its name.', repeated, region_group(), all=regions)
     call table%add('side', 'Facets of a surface by a name: by their centres, their normals, or '// &
@@ -164,6 +167,16 @@ contains
     if (.not. allocated(scene%removed)) allocate (scene%removed(0))
     groups => scene%removed
   end subroutine removed
+
+  subroutine refines(scene, groups, room)
+    type(scene_type), intent(inout), target :: scene
+    class(group_type), pointer, intent(out) :: groups(:)
+    integer, intent(in), optional :: room
+    if (present(room) .and. allocated(scene%refines)) deallocate (scene%refines)
+    if (present(room)) allocate (scene%refines(room))
+    if (.not. allocated(scene%refines)) allocate (scene%refines(0))
+    groups => scene%refines
+  end subroutine refines
 
   subroutine regions(scene, groups, room)
     type(scene_type), intent(inout), target :: scene

@@ -25,6 +25,7 @@ module pd_scene_content_types
   use pd_scene_groups_material, only: material_group
   use pd_scene_groups_output, only: output_group
   use pd_scene_groups_probe, only: probe_group
+  use pd_scene_groups_refine, only: refine_group
   use pd_scene_groups_relaxation, only: relaxation_group
   use pd_scene_groups_rigid, only: rigid_group
   use pd_scene_groups_section, only: section_group
@@ -39,9 +40,10 @@ module pd_scene_content_types
     & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
     & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
     & section_group, line_group, j_integral_group, side_group, study_group, contact_group, &
-    & rigid_group, name_length, path_length, text_length, unset, is_set, is_given
+    & rigid_group, refine_group, name_length, path_length, text_length, unset, is_set, is_given
   public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned
-  public :: laws_of, added_type, group_entry, group_table, group_interface, groups_interface
+  public :: has_refinement, has_own_horizons, laws_of, added_type, group_entry, group_table, &
+    & group_interface, groups_interface
 
   !> A group that the scene has no component for.
   type :: added_type
@@ -86,6 +88,7 @@ module pd_scene_content_types
     type(body_group), allocatable :: bodies(:)
     type(shape_group), allocatable :: kept(:)
     type(shape_group), allocatable :: removed(:)
+    type(refine_group), allocatable :: refines(:)
     type(region_group), allocatable :: regions(:)
     type(side_group), allocatable :: sides(:)
     type(material_group), allocatable :: materials(:)
@@ -134,6 +137,19 @@ module pd_scene_content_types
   end interface
 
 contains
+
+  !> Whether lattices are finer in some places.
+  pure logical function has_refinement(scene)
+    type(scene_type), intent(in) :: scene  !! any scene
+    has_refinement = .false.
+    if (allocated(scene%refines)) has_refinement = size(scene%refines) > 0
+  end function has_refinement
+
+  !> Whether each point has a horizon of its own: `ratio` times its spacing.
+  pure logical function has_own_horizons(scene)
+    type(scene_type), intent(in) :: scene  !! any scene
+    has_own_horizons = scene%horizon%local .or. has_refinement(scene)
+  end function has_own_horizons
 
   !> The bond laws that a scene may name: its own table, else that of the program.
   function laws_of(scene) result(laws)

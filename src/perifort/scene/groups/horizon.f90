@@ -12,6 +12,7 @@ module pd_scene_groups_horizon
   type, extends(group_type) :: horizon_group
     real(wp) :: ratio = 3.015_wp                           !! delta over the largest spacing [-]
     real(wp) :: length = unset                             !! delta [m], instead of ratio
+    logical :: local = .false.                             !! each point has its own
     character(name_length) :: volume_correction = 'linear' !! 'linear_extended', 'exact', 'none'
     character(name_length) :: surface_correction = 'energy'!! 'consistent', 'none'
     character(name_length) :: dilatation = ''              !! 'unprojected': Lambda = 1;
@@ -32,6 +33,8 @@ contains
     call keys%key('ratio', group%ratio, '-', 'horizon over the largest spacing', at_least=1.0_wp, &
       & hidden=is_set(group%length))
     call keys%key('length', group%length, 'm', 'horizon delta, instead of ratio', above=0.0_wp)
+    call keys%key('local', group%local, 'each point has its own horizon: `ratio` times its '// &
+      & 'spacing; bonds have the larger one of both ends')
     call keys%key('volume_correction', group%volume_correction, 'volumes of cells that the '// &
       & 'horizon cuts (7.2)', allowed=[character(15) :: 'linear', 'linear_extended', 'exact', &
       & 'none'])

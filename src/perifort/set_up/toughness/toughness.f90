@@ -11,7 +11,7 @@ module pd_set_up_toughness_toughness
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_law_weighted, only: weighted_law_type
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: has_own_horizons, scene_type
   use pd_set_up_toughness_grow, only: grow_crack, subject_type, toughness_type
   use pd_set_up_toughness_table, only: look_up
   implicit none (type, external)
@@ -71,7 +71,9 @@ contains
       subject%rule = volume_rule_type(volume_rule_number(trim(scene%horizon%volume_correction)), &
         & delta/spacing)
       subject%corrected = scene%horizon%surface_correction /= 'none'
-      if (spacing - minval(body%spacing) > same_spacing*spacing) then
+      ! lattices with horizons of their own are all alike in spacings
+      if (.not. has_own_horizons(scene) .and. &
+        & spacing - minval(body%spacing) > same_spacing*spacing) then
         reason = 'spacings differ'
       else if (subject%rule%delta > longest(subject%dim)) then
         reason = 'the lattice is solved for horizons of at most '// &

@@ -15,7 +15,7 @@ module pd_study_limits_vibration
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
   use pd_force_generic_bonds, only: begin_laws
-  use pd_force_model, only: model_type, new_model
+  use pd_force_model, only: give_horizons, model_type, new_model
   use pd_force_weights, only: build_weights
   use pd_motion_conditions, only: motion_type, moved_by_displacement
   use pd_motion_curve, only: constant_curve
@@ -82,6 +82,7 @@ contains
     call new_model(twin%body, materials, system%model%projected, &
       & spread(.false., 1, twin%body%n_slots), spread(0.0_wp, 1, twin%body%n_slots), &
       & twin%model, laws)
+    if (rule%ratio > 0.0_wp) call give_horizons(twin%body, rule, twin%model)
     twin%model%surface = system%model%surface
     if (twin%model%surface) call surface_factors(twin%body, twin%family, materials, twin%model%D, &
       & twin%model%S, laws, system%model%axes)

@@ -13,8 +13,8 @@ module pd_study_trade_analytic
   use pd_motion_system, only: system_type
   use pd_scene_content_expressions, only: has_expressions
   use pd_scene_content_groups, only: closed_forms
-  use pd_scene_content_types, only: boundary_group, initial_group, is_box, is_set, laws_of, &
-    & scene_type, shape_group
+  use pd_scene_content_types, only: boundary_group, has_refinement, initial_group, is_box, is_set, &
+    & laws_of, scene_type, shape_group
   use pd_study_trade_closed_form, only: chain_frequency, closed_form_type, form_chain, form_hole, &
     & form_linear, form_wave
   use pd_study_trade_pull, only: pull
@@ -311,6 +311,8 @@ contains
       reason = "it needs &time method = 'explicit'"
     else if (size(scene%loads) + size(scene%boundaries) + size(scene%removed) > 0) then
       reason = 'the chain must be without loads and boundaries, and without removed shapes'
+    else if (has_refinement(scene)) then
+      reason = 'the chain must have one spacing'
     else if (size(scene%initial) /= 1) then
       reason = 'one &initial must give the wave'
     else if (scene%initial(1)%file == '' .or. scene%initial(1)%region /= '') then
