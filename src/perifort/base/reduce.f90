@@ -5,8 +5,8 @@
 !> whole multiples of 2^(30 i), from the first one down, each the part towards 0 of what the digits
 !> above leave. Sums of digits are sums of integers. Where the largest term begins with the digit i,
 !> the sum is that of the digits i, i - 1 and i - 2 of all terms: what is left out is below 2^-60 of
-!> the largest term for each. Terms beyond 9e288 are added as they come. (Demmel and Nguyen, Parallel
-!> reproducible summation, IEEE Transactions on Computers 64, 2015, cut terms in this way.)
+!> the largest term for each. Terms beyond 9e288 are added as they come. (Demmel and Nguyen,
+!> Parallel reproducible summation, IEEE Transactions on Computers 64, 2015, cut terms in this way.)
 !>
 !> What ranks exchange (`pd_base_order`) is one `add_all` or `take_largest` for some sums or an
 !> extreme. The sums of digits are exact there, too.
