@@ -219,7 +219,7 @@ contains
               ! the smaller of both horizons would not have it
               if (norm2(xi) > ratio*min(body%spacing(k), body%spacing(j))) different = different + 1
               call check(error, any(bonds%j(:bonds%n) == j), 'a bond is missing, '//rule)
-              call expect_close(error, weight(j)/body%volume(j), fraction(rule, xi(:dim), h, &
+              call expect_close(error, weight(j)/body%volume(j), part_of_volume(rule, xi(:dim), h, &
                 & delta), 1.0e-12_wp, 'volume correction, '//rule)
             end if
             if (allocated(error)) return
@@ -230,19 +230,19 @@ contains
     end subroutine expect_families
 
     !> v_c of a bond.
-    real(wp) function fraction(rule, xi, h, delta)
+    real(wp) function part_of_volume(rule, xi, h, delta)
       character(*), intent(in) :: rule
       real(wp), intent(in) :: xi(:), h, delta
 
       select case (rule)
       case ('none')
-        fraction = 1.0_wp
+        part_of_volume = 1.0_wp
       case ('exact')
-        fraction = covered_fraction(xi, h, delta)
+        part_of_volume = covered_fraction(xi, h, delta)
       case default  ! linear
-        fraction = max(0.0_wp, min(1.0_wp, (delta + h/2 - norm2(xi))/h))
+        part_of_volume = max(0.0_wp, min(1.0_wp, (delta + h/2 - norm2(xi))/h))
       end select
-    end function fraction
+    end function part_of_volume
 
   end subroutine test_families
 

@@ -108,11 +108,9 @@ contains
       n = 0
       do i = 1, size(slot)
         block = block_of(i)
-        if (i > 1) then
-          if (slot(i) == slot(i - 1) + 1_i4 .and. place_of(i) > 1) then
-            if (pass == 2) order%run_length(n) = order%run_length(n) + 1_i4
-            cycle
-          end if
+        if (goes_on(slot, i)) then
+          if (pass == 2) order%run_length(n) = order%run_length(n) + 1_i4
+          cycle
         end if
         n = n + 1
         order%begin(block + 1) = int(n + 1, i4)
@@ -132,6 +130,14 @@ contains
     order%slot = slot
     allocate (order%run_slot(0), order%run_at(0), order%run_length(0))
   end subroutine number_points
+
+  !> Whether a point goes on with the run of the one before it, in the same block.
+  pure logical function goes_on(slot, i)
+    integer(i4), intent(in) :: slot(:)
+    integer, intent(in) :: i
+    goes_on = .false.
+    if (place_of(i) > 1) goes_on = slot(i) == slot(i - 1) + 1_i4
+  end function goes_on
 
   !> The block of an owned point.
   elemental integer function block_of(point)

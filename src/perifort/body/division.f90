@@ -147,10 +147,10 @@ contains
       wanted = sum(histogram)*lower_ranks/d%n_ranks(part)
       n = size(histogram)
       so_far = 0.0_wp
-      best = huge(best)
+      best = abs(wanted)
       cut = 0
-      do i = 0, n
-        if (i > 0) so_far = so_far + histogram(i)
+      do i = 1, n
+        so_far = so_far + histogram(i)
         if (abs(so_far - wanted) < best) then
           best = abs(so_far - wanted)
           cut = i

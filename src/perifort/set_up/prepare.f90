@@ -90,11 +90,12 @@ contains
     integer, allocatable :: owner(:)
     character(:), allocatable :: reason
     logical :: divided, suits
-    integer :: i
+    integer :: i, ranks
 
-    divided = .false.
-    if (present(world)) divided = world%ranks > 1
-    call check_memory(scene, error)
+    ranks = 1
+    if (present(world)) ranks = world%ranks
+    divided = ranks > 1
+    call check_memory(scene, error, ranks=ranks)
     if (.not. allocated(error) .and. divided) call check_ranks(scene, error)
     if (allocated(error)) return
     if (present(threads)) call set_up%team%begin(threads)

@@ -33,7 +33,6 @@ contains
     type(division_type) :: division
     type(share_type), allocatable :: shares(:)
     real(wp) :: mean
-    integer :: r
 
     call work_of_body(body, 1, work)
     call divide_space(work, ranks, division)
