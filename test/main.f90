@@ -122,6 +122,7 @@ program main
   use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_set_up_consistent_weights, only: collect_set_up_consistent_weights
+  use test_set_up_ranks, only: collect_set_up_ranks
   use test_set_up_horizons, only: collect_set_up_horizons
   use test_set_up_toughness, only: collect_set_up_toughness
   use test_set_up_terms, only: collect_set_up_terms
@@ -253,6 +254,7 @@ program main
   call register('set_up_consistent_weights', collect_set_up_consistent_weights)
   call register('set_up_terms', collect_set_up_terms)
   call register('set_up_horizons', collect_set_up_horizons)
+  call register('set_up_ranks', collect_set_up_ranks)
   call register('set_up_toughness', collect_set_up_toughness)
   call register('study_limits_limits', collect_study_limits_limits)
   call register('study_trade_closed_form', collect_study_trade_closed_form)

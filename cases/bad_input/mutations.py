@@ -95,6 +95,8 @@ def bases(program, project, largest=400):
     for path in sorted(paths):
         if path.parent.name in ("fracture", "mesh_plate"):
             continue  # their small regions would be empty, and meshes are not thinned
+        if path.match("refined/plate_crack.nml"):
+            continue  # with so few cells the rims reach the layers
         whole = path.read_text(encoding="utf-8")
         text = small(whole, largest)
         number = points_of(text)

@@ -13,6 +13,6 @@ program shortest
     print '(a)', error%message
     error stop
   end if
-  print '(a, f0.4, a)', 'the wall holds the bar by ', answer%history(size(answer%history, 1), &
+  print '(a, f0.2, a)', 'the wall holds the bar by ', answer%history(size(answer%history, 1), &
     & answer%column_number('wall_reaction_x')), ' N'
 end program shortest

@@ -2,7 +2,7 @@
 module pd_set_up_prepare
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_clock, only: phase_timer_type
-  use pd_base_error, only: error_type, status_input
+  use pd_base_error, only: error_type, fail, status_input
   use pd_base_text, only: to_text
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
@@ -97,6 +97,8 @@ contains
     divided = ranks > 1
     call check_memory(scene, error, ranks=ranks)
     if (.not. allocated(error) .and. divided) call check_ranks(scene, error)
+    if (.not. allocated(error) .and. divided .and. present(terms)) call fail(error, &
+      & 'a run on several ranks cannot have terms of the force that a program gives')
     if (allocated(error)) return
     if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)

@@ -67,6 +67,7 @@ contains
     do i = 1, size(scene%probes)
       if (scene%probes(i)%interpolate) call refuse('probe', i, 'interpolate', 'interpolation')
     end do
+    if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
     if (scene%output%fragments) call refuse('output', 1, 'fragments', 'fragments')
     if (allocated(scene%output%fields)) then
       if (any(scene%output%fields == 'fragment')) call refuse('output', 1, 'fields', &

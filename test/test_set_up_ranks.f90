@@ -1,0 +1,158 @@
+!> What a run on several ranks refuses, by name, and what it does not.
+module test_set_up_ranks
+  use pd_base_error, only: fault_type => error_type
+  use pd_base_kinds, only: wp
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_ranks, only: check_ranks, reproducible_layer
+  use bodies, only: box_scene, expect_true
+  use testdrive, only: error_type, new_unittest, unittest_type
+  implicit none (type, external)
+  private
+  public :: collect_set_up_ranks
+
+  integer, parameter :: kinds = 22   !! of scenes that are refused
+
+contains
+
+  subroutine collect_set_up_ranks(testsuite)
+    type(unittest_type), allocatable, intent(out) :: testsuite(:)
+    testsuite = [ &
+      & new_unittest('what is refused', test_refused), &
+      & new_unittest('what is not', test_allowed)]
+  end subroutine collect_set_up_ranks
+
+  !> Each has an error that names it.
+  subroutine test_refused(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    character(40) :: name
+    integer :: kind
+
+    do kind = 1, kinds
+      call refused_scene(kind, scene, name)
+      call check_ranks(scene, fault)
+      call expect_true(error, allocated(fault), 'not refused: '//trim(name))
+      if (allocated(error)) return
+      call expect_true(error, index(fault%message, 'several ranks cannot have '//trim(name)) > 0, &
+        & trim(name)//' is refused as: '//fault%message)
+    end do
+  end subroutine test_refused
+
+  !> A scene with one thing that is refused, and what the error calls it.
+  subroutine refused_scene(kind, scene, name)
+    integer, intent(in) :: kind
+    type(scene_type), intent(out) :: scene
+    character(*), intent(out) :: name
+
+    call box_scene([10, 10], 0.1_wp, 0.3_wp, scene)
+    deallocate (scene%boundaries, scene%loads, scene%initial, scene%probes)
+    allocate (scene%boundaries(1), scene%loads(1), scene%initial(1), scene%probes(1))
+    select case (kind)
+    case (1)
+      name = 'a mesh'
+      scene%bodies(1)%mesh = 'part.msh'
+    case (2)
+      name = 'a surface'
+      scene%bodies(1)%surface = 'part.stl'
+    case (3)
+      name = 'growth by events'
+      scene%time%method = 'relaxation'
+      scene%materials(1)%critical_stretch = 0.01_wp
+    case (4)
+      name = 'horizons of points'
+      scene%horizon%local = .true.
+    case (5)
+      name = "surface_correction = 'consistent'"
+      scene%horizon%surface_correction = 'consistent'
+    case (6)
+      name = 'a pin'
+      scene%boundaries(1)%motion = 'pin'
+    case (7)
+      name = 'an absorbing boundary'
+      scene%boundaries(1)%absorbing = .true.
+    case (8)
+      name = 'springs'
+      scene%loads(1)%stiffness(2) = 1.0_wp
+    case (9)
+      name = 'a file of initial values'
+      scene%initial(1)%file = 'state.txt'
+    case (10)
+      name = 'a temperature change'
+      scene%initial(1)%temperature_change = 10.0_wp
+    case (11)
+      name = 'a temperature change'
+      scene%initial(1)%temperature_text = 't'
+    case (12)
+      name = '&rigid'
+      deallocate (scene%rigids)
+      allocate (scene%rigids(1))
+    case (13)
+      name = '&contact'
+      deallocate (scene%contacts)
+      allocate (scene%contacts(1))
+    case (14)
+      name = '&tip'
+      deallocate (scene%tips)
+      allocate (scene%tips(1))
+    case (15)
+      name = '&section'
+      deallocate (scene%sections)
+      allocate (scene%sections(1))
+    case (16)
+      name = '&line'
+      deallocate (scene%lines)
+      allocate (scene%lines(1))
+    case (17)
+      name = '&j_integral'
+      deallocate (scene%j_integrals)
+      allocate (scene%j_integrals(1))
+    case (18)
+      name = 'interpolation'
+      scene%probes(1)%interpolate = .true.
+    case (19)
+      name = 'fragments'
+      scene%output%fragments = .true.
+    case (20)
+      name = "the field 'fragment'"
+      scene%output%fields = [character(len(scene%output%fields)) :: 'damage', 'fragment']
+    case (21)
+      name = '&refine'
+      allocate (scene%refines(1))
+    case default
+      name = 'cells'
+      scene%output%cells = .true.
+    end select
+  end subroutine refused_scene
+
+  !> Explicit runs with cracks, boundaries, loads and probes; static equilibrium, also with bonds that
+  !> break in load steps.
+  subroutine test_allowed(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    call box_scene([10, 10], 0.1_wp, 0.3_wp, scene)
+    deallocate (scene%boundaries, scene%loads, scene%initial, scene%probes, scene%cracks)
+    allocate (scene%boundaries(2), scene%loads(1), scene%initial(1), scene%probes(1))
+    allocate (scene%cracks(1))
+    scene%materials(1)%critical_stretch = 0.01_wp
+    scene%materials(1)%scatter = 10.0_wp
+    scene%horizon%surface_correction = 'energy'
+    call check_ranks(scene, fault)
+    call expect_true(error, .not. allocated(fault), 'an explicit run is refused')
+    scene%time%method = 'relaxation'
+    scene%relaxation%growth = 'load_steps'
+    call check_ranks(scene, fault)
+    call expect_true(error, .not. allocated(fault), 'growth in load steps is refused')
+    deallocate (scene%cracks)
+    allocate (scene%cracks(0))
+    call box_scene([10, 10], 0.1_wp, 0.3_wp, scene)
+    scene%time%method = 'relaxation'
+    call check_ranks(scene, fault)
+    call expect_true(error, .not. allocated(fault), 'static equilibrium is refused')
+    call expect_true(error, reproducible_layer(.false.) == 8 .and. reproducible_layer(.true.) == &
+      & 16, 'blocks of rows')
+  end subroutine test_allowed
+
+end module test_set_up_ranks
