@@ -98,7 +98,7 @@ contains
         allocate (start(last - first + 1), axis(last - first + 1))
         n = 0
         do p = first, last
-          axis(p - first + 1) = maxloc(d%upper(:, p) - d%lower(:, p), dim=1)
+          axis(p - first + 1) = longest_side(d%upper(:, p) - d%lower(:, p))
           start(p - first + 1) = n
           n = n + layers_of(work, d, p, axis(p - first + 1))
         end do
@@ -123,6 +123,18 @@ contains
       end do
     end associate
   end subroutine divide_space
+
+  !> The number of the longest side; of sides as long as each other the last one, across which the
+  !> rows of a lattice stay whole.
+  pure integer function longest_side(sides) result(axis)
+    real(wp), intent(in) :: sides(:)
+    integer :: c
+
+    axis = size(sides)
+    do c = size(sides) - 1, 1, -1
+      if (sides(c) > sides(axis)*(1 + 1.0e-6_wp)) axis = c
+    end do
+  end function longest_side
 
   !> Layers of a part across an axis: its sides are multiples of the layers' thickness.
   pure integer function layers_of(work, division, part, axis) result(layers)

@@ -40,6 +40,7 @@ module pd_family_lattice
     logical :: mixed = .false.                 !! bonds are computed in single precision
     logical :: has_copies = .false.            !! some slots are copies of other ranks' points,
                                                !! whose bonds are not all here
+    integer(i8) :: last_owned = huge(0_i8)     !! the last slot that is no copy
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
@@ -174,6 +175,7 @@ contains
     family%words = (family%most_bonds + word_bits - 1)/word_bits
     call place_points(body, family, error)
     if (allocated(error)) return
+    if (family%has_copies) family%last_owned = maxval(body%slot(:body%order%n_owned))
     call find_classes(family%grids, family%alive, body%material, family%words, family%key_bits, &
       & family%class_of, family%first_of, family%n_bonds)
     call find_blocks(family)
@@ -331,6 +333,8 @@ contains
   end function grid_at
 
   !> Cover the live slots with blocks. Rows begin at multiples of their length, and so do blocks.
+  !> Copies behind the last owned slot need none: loops that add to both ends of a bond add forward,
+  !> and what copies have comes from their owners.
   subroutine find_blocks(family)
     type(lattice_family_type), intent(inout) :: family
     integer(i8) :: k, n
@@ -340,6 +344,7 @@ contains
     do pass = 1, 2
       n = 0_i8
       do k = 1, family%n_slots - family%block_length + 1, family%block_length
+        if (k > family%last_owned) exit
         if (all(family%alive(k:k + family%block_length - 1) == 0_i1)) cycle
         n = n + 1
         if (pass == 2) family%block(n) = k
