@@ -8,7 +8,7 @@ module pd_base_order
   use pd_base_kinds, only: wp, i4, i8
   implicit none (type, external)
   private
-  public :: order_type, ranks_type, block_points, number_of, owned_point, owns
+  public :: order_type, ranks_type, block_points, number_of, owned_point, owns, place_in
   public :: number_points, slots_of_block, take_block, put_block, ascending_order
 
   integer, parameter :: block_points = 256  !! points of a block
@@ -163,23 +163,31 @@ contains
   pure integer function owned_point(order, number) result(point)
     type(order_type), intent(in) :: order  !! the points that are owned
     integer(i8), intent(in) :: number      !! its number among the points of all ranks
+
+    if (allocated(order%number)) then
+      point = place_in(order%number, number)
+    else
+      point = 0
+      if (number <= order%n_owned) point = int(number)
+    end if
+  end function owned_point
+
+  !> The place of a number among ascending ones; 0 if it is not there.
+  pure integer function place_in(numbers, number) result(place)
+    integer(i8), intent(in) :: numbers(:)  !! (n) ascending
+    integer(i8), intent(in) :: number      !! to be found
     integer :: low, high
 
-    point = 0
-    if (.not. allocated(order%number)) then
-      if (number <= order%n_owned) point = int(number)
-      return
-    end if
     low = 1
-    high = order%n_owned
+    high = size(numbers)
     do while (low <= high)
-      point = low + (high - low)/2
-      if (order%number(point) == number) return
-      if (order%number(point) < number) low = point + 1
-      if (order%number(point) > number) high = point - 1
+      place = low + (high - low)/2
+      if (numbers(place) == number) return
+      if (numbers(place) < number) low = place + 1
+      if (numbers(place) > number) high = place - 1
     end do
-    point = 0
-  end function owned_point
+    place = 0
+  end function place_in
 
   !> Whether the point with this number here (0: none) is one that the process owns.
   elemental logical function owns(order, point)

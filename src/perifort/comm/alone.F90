@@ -6,10 +6,6 @@ submodule(pd_comm_world) alone
 
 contains
 
-  module procedure has_messages
-    has_messages = .false.
-  end procedure has_messages
-
   module procedure begin_world
     world%rank = 0
     world%ranks = 1
@@ -19,17 +15,16 @@ contains
   end procedure end_world
 
   module procedure abort_world
-    if (status >= 0) return  ! who calls ends by itself
+    associate (unused_status => status)  ! who calls ends by itself
+    end associate
   end procedure abort_world
 
   module procedure add_all
-    self%sums = self%sums + 1_i8
-    if (size(values) < 0) call internal_fault('sums of no rank')
+    if (self%ranks > 1 .and. size(values) > 0) call internal_fault('there is no other rank')
   end procedure add_all
 
   module procedure take_largest
-    self%sums = self%sums + 1_i8
-    if (size(values) < 0) call internal_fault('extremes of no rank')
+    if (self%ranks > 1 .and. size(values) > 0) call internal_fault('there is no other rank')
   end procedure take_largest
 
   module procedure share
@@ -50,12 +45,6 @@ contains
     if (self%ranks > 1 .or. number < 0_i8) call internal_fault('there is no other rank')
     before = 0_i8
   end procedure number_before
-
-  module procedure swap
-    if (self%ranks > 1) call internal_fault('there is no other rank')
-    got_number = number
-    got = values
-  end procedure swap
 
   module procedure wait_for_all
     if (self%ranks > 1) call internal_fault('there is no other rank')

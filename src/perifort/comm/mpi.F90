@@ -9,15 +9,12 @@ submodule(pd_comm_world) messages
     & MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, MPI_Isend, MPI_MAX, MPI_Request, MPI_STATUSES_IGNORE, &
     & MPI_SUM, MPI_THREAD_FUNNELED, MPI_Waitall
   use pd_base_error, only: internal_fault
+  use pd_base_order, only: place_in
   implicit none (type, external)
 
   integer, parameter :: tag = 7
 
 contains
-
-  module procedure has_messages
-    has_messages = .true.
-  end procedure has_messages
 
   module procedure begin_world
     logical :: begun
@@ -45,7 +42,6 @@ contains
   end procedure abort_world
 
   module procedure add_all
-    self%sums = self%sums + 1_i8
     call MPI_Allreduce(MPI_IN_PLACE, values, size(values), MPI_DOUBLE_PRECISION, MPI_SUM, &
       & MPI_COMM_WORLD)
   end procedure add_all
@@ -54,7 +50,6 @@ contains
     real(wp), parameter :: beyond = 2*(huge(1.0_wp)/2)
     integer :: i
 
-    self%sums = self%sums + 1_i8
     ! ranks may reduce in different orders, in which comparisons with NaN would differ
     do i = 1, size(values)
       if (ieee_is_nan(values(i))) values(i) = beyond
@@ -100,15 +95,13 @@ contains
         end do
       end do
     end do
-    self%messages = self%messages + size(self%neighbour)
-    self%bytes_sent = self%bytes_sent + 8_i8*size(sent)
   end procedure share
 
   module procedure join
     integer :: wanted(0:self%ranks - 1), asked(0:self%ranks - 1)
     integer :: wanted_at(0:self%ranks), asked_at(0:self%ranks), next(0:self%ranks - 1)
     integer(i8), allocatable :: want(:), ask(:)
-    integer :: r, i, n, low, high, middle
+    integer :: r, i, n
 
     wanted = 0
     do i = 1, size(owner)
@@ -135,20 +128,9 @@ contains
     if (allocated(self%send_slot)) deallocate (self%send_slot)
     allocate (self%send_slot(size(ask)))
     do i = 1, size(ask)
-      low = 1
-      high = size(owned_number)
-      do while (low < high)
-        middle = low + (high - low)/2
-        if (owned_number(middle) < ask(i)) then
-          low = middle + 1
-        else
-          high = middle
-        end if
-      end do
-      if (high < 1) call internal_fault('a rank is asked for a point that it does not own')
-      if (owned_number(low) /= ask(i)) &
-        & call internal_fault('a rank is asked for a point that it does not own')
-      self%send_slot(i) = owned_slot(low)
+      n = place_in(owned_number, ask(i))
+      if (n == 0) call internal_fault('a rank is asked for a point that it does not own')
+      self%send_slot(i) = owned_slot(n)
     end do
     self%neighbour = pack([(r, r=0, self%ranks - 1)], wanted + asked > 0)
     n = size(self%neighbour)
@@ -175,22 +157,6 @@ contains
     call MPI_Exscan(number, before, 1, MPI_INTEGER8, MPI_SUM, MPI_COMM_WORLD)
     if (self%rank == 0) before = 0_i8
   end procedure number_before
-
-  module procedure swap
-    integer :: at(0:self%ranks - 1), got_at(0:self%ranks - 1), r
-
-    allocate (got_number(0:self%ranks - 1))
-    call MPI_Alltoall(number, 1, MPI_INTEGER, got_number, 1, MPI_INTEGER, MPI_COMM_WORLD)
-    at(0) = 0
-    got_at(0) = 0
-    do r = 1, self%ranks - 1
-      at(r) = at(r - 1) + number(r - 1)
-      got_at(r) = got_at(r - 1) + got_number(r - 1)
-    end do
-    allocate (got(sum(got_number)))
-    call MPI_Alltoallv(values, number, at, MPI_DOUBLE_PRECISION, got, got_number, got_at, &
-      & MPI_DOUBLE_PRECISION, MPI_COMM_WORLD)
-  end procedure swap
 
   module procedure wait_for_all
     call MPI_Barrier(MPI_COMM_WORLD)

@@ -7,8 +7,7 @@ module pd_comm_world
   use pd_base_order, only: ranks_type
   implicit none (type, external)
   private
-  public :: world_type, begin_world, end_world, abort_world, has_messages, &
-    & wait_for_turn
+  public :: world_type, begin_world, end_world, abort_world, wait_for_turn
 
   !> All ranks, and of one body's halo: which values go where.
   type, extends(ranks_type) :: world_type
@@ -21,9 +20,6 @@ module pd_comm_world
     integer(i4), allocatable :: send_slot(:)       !! slots of points that others have copies of
     integer, allocatable :: take_first(:)          !! the same of `take_slot`
     integer(i4), allocatable :: take_slot(:)       !! slots of copies, neighbour by neighbour
-    integer(i8) :: bytes_sent = 0_i8               !! of halos, since the run began
-    integer(i8) :: messages = 0_i8                 !! of halos
-    integer(i8) :: sums = 0_i8                     !! `add_all` and `take_largest`
   contains
     procedure :: add_all
     procedure :: take_largest
@@ -31,16 +27,10 @@ module pd_comm_world
     procedure :: join
     procedure :: collect
     procedure :: number_before
-    procedure :: swap
     procedure :: wait_for_all
   end type world_type
 
   interface
-    !> Whether the program was built with messages between processes.
-    module logical function has_messages()
-      implicit none (type, external)
-    end function has_messages
-
     !> Begin: the rank of this process and how many there are.
     module subroutine begin_world(world)
       implicit none (type, external)
@@ -107,16 +97,6 @@ module pd_comm_world
       real(wp), intent(in) :: values(:)                    !! of this rank; any number
       real(wp), allocatable, intent(out) :: all_values(:)  !! on rank 0; of size 0 elsewhere
     end subroutine collect
-
-    !> Send values to ranks and take what they send.
-    module subroutine swap(self, number, values, got_number, got)
-      implicit none (type, external)
-      class(world_type), intent(inout) :: self
-      integer, intent(in) :: number(0:)                   !! how many go to each rank
-      real(wp), intent(in) :: values(:)                   !! those, rank by rank
-      integer, allocatable, intent(out) :: got_number(:)  !! (0:ranks - 1) how many came from each
-      real(wp), allocatable, intent(out) :: got(:)        !! those, rank by rank
-    end subroutine swap
 
     !> Wait until all ranks are here.
     module subroutine wait_for_all(self)

@@ -126,7 +126,7 @@ contains
         if (world%reproducible .and. .not. suits) call scene_fault(error, scene, 'horizon', 1, &
           & 'family', '--reproducible needs lattice families: on lists forces depend on the '// &
           & 'ranks in their last digits', reason)
-        if (world%reproducible .and. .not. divided) call find_lowest(system%body)
+        if (world%reproducible) call find_lowest(system%body)
         system%body%order%reproducible = world%reproducible
       end if
       if (allocated(error)) return

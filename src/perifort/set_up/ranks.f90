@@ -2,6 +2,7 @@
 !> count together.
 module pd_set_up_ranks
   use pd_base_error, only: error_type
+  use pd_base_lanes, only: lanes
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_reduce, only: count_of_ranks
   use pd_base_text, only: to_text
@@ -95,7 +96,7 @@ contains
   !> ranks: loops work on blocks of so many points of a row.
   pure integer function reproducible_layer(mixed) result(points)
     logical, intent(in) :: mixed  !! bonds in single precision
-    points = merge(16, 8, mixed)
+    points = merge(2*lanes, lanes, mixed)
   end function reproducible_layer
 
   !> Reduce a body to the points of this rank and copies of others. An error if some rank would have
@@ -114,7 +115,6 @@ contains
     integer :: i
     real(wp) :: farthest
 
-    if (world%reproducible) call find_lowest(body)
     call work_of_body(body, blocks, work)
     call divide_space(work, world%ranks, division)
     i = minloc(division%work, dim=1) - 1

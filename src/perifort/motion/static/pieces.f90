@@ -3,7 +3,7 @@
 module pd_motion_static_pieces
   use pd_base_joining, only: each_alone, unite, settle_groups
   use pd_base_kinds, only: wp, i4, i8
-  use pd_base_order, only: ascending_order
+  use pd_base_order, only: ascending_order, place_in
   use pd_base_reduce, only: any_of_ranks, count_of_ranks
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type, share_halo
@@ -125,24 +125,6 @@ contains
     call body%order%ranks%add_all(counted)
     pieces%points = nint(counted, i8)
   end subroutine join_over_ranks
-
-  !> The place of a number in ascending ones, which have it.
-  pure integer function place_in(numbers, number) result(place)
-    integer(i8), intent(in) :: numbers(:), number
-    integer :: low, high
-
-    low = 1
-    high = size(numbers)
-    do while (low < high)
-      place = low + (high - low)/2
-      if (numbers(place) < number) then
-        low = place + 1
-      else
-        high = place
-      end if
-    end do
-    place = low
-  end function place_in
 
   !> Slots piece by piece.
   pure subroutine list_slots(body, pieces)
