@@ -26,16 +26,16 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
     type(fault_type), allocatable :: fault
-    character(40) :: name
+    character(:), allocatable :: name
     integer :: kind
 
     do kind = 1, kinds
       call refused_scene(kind, scene, name)
       call check_ranks(scene, fault)
-      call expect_true(error, allocated(fault), 'not refused: '//trim(name))
+      call expect_true(error, allocated(fault), 'not refused: '//name)
       if (allocated(error)) return
-      call expect_true(error, index(fault%message, 'several ranks cannot have '//trim(name)) > 0, &
-        & trim(name)//' is refused as: '//fault%message)
+      call expect_true(error, index(fault%message, 'several ranks cannot have '//name) > 0, &
+        & name//' is refused as: '//fault%message)
     end do
   end subroutine test_refused
 
@@ -43,7 +43,7 @@ contains
   subroutine refused_scene(kind, scene, name)
     integer, intent(in) :: kind
     type(scene_type), intent(out) :: scene
-    character(*), intent(out) :: name
+    character(:), allocatable, intent(out) :: name
 
     call box_scene([10, 10], 0.1_wp, 0.3_wp, scene)
     deallocate (scene%boundaries, scene%loads, scene%initial, scene%probes)
@@ -125,8 +125,8 @@ contains
     end select
   end subroutine refused_scene
 
-  !> Explicit runs with cracks, boundaries, loads and probes; static equilibrium, also with bonds that
-  !> break in load steps.
+  !> Explicit runs with cracks, boundaries, loads and probes; static equilibrium, also with bonds
+  !> that break in load steps.
   subroutine test_allowed(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
