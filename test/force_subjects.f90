@@ -9,6 +9,7 @@ module force_subjects
   use pd_law_laws, only: all_laws, law_item_type, law_table_type
   use pd_law_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
+  use pd_family_composite, only: composite_family_type, composite_suits, new_composite_family
   use pd_family_family, only: family_type
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
@@ -16,6 +17,7 @@ module force_subjects
   use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
     & volume_linear_extended, &
     & volume_exact
+  use pd_force_composite, only: prepare_composite
   use pd_force_forces, only: internal_force
   use pd_force_generic_bonds, only: begin_laws, refresh_bonds
   use pd_force_generic_points, only: generic_point_dilatation
@@ -32,15 +34,16 @@ module force_subjects
   !> The kinds of families that must keep the contract. `tables`: lists where every cluster has
   !> tables, also those that no other shares.
   !> `generic`: a lattice whose laws are computed on the generic pass.
-  character(8), parameter :: kinds(*) = [character(8) :: 'list', 'tables', 'lattice', 'mixed', &
-    & 'generic']
+  !> `composite`: points on two grids and on none.
+  character(9), parameter :: kinds(*) = [character(9) :: 'list', 'tables', 'lattice', 'mixed', &
+    & 'generic', 'composite']
 
   !> Of every body here [m]; a power of 2, so that positions are exact.
   real(wp), parameter :: spacing = 2.0_wp**(-10)
 
   !> One body under test, and which terms its force has.
   type :: subject_type
-    character(8) :: kind = 'list'
+    character(9) :: kind = 'list'
     integer :: dim = 1
     real(wp) :: poissons_ratio = 0.2_wp
     logical :: bond_based = .false.
@@ -80,7 +83,11 @@ contains
     type(workspace_type), intent(inout) :: workspace
     type(list_family_type), allocatable :: list
     type(lattice_family_type), allocatable :: lattice
+    type(composite_family_type), allocatable :: composite
     type(fault_type), allocatable :: fault
+    character(:), allocatable :: reason
+    logical, allocatable :: listed(:)
+    logical :: suits
 
     select case (kind)
     case ('list', 'tables')
@@ -89,6 +96,12 @@ contains
       workspace%list%key_bits = key_bits
       workspace%list%least_shared = merge(1, least_shared, kind == 'tables')
       call move_alloc(list, family)
+    case ('composite')
+      call part_grids(body)
+      allocate (composite)
+      call composite_suits(body, rule, suits, reason, listed)
+      call new_composite_family(body, rule, listed, breakable, composite, fault)
+      call move_alloc(composite, family)
     case default
       allocate (lattice)
       call new_lattice_family(body, rule, breakable, kind == 'mixed', lattice, fault, key_bits)
@@ -96,12 +109,27 @@ contains
     end select
   end subroutine build_family
 
+  !> Points of one grid on two grids and, where there are many, some on none: what is computed must
+  !> not change.
+  subroutine part_grids(body)
+    type(body_type), intent(inout) :: body
+    real(wp) :: middle
+
+    middle = sum(body%x(:, 1))/body%n_points
+    body%grids = [body%grids(1), body%grids(1)]
+    where (body%x(:, 1) > middle) body%grid = 2_i2
+    if (body%n_points > 4) where (body%x(:, body%dim) > 0.8_wp*maxval(body%x(:, body%dim))) &
+      & body%grid = 0_i2
+  end subroutine part_grids
+
   !> What is kept of the model once that is complete.
   subroutine finish_family(subject)
     type(subject_type), intent(inout) :: subject
     select type (family => subject%family)
     type is (lattice_family_type)
       call build_weights(family, subject%model, subject%workspace%lattice)
+    type is (composite_family_type)
+      call prepare_composite(family, subject%model, subject%workspace)
     end select
   end subroutine finish_family
 

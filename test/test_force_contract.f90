@@ -645,7 +645,8 @@ contains
     integer :: kind, dim, i
 
     do kind = 1, size(kinds)
-      if (kinds(kind) == 'list' .or. kinds(kind) == 'tables') cycle
+      ! keys are those of lattices; a composite has the same
+      if (any(kinds(kind) == [character(9) :: 'list', 'tables', 'composite'])) cycle
       do dim = 1, 3
         subject = subject_type(kind=kinds(kind), dim=dim, surface=.true., two_materials=.true., &
           & hole=.true., crack=.true., dilatant=dim == 1)

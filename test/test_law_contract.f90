@@ -19,7 +19,7 @@ module test_law_contract
   private
   public :: collect_law_contract
 
-  character(8), parameter :: kinds(*) = [character(8) :: 'lattice', 'list']
+  character(9), parameter :: kinds(*) = [character(9) :: 'lattice', 'list', 'composite']
 
 contains
 

@@ -3,7 +3,7 @@ module pd_family_cells
   use pd_base_kinds, only: wp, i2, i4
   implicit none (type, external)
   private
-  public :: cells_type, sort_into_cells, neighbours_of, joins_labels, brute_force_neighbours, &
+  public :: cells_type, sort_into_cells, neighbours_of, points_across, brute_force_neighbours, &
     & cell_of, cells_around, rows_around
 
   !> Points sorted by cells; cells are no smaller than the reach they were made for.
@@ -129,27 +129,69 @@ contains
     call visit(x, half_reach, cells, k, number, found)
   end subroutine neighbours_of
 
-  !> Whether two points with different labels are neighbours.
-  logical function joins_labels(x, half_reach, cells, label) result(joins)
+  !> Which points have a neighbour with another label.
+  subroutine points_across(x, half_reach, cells, label, across)
     real(wp), intent(in) :: x(:, :)        !! (n, dim) positions [m]
     real(wp), intent(in) :: half_reach(:)  !! (n) half of the reach of each point [m]
     type(cells_type), intent(in) :: cells  !! of these points, at least as wide as the largest reach
     integer(i2), intent(in) :: label(:)    !! (n) of each point, such as the number of its grid
-    integer(i4), allocatable :: found(:)
-    integer(i4) :: number
-    integer :: k
+    logical, intent(out) :: across(:)      !! (n) whether a point has one
+    integer(i2), allocatable :: lowest(:), highest(:)
+    integer :: c, k
 
-    joins = .false.
-    !$omp parallel default(none) shared(x, half_reach, cells, label) private(found, number, k) &
-    !$omp reduction(.or.:joins)
-    !$omp do schedule(dynamic, 512)
-    do k = 1, size(x, 1)
-      if (joins) cycle
-      call neighbours_of(x, half_reach, cells, k, number, found)
-      if (any(label(found(:number)) /= label(k))) joins = .true.
+    ! of each cell; of one without points the lowest is above the highest
+    allocate (lowest(size(cells%first) - 1), highest(size(cells%first) - 1))
+    do c = 1, size(lowest)
+      associate (points => cells%order(cells%first(c):cells%first(c + 1) - 1))
+        lowest(c) = minval(label(points))
+        highest(c) = maxval(label(points))
+      end associate
     end do
-    !$omp end parallel
-  end function joins_labels
+    !$omp parallel do schedule(dynamic, 512) default(none) private(k) &
+    !$omp shared(x, half_reach, cells, label, across, lowest, highest)
+    do k = 1, size(x, 1)
+      across(k) = has_other(x, half_reach, cells, label, lowest, highest, k)
+    end do
+  end subroutine points_across
+
+  !> Whether point `k` has a neighbour with another label. Cells whose points have that of `k` are
+  !> passed over.
+  pure logical function has_other(x, half_reach, cells, label, lowest, highest, k)
+    real(wp), intent(in) :: x(:, :)
+    real(wp), intent(in) :: half_reach(:)
+    type(cells_type), intent(in) :: cells
+    integer(i2), intent(in) :: label(:), lowest(:), highest(:)
+    integer, intent(in) :: k
+    integer :: i(3), low(3), high(3), cx, cy, cz, at, m, j
+
+    has_other = .true.
+    i = cell_numbers(cells, int(cells%cell(k)))
+    low = max(i - 1, 0)
+    high = min(i + 1, cells%count - 1)
+    do cz = low(3), high(3)
+      do cy = low(2), high(2)
+        do cx = low(1), high(1)
+          at = 1 + cx + cells%count(1)*(cy + cells%count(2)*cz)
+          if (lowest(at) == label(k) .and. highest(at) == label(k)) cycle
+          do m = cells%first(at), cells%first(at + 1) - 1
+            j = cells%order(m)
+            if (label(j) == label(k)) cycle
+            if (sum((x(j, :) - x(k, :))**2) <= (half_reach(k) + half_reach(j))**2) return
+          end do
+        end do
+      end do
+    end do
+    has_other = .false.
+  end function has_other
+
+  !> The numbers of a cell along x, y and z, from 0.
+  pure function cell_numbers(cells, cell) result(i)
+    type(cells_type), intent(in) :: cells
+    integer, intent(in) :: cell
+    integer :: i(3)
+    i = [mod(cell - 1, cells%count(1)), mod((cell - 1)/cells%count(1), cells%count(2)), &
+      & (cell - 1)/(cells%count(1)*cells%count(2))]
+  end function cell_numbers
 
   !> The cells around a cell and itself, as ranges of places in `order`: those along x stand one
   !> after another.
@@ -160,8 +202,7 @@ contains
     integer, intent(out) :: number             !! of rows
     integer :: i(3), low(3), high(3), cy, cz, at
 
-    i = [mod(cell - 1, cells%count(1)), mod((cell - 1)/cells%count(1), cells%count(2)), &
-      & (cell - 1)/(cells%count(1)*cells%count(2))]
+    i = cell_numbers(cells, cell)
     low = max(i - 1, 0)
     high = min(i + 1, cells%count - 1)
     number = 0
@@ -186,8 +227,7 @@ contains
     real(wp) :: here(3), d2
     integer :: i(3), low(3), high(3), cx, cy, cz, at, c, m, j
 
-    i = [mod(cells%cell(k) - 1, cells%count(1)), mod((cells%cell(k) - 1)/cells%count(1), &
-      & cells%count(2)), (cells%cell(k) - 1)/(cells%count(1)*cells%count(2))]
+    i = cell_numbers(cells, int(cells%cell(k)))
     low = max(i - 1, 0)
     high = min(i + 1, cells%count - 1)
     here = 0.0_wp

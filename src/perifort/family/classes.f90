@@ -15,17 +15,20 @@ contains
 
   !> Number the kinds of surroundings: slots of the same grid and material with the same members are
   !> of one class. A key finds the class, the members themselves decide.
-  subroutine find_classes(grids, alive, material, words, key_bits, class_of, first_of, n_bonds)
+  subroutine find_classes(grids, alive, material, apart, words, key_bits, class_of, first_of, &
+    & n_bonds)
     type(offsets_type), intent(in) :: grids(:)  !! (any number) with shifts set
     integer(i1), intent(in) :: alive(:)     !! 1 where a slot holds a point
     integer(i2), intent(in) :: material(:)  !! of each slot
+    logical, intent(in) :: apart(:)         !! slots in other classes than all that are not apart
     integer, intent(in) :: words            !! of 64-bit words that hold a bit for each offset
     integer(i8), intent(in) :: key_bits     !! bits of keys that count
     integer(i4), allocatable, intent(out) :: class_of(:)  !! of each slot, 0: dead
     integer(i4), allocatable, intent(out) :: first_of(:)  !! the first slot of each class
     integer(i8), intent(out) :: n_bonds     !! directed ones
     type(lookup_type) :: classes
-    integer(i8), allocatable :: kind(:, :)     ! grid and material, bits of the members; 0: dead
+    ! grid, material and whether it is apart, bits of the members; 0: dead
+    integer(i8), allocatable :: kind(:, :)
     integer(i8), allocatable :: kind_of(:, :)  ! the same of each class
     integer(i8) :: first, last
     integer :: g
@@ -36,7 +39,7 @@ contains
     do g = 1, size(grids)
       do first = grids(g)%first, grids(g)%last, chunk
         last = min(first + chunk - 1, grids(g)%last)
-        call find_kinds(grids(g), g, alive, material, words, first, last, kind, n_bonds)
+        call find_kinds(grids(g), g, alive, material, apart, words, first, last, kind, n_bonds)
         call number_kinds(first, last, kind, key_bits, classes, kind_of, class_of, first_of)
       end do
     end do
@@ -44,11 +47,12 @@ contains
   end subroutine find_classes
 
   !> What the slots from `first` to `last` of grid number `g` are; adds their bonds to `n_bonds`.
-  subroutine find_kinds(grid, g, alive, material, words, first, last, kind, n_bonds)
+  subroutine find_kinds(grid, g, alive, material, apart, words, first, last, kind, n_bonds)
     type(offsets_type), intent(in) :: grid
     integer, intent(in) :: g, words
     integer(i1), intent(in) :: alive(:)
     integer(i2), intent(in) :: material(:)
+    logical, intent(in) :: apart(:)
     integer(i8), intent(in) :: first, last
     integer(i8), intent(inout) :: kind(0:, :)
     integer(i8), intent(inout) :: n_bonds
@@ -57,11 +61,12 @@ contains
 
     count = 0_i8
     !$omp parallel do schedule(static) default(none) reduction(+:count) private(k, w, o, bits) &
-    !$omp shared(grid, g, alive, material, words, first, last, kind)
+    !$omp shared(grid, g, alive, material, apart, words, first, last, kind)
     do k = first, last
       kind(0, k - first + 1) = 0_i8
       if (alive(k) == 0_i1) cycle
       kind(0, k - first + 1) = ior(ishft(int(g, i8), 32), int(material(k), i8))
+      if (apart(k)) kind(0, k - first + 1) = ibset(kind(0, k - first + 1), 62)
       do w = 0, words - 1
         bits = 0_i8
         do o = 1, min(word_bits, grid%n - w*word_bits)

@@ -2,7 +2,7 @@
 !> points that follow each other lie close together, and the points that some of the eight have as
 !> family members. Loops then work on eight bonds at a time, all with the same other end.
 module pd_family_clusters
-  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_base_lanes, only: lanes
   use pd_family_cells, only: cells_type, sort_into_cells
   implicit none (type, external)
@@ -84,12 +84,13 @@ contains
   !> The members of all clusters of the points `x` (n, dim), which are in the order of `rows`: those
   !> of cluster c stand from `start(c)` to `start(c+1) - 1`, ascending, each with the bits of the
   !> lanes whose family it is in. Two points are neighbours if they are no further apart than the
-  !> sum of their `half_reach` and the larger one of their `own` [m].
-  subroutine collect_members(x, half_reach, own, rows, start, member, bits)
+  !> sum of their `half_reach` and the larger one of their `own` [m], and do not have the same label.
+  subroutine collect_members(x, half_reach, own, label, rows, start, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)  !! (n, dim) positions in the order of `rows` [m]
     real(wp), intent(in), contiguous :: half_reach(:)   !! (n) half of the reach of each point [m]
     real(wp), intent(in), contiguous :: own(:)
       !! (n) what reaches farther by the larger one of both ends [m]
+    integer(i2), intent(in), contiguous :: label(:)     !! (n) of each point; 0: none, like no other
     type(rows_type), intent(in) :: rows                 !! as `order_in_rows` made them
     integer(i8), allocatable, intent(out) :: start(:)
       !! (clusters + 1) first member of each cluster
@@ -99,16 +100,18 @@ contains
     integer(i4) :: no_member(0)
     integer(i1) :: no_bits(0)
     real(wp) :: most
+    logical :: labelled
     integer :: c, found
 
     most = maxval(half_reach) + maxval(own)
+    labelled = any(label /= 0_i2)
     allocate (start((size(x, 1) + lanes - 1)/lanes + 1))
     start(1) = 1_i8
     ! searching twice, first to count, needs no room but that of the result
     !$omp parallel do schedule(dynamic, 64) default(none) private(c, found, no_member, no_bits) &
-    !$omp shared(x, half_reach, own, rows, start, most)
+    !$omp shared(x, half_reach, own, label, rows, start, most, labelled)
     do c = 1, size(start) - 1
-      call visit(x, half_reach, own, most, rows, c, found, no_member, no_bits)
+      call visit(x, half_reach, own, label, labelled, most, rows, c, found, no_member, no_bits)
       start(c + 1) = found
     end do
     do c = 1, size(start) - 1
@@ -116,10 +119,10 @@ contains
     end do
     allocate (member(start(size(start)) - 1), bits(start(size(start)) - 1))
     !$omp parallel do schedule(dynamic, 64) default(none) private(c, found) &
-    !$omp shared(x, half_reach, own, rows, start, member, bits, most)
+    !$omp shared(x, half_reach, own, label, rows, start, member, bits, most, labelled)
     do c = 1, size(start) - 1
-      call visit(x, half_reach, own, most, rows, c, found, member(start(c):start(c + 1) - 1), &
-        & bits(start(c):start(c + 1) - 1))
+      call visit(x, half_reach, own, label, labelled, most, rows, c, found, &
+        & member(start(c):start(c + 1) - 1), bits(start(c):start(c + 1) - 1))
     end do
   end subroutine collect_members
 
@@ -220,10 +223,12 @@ contains
 
   !> Search the cells around cluster `c`: the number of its members, and as many of them as
   !> there is room for.
-  pure subroutine visit(x, half_reach, own, most, rows, c, found, member, bits)
+  pure subroutine visit(x, half_reach, own, label, labelled, most, rows, c, found, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)
     real(wp), intent(in), contiguous :: half_reach(:)
     real(wp), intent(in), contiguous :: own(:)
+    integer(i2), intent(in), contiguous :: label(:)
+    logical, intent(in) :: labelled            !! some point has a label
     real(wp), intent(in) :: most               !! largest half reach and largest own one [m]
     type(rows_type), intent(in) :: rows
     integer, intent(in) :: c
@@ -255,6 +260,8 @@ contains
         end if
         do j = rows%first(from), rows%first(to + 1) - 1, piece
           call compare(x, half_reach, own, first, last, j, min(j + piece, rows%first(to + 1)) &
+            & - 1, code)
+          if (labelled) call leave_out(label, first, last, j, min(j + piece, rows%first(to + 1)) &
             & - 1, code)
           do i = 1, min(piece, rows%first(to + 1) - j)
             if (code(i) <= 0.0_wp) cycle
@@ -314,6 +321,23 @@ contains
       bit = 2*bit
     end do
   end subroutine compare
+
+  !> Take from `code` the bits of the lanes `first:last` that have the label of the point.
+  pure subroutine leave_out(label, first, last, from, to, code)
+    integer(i2), intent(in), contiguous :: label(:)
+    integer, intent(in) :: first, last, from, to
+    real(wp), intent(inout) :: code(:)
+    integer :: same, j, l
+
+    do j = from, to
+      if (label(j) == 0_i2) cycle
+      same = 0
+      do l = first, last
+        if (label(l) == label(j)) same = ibset(same, l - first)
+      end do
+      code(j - from + 1) = real(iand(nint(code(j - from + 1)), not(same)), wp)
+    end do
+  end subroutine leave_out
 
   !> The cell of a coordinate along direction `d`, from 0; those outside are taken to the nearest.
   pure integer function cell_along(rows, d, x) result(cell)

@@ -33,6 +33,7 @@ module pd_family_family
     procedure(memory_interface), deferred :: bytes
     procedure(describe_interface), deferred :: describe
     procedure :: alike
+    procedure :: bytes_are_shared
   end type family_type
 
   abstract interface
@@ -91,6 +92,13 @@ contains
     integer, intent(in) :: k                  !! slot
     alike = min(k, family%n_slots)
   end function alike
+
+  !> Whether bonds of slots of different groups of `lanes` may share a byte, so that one thread must
+  !> break all of them.
+  pure logical function bytes_are_shared(family)
+    class(family_type), intent(in) :: family  !! the family
+    bytes_are_shared = family%n_slots < 0
+  end function bytes_are_shared
 
   !> Room for the bonds of any one point.
   pure subroutine allocate_bonds(family, bonds)

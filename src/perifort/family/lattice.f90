@@ -18,14 +18,14 @@ module pd_family_lattice
   use pd_base_text, only: to_text, with_unit
   use pd_body_lattices, only: coordinate
   use pd_body_body, only: body_type, arrange
-  use pd_family_cells, only: cells_type, sort_into_cells, joins_labels
+  use pd_family_cells, only: cells_type, points_across, sort_into_cells
   use pd_family_classes, only: find_classes
   use pd_family_family, only: family_type, bonds_type
   use pd_family_offsets, only: offsets_type, make_offsets, order_offsets, turn_offsets, &
     & first_cell, &
     & whole_blocks, both_ends
   use pd_family_slabs, only: slabs_type, find_slabs
-  use pd_family_volume, only: volume_rule_type, reach
+  use pd_family_volume, only: volume_rule_type, reach, rule_of_bond
   implicit none (type, external)
   private
   public :: lattice_family_type, offsets_type, new_lattice_family, lattice_suits, use_double, &
@@ -38,8 +38,9 @@ module pd_family_lattice
     type(offsets_type), allocatable :: grids(:)
     integer :: words = 0                       !! words of bits of one slot
     logical :: mixed = .false.                 !! bonds are computed in single precision
-    logical :: has_copies = .false.            !! some slots are copies of other ranks' points,
-                                               !! whose bonds are not all here
+    logical :: partial = .false.               !! some slots have bonds that are not here: copies of
+                                               !! other ranks' points, or points with bonds in the
+                                               !! list of a composite family
     integer(i8) :: last_owned = huge(0_i8)     !! the last slot that is no copy
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
@@ -51,6 +52,7 @@ module pd_family_lattice
     type(slabs_type) :: slabs                  !! which blocks can be worked on at once
   contains
     procedure :: bonds_of
+    procedure :: number_at
     procedure :: break_bond
     procedure :: keep_bonds
     procedure :: bytes
@@ -62,44 +64,31 @@ module pd_family_lattice
 contains
 
   !> Whether lattice families are possible for a body in point order: every point on a grid, grids
-  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not.
-  subroutine lattice_suits(body, rule, suits, reason)
+  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not. In a composite
+  !> family a list has the bonds between grids and those of points on none.
+  subroutine lattice_suits(body, rule, suits, reason, joined)
     type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
     type(volume_rule_type), intent(in) :: rule        !! how far families reach
     logical, intent(out) :: suits                     !! a lattice family can be made
     character(:), allocatable, intent(out) :: reason
       !! why not, without a full stop; empty if it suits
-    type(cells_type) :: cells
-    real(wp), allocatable :: half_reach(:)
+    logical, intent(in), optional :: joined
+      !! a list joins the grids; absent: none does
     real(wp) :: room
-    integer :: g, k
+    logical :: alone
+    integer :: g
 
     suits = .false.
     reason = ''
-    if (any(body%grid == 0)) then
-      reason = 'some points are a cloud, a mesh or cut cells'
-      return
-    end if
-    if (rule%ratio > 0.0_wp) then
-      reason = 'horizons differ from point to point'
-      return
-    end if
-    if (any(body%grid /= body%grid(1))) then
-      allocate (half_reach(body%n_points))
-      do k = 1, body%n_points
-        half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
-      end do
-      call sort_into_cells(body%x, 2*maxval(half_reach), cells)
-      if (joins_labels(body%x, half_reach, cells, body%grid)) then
-        reason = 'bonds join bodies on different grids'
-        return
-      end if
-    end if
+    alone = .true.
+    if (present(joined)) alone = .not. joined
+    if (alone) call look_across(body, rule, reason)
+    if (reason /= '') return
     room = 0.0_wp
     do g = 1, size(body%grids)
       if (any(body%grid == g)) room = room + product(real(extent(body, g), wp))
     end do
-    suits = body%n_points >= least_filled*room
+    suits = count(body%grid > 0) >= least_filled*room
     if (.not. suits) then
       reason = 'the points fill too little of their grid'
       return
@@ -113,6 +102,39 @@ contains
       & ' cells, more than '//to_text(most_slots)
   end subroutine lattice_suits
 
+  !> Why a lattice alone cannot have all bonds of a body; `reason` is empty if it can.
+  subroutine look_across(body, rule, reason)
+    type(body_type), intent(in) :: body
+    type(volume_rule_type), intent(in) :: rule
+    character(:), allocatable, intent(out) :: reason
+    type(cells_type) :: cells
+    real(wp), allocatable :: half_reach(:)
+    logical, allocatable :: across(:)
+    integer :: k
+
+    reason = ''
+    if (any(body%grid == 0)) then
+      reason = 'some points are a cloud, a mesh or cut cells'
+    else if (rule%ratio > 0.0_wp) then
+      reason = 'horizons differ from point to point'
+    else if (any(body%grid /= body%grid(1))) then
+      allocate (half_reach(body%n_points), across(body%n_points))
+      do k = 1, body%n_points
+        half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
+      end do
+      call sort_into_cells(body%x, 2*maxval(half_reach), cells)
+      call points_across(body%x, half_reach, cells, body%grid, across)
+      if (any(across)) reason = 'bonds join bodies on different grids'
+    end if
+  end subroutine look_across
+
+  !> The rule for the bonds within a grid: with the horizon that its spacing has.
+  pure type(volume_rule_type) function rule_of_grid(rule, spacing) result(own)
+    type(volume_rule_type), intent(in) :: rule
+    real(wp), intent(in) :: spacing  !! of the grid [m]
+    own = rule_of_bond(rule, spacing, spacing)
+  end function rule_of_grid
+
   !> Slots of the box around the points of grid `g` with its padding, or a few less.
   pure real(wp) function padded(body, rule, g) result(slots)
     type(body_type), intent(in) :: body
@@ -120,7 +142,9 @@ contains
     integer, intent(in) :: g
     real(wp) :: cells(3), margin
 
-    margin = reach(rule, body%grids(g)%spacing, body%dim)/body%grids(g)%spacing
+    associate (spacing => body%grids(g)%spacing)
+      margin = reach(rule_of_grid(rule, spacing), spacing, body%dim)/spacing
+    end associate
     cells = real(extent(body, g), wp)
     ! rows and planes are followed by padding, and the box has it at both ends
     cells(:body%dim - 1) = cells(:body%dim - 1) + margin
@@ -144,12 +168,12 @@ contains
     end do
   end function extent
 
-  !> Families of a body that `lattice_suits`; the body is arranged in slots. `breakable`: bonds may
-  !> break or be cut, so each gets a bit. `mixed`: bonds in single precision, which 1D has no loops
+  !> Families of a body that `lattice_suits`; the body is arranged in slots, points on no grid behind
+  !> the others and without bonds. `breakable`: bonds may break or be cut, so each gets a bit. `mixed`: bonds in single precision, which 1D has no loops
   !> for. `key_bits`: the bits of keys that count; with fewer, different surroundings get one key.
   !> An error is set if the slots are too many for their numbers or for the memory, or if two points
   !> are in one cell.
-  subroutine new_lattice_family(body, rule, breakable, mixed, family, error, key_bits)
+  subroutine new_lattice_family(body, rule, breakable, mixed, family, error, key_bits, listed)
     type(body_type), intent(inout) :: body
       !! in point order; arranged in the slots of the family on return
     type(volume_rule_type), intent(in) :: rule        !! volume correction and horizon
@@ -159,11 +183,15 @@ contains
       !! whole, all bonds intact
     type(error_type), allocatable, intent(out) :: error
     integer(i8), intent(in), optional :: key_bits     !! all count if absent; for tests
-    integer :: g
+    logical, intent(in), optional :: listed(:)
+      !! (n_points) points with bonds in the list of a composite family; absent: none
+    logical, allocatable :: apart(:)
+    integer :: g, k
 
     if (present(key_bits)) family%key_bits = key_bits
     family%dim = body%dim
-    family%has_copies = body%n_points > body%order%n_owned
+    family%partial = body%n_points > body%order%n_owned
+    if (present(listed)) family%partial = family%partial .or. any(listed)
     family%mixed = mixed .and. body%dim > 1
     if (family%mixed) family%block_length = 2*lanes
     family%rule = rule
@@ -175,9 +203,16 @@ contains
     family%words = (family%most_bonds + word_bits - 1)/word_bits
     call place_points(body, family, error)
     if (allocated(error)) return
-    if (family%has_copies) family%last_owned = maxval(body%slot(:body%order%n_owned))
-    call find_classes(family%grids, family%alive, body%material, family%words, family%key_bits, &
-      & family%class_of, family%first_of, family%n_bonds)
+    if (body%n_points > body%order%n_owned) &
+      & family%last_owned = maxval(body%slot(:body%order%n_owned))
+    allocate (apart(body%n_slots), source=.false.)
+    if (present(listed)) then
+      do k = 1, body%n_slots
+        if (body%point(k) > 0) apart(k) = listed(body%point(k))
+      end do
+    end if
+    call find_classes(family%grids, family%alive, body%material, apart, family%words, &
+      & family%key_bits, family%class_of, family%first_of, family%n_bonds)
     call find_blocks(family)
     if (breakable) call family%allow_breaking()
   end subroutine new_lattice_family
@@ -210,7 +245,7 @@ contains
     cells = extent(body, g)
     grid%alignment = family%block_length
     if (allocated(body%grids(g)%lowest)) call fix_box(body, g, grid, cells)
-    call make_offsets(family%rule, body%dim, cells, grid)
+    call make_offsets(rule_of_grid(family%rule, grid%spacing), body%dim, cells, grid)
     associate (m => grid%reach_cells)
       grid%stride = [1, whole_blocks(cells(1) + m, grid%alignment), 0]
       grid%stride(3) = grid%stride(2)*(cells(2) + m)
@@ -267,11 +302,13 @@ contains
     integer(i4), allocatable :: point(:)
     real(wp), allocatable :: lower(:, :)
     real(wp) :: x(body%dim)
-    integer(i8) :: n_slots, need, at
+    integer(i8) :: n_slots, need, at, free
     integer :: c, k, n, g
     integer, allocatable :: number(:)
 
-    n_slots = family%grids(size(family%grids))%last
+    ! points on no grid stand behind the boxes of the grids
+    free = family%grids(size(family%grids))%last
+    n_slots = free + whole_blocks(count(body%grid == 0), lanes)
     if (n_slots > most_slots) then
       call fail(error, 'the lattice needs '//to_text(n_slots)//' slots, more than '// &
         & to_text(most_slots))
@@ -300,6 +337,11 @@ contains
     allocate (point(n_slots), source=0_i4)
     do k = 1, body%n_points
       g = body%grid(k)
+      if (g == 0) then
+        free = free + 1
+        point(free) = int(k, i4)
+        cycle
+      end if
       associate (grid => family%grids(number(g)))
         at = first_cell(grid)
         x = body%x(k, :)
@@ -321,7 +363,19 @@ contains
     family%n_slots = body%n_slots
     allocate (family%alive(n_slots))
     family%alive = merge(1_i1, 0_i1, point > 0_i4)
+    family%alive(family%grids(size(family%grids))%last + 1:) = 0_i1
   end subroutine place_points
+
+  !> How many bonds slot `k` has, broken ones too.
+  pure integer function number_at(family, k) result(n)
+    class(lattice_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                          !! slot; a dead one has none
+    n = 0
+    if (family%alive(k) == 0_i1) return
+    associate (grid => family%grids(grid_at(family, int(k, i8))))
+      n = sum(int(family%alive(k + grid%shift)))
+    end associate
+  end function number_at
 
   !> The number of the grid that holds slot `k`.
   pure integer function grid_at(family, k) result(g)

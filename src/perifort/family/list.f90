@@ -8,7 +8,7 @@
 !> (`pd_force_list_tables`).
 module pd_family_list
   use pd_base_archive, only: archive_type
-  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type, arrange
@@ -36,6 +36,7 @@ module pd_family_list
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
+    procedure :: number_at
     procedure :: break_bond
     procedure :: keep_bonds
     procedure :: bytes
@@ -46,16 +47,20 @@ contains
 
   !> Families of all points of `body`, which is sorted, and filled with dead slots up to whole
   !> clusters. Members are those within the rule's reach for the bond's mean spacing and, where
-  !> points have their own horizons, the larger one of both ends.
-  subroutine new_list_family(body, rule, family)
+  !> points have their own horizons, the larger one of both ends. In a composite family points of
+  !> one grid are no members of each other here.
+  subroutine new_list_family(body, rule, family, apart)
     type(body_type), intent(inout) :: body
       !! in point order; arranged in the slots of the family on return
     type(volume_rule_type), intent(in) :: rule     !! volume correction and horizon
     type(list_family_type), intent(out) :: family  !! whole, all bonds intact
+    logical, intent(in), optional :: apart
+      !! bonds within grids are elsewhere; absent: they are here
     type(rows_type) :: rows
     type(volume_rule_type) :: beyond
     real(wp), allocatable :: half_reach(:), own(:)
     integer(i4), allocatable :: order(:), point(:), member(:)
+    integer(i2), allocatable :: label(:)
     real(wp) :: spacing
     integer :: k, n, edges
 
@@ -83,7 +88,10 @@ contains
         if (rule%ratio > 0.0_wp) own(k) = reach(rule_of_bond(rule, h, h), 0.0_wp, body%dim)
       end associate
     end do
-    call collect_members(body%x(:n, :), half_reach, own, rows, family%start, member, family%bits)
+    allocate (label(n), source=0_i2)
+    if (present(apart)) label = merge(body%grid(:n), 0_i2, apart)
+    call collect_members(body%x(:n, :), half_reach, own, label, rows, family%start, member, &
+      & family%bits)
     call pair_members(family%start, member, family%bits, family%member, family%first)
     allocate (family%intact, source=family%bits)
     call count_bonds(family)
@@ -207,6 +215,18 @@ contains
         & *max(0.0_wp, min(1.0_wp, (family%rule%delta + spacing/2 - bonds%length(i))/spacing))
     end do
   end subroutine bonds_of
+
+  !> How many bonds slot `k` has, broken ones too.
+  pure integer function number_at(family, k) result(n)
+    class(list_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                       !! slot; a dead one has none
+    integer :: c
+
+    c = (k - 1)/lanes + 1
+    associate (bits => family%bits(family%start(c):family%start(c + 1) - 1))
+      n = count(iand(bits, lane_bit(k - lanes*(c - 1))) /= 0_i1)
+    end associate
+  end function number_at
 
   !> Break the `i`-th bond of slot `k`; the other direction is another call.
   pure subroutine break_bond(family, k, i)

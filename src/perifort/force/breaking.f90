@@ -74,7 +74,7 @@ contains
     integer, allocatable :: number(:), first(:), order(:)
     type(running_type) :: running
     real(wp) :: totals(6)
-    logical :: breaks
+    logical :: breaks, together
     integer :: g, m, k, i, sets
 
     of_limit = 1.0_wp
@@ -84,10 +84,11 @@ contains
     allocate (lost(size(slots), 0:sets), before(0:sets), source=0.0_wp)
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
+    together = family%bytes_are_shared()
     !$omp parallel default(none) &
     !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
     !$omp shared(of_limit) &
-    !$omp firstprivate(before) private(bonds, g, m, k, i, breaks)
+    !$omp firstprivate(before) private(bonds, g, m, k, i, breaks) if(.not. together)
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 4)
     do g = 1, size(first) - 1

@@ -4,9 +4,11 @@ module pd_force_forces
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i8
   use pd_body_body, only: body_type, share_halo
+  use pd_family_composite, only: composite_family_type
   use pd_family_family, only: family_type
   use pd_family_list, only: list_family_type
   use pd_family_lattice, only: lattice_family_type
+  use pd_force_composite, only: composite_dilatation, composite_energy, composite_force
   use pd_force_generic_pass, only: generic_energy, generic_force, generic_pulls
   use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
@@ -122,6 +124,8 @@ contains
       call list_dilatation(family, model, options, workspace%list, u, p, strained)
     type is (lattice_family_type)
       call lattice_dilatation(family, model, options, workspace%lattice, u, p, strained)
+    type is (composite_family_type)
+      call composite_dilatation(family, model, options, workspace, u, p, strained)
     class default
       call internal_fault('the dilatation of a family that has no loops')
     end select
@@ -143,6 +147,8 @@ contains
       call list_force(family, model, options, workspace%list, u, p, force, strained)
     type is (lattice_family_type)
       call lattice_force(family, model, options, workspace%lattice, u, p, force, strained)
+    type is (composite_family_type)
+      call composite_force(family, model, options, workspace, u, p, force, strained)
     class default
       call internal_fault('the forces of a family that has no loops')
     end select
@@ -165,6 +171,8 @@ contains
       call list_energy(family, model, workspace%list, u, energy)
     type is (lattice_family_type)
       call lattice_energy(family, model, workspace%lattice, u, energy)
+    type is (composite_family_type)
+      call composite_energy(family, model, workspace, u, energy)
     class default
       call internal_fault('the energy of a family that has no loops')
     end select

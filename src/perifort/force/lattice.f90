@@ -165,29 +165,38 @@ contains
     !$omp end parallel
   end subroutine lattice_force
 
-  !> Strain energy density of all slots [J/m3].
-  subroutine lattice_energy(family, model, workspace, u, energy)
+  !> Strain energy density of all slots [J/m3]. With `theta` that of the stretches alone, and the
+  !> dilatation beside it.
+  subroutine lattice_energy(family, model, workspace, u, energy, theta)
     type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
     type(lattice_workspace_type), intent(inout) :: workspace  !! with weights of this model
     real(wp), intent(in), contiguous :: u(:, :)      !! (n_slots, dim) displacements [m]
     real(wp), intent(out), contiguous :: energy(:)
       !! (n_slots) of each slot, 0 for dead ones [J/m3]
+    real(wp), intent(out), contiguous, optional, target :: theta(:)
+      !! (n_slots) of each slot, 0 for dead ones [-]
     type(weights_type) :: own, half
+    real(wp), pointer :: apart(:)
     integer :: b
 
     call prepare_blocks(family, model, workspace)
     energy = 0.0_wp
-    !$omp parallel default(none) shared(family, model, workspace, u, energy) &
+    apart => null()
+    if (present(theta)) then
+      theta = 0.0_wp
+      apart => theta
+    end if
+    !$omp parallel default(none) shared(family, model, workspace, u, energy, apart) &
     !$omp private(own, half, b)
     !$omp do schedule(static)
     do b = 1, size(family%block)
       if (shared_weights(family, workspace, b, .false.)) then
         call energy_of_block(family, model, b, workspace%table(workspace%weights(b)), half, u, &
-          & energy)
+          & energy, apart)
       else
         call weights_now(family, model, workspace, b, own)
-        call energy_of_block(family, model, b, own, half, u, energy)
+        call energy_of_block(family, model, b, own, half, u, energy, apart)
       end if
     end do
     !$omp end parallel
@@ -415,8 +424,9 @@ contains
     end if
   end subroutine force_of_block
 
-  !> Strain energy density of one block; `half` is room for half of it, if it is long.
-  subroutine energy_of_block(family, model, b, weights, half, u, energy)
+  !> Strain energy density of one block; `half` is room for half of it, if it is long. The
+  !> dilatation is left `apart`, if that is associated.
+  subroutine energy_of_block(family, model, b, weights, half, u, energy, apart)
     type(lattice_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     integer, intent(in) :: b
@@ -424,25 +434,27 @@ contains
     type(weights_type), intent(inout) :: half
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
+    real(wp), pointer, intent(in) :: apart(:)
     integer :: l
 
     if (.not. family%mixed) then
-      call energy_of_lanes(model, weights, family%block(b), u, energy)
+      call energy_of_lanes(model, weights, family%block(b), u, energy, apart)
       return
     end if
     do l = 0, family%block_length - lanes, lanes
       call half_of(family, weights, l, half)
-      call energy_of_lanes(model, half, family%block(b) + l, u, energy)
+      call energy_of_lanes(model, half, family%block(b) + l, u, energy, apart)
     end do
   end subroutine energy_of_block
 
   !> Strain energy density of `lanes` slots from `first` on.
-  subroutine energy_of_lanes(model, weights, first, u, energy)
+  subroutine energy_of_lanes(model, weights, first, u, energy, apart)
     type(model_type), intent(in) :: model
     type(weights_type), intent(in) :: weights
     integer(i8), intent(in) :: first
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
+    real(wp), pointer, intent(in) :: apart(:)
     type(force_options_type) :: options
     real(wp) :: stretches(lanes), theta(lanes)
     integer :: l
@@ -457,8 +469,13 @@ contains
     end if
     do l = 1, lanes
       associate (m => model%materials(model%material(first + l - 1)))
-        energy(first + l - 1) = stretches(l)/4 &
-          & + m%a*(t_of(model, int(first) + l - 1)*theta(l))**2
+        if (associated(apart)) then
+          energy(first + l - 1) = stretches(l)/4
+          apart(first + l - 1) = t_of(model, int(first) + l - 1)*theta(l)
+        else
+          energy(first + l - 1) = stretches(l)/4 &
+            & + m%a*(t_of(model, int(first) + l - 1)*theta(l))**2
+        end if
       end associate
     end do
   end subroutine energy_of_lanes

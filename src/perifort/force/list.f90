@@ -157,13 +157,15 @@ contains
     end do
   end subroutine list_force
 
-  !> Strain energy density of all slots [J/m3].
-  subroutine list_energy(family, model, workspace, u, energy)
+  !> Strain energy density of all slots [J/m3]. With `theta` that of the stretches alone, and the
+  !> dilatation beside it.
+  subroutine list_energy(family, model, workspace, u, energy, theta)
     type(list_family_type), intent(in) :: family      !! the family
     type(model_type), intent(in) :: model             !! parameters of the slots
     type(list_workspace_type), intent(inout) :: workspace  !! of this model; gets the displacements
     real(wp), intent(in), contiguous :: u(:, :)       !! (n_slots, dim) displacements [m]
     real(wp), intent(inout), contiguous :: energy(:)  !! (n_slots) set for all slots [J/m3]
+    real(wp), intent(inout), optional :: theta(:)     !! (n_slots) set for all slots [-]
     type(force_options_type) :: options
     type(loops_type) :: loops
     type(work_type) :: work
@@ -176,7 +178,7 @@ contains
     call new_loops(family, model, options, for_energy, loops)
     call gather_state(u, workspace)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, workspace, energy, loops) &
+    !$omp shared(family, model, options, workspace, energy, theta, loops) &
     !$omp private(work, sums, missed, c, k, l)
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
@@ -194,7 +196,12 @@ contains
         k = work%first + l - 1
         associate (m => model%materials(model%material(k)))
           energy(k) = sums(l, 1)
-          if (options%dilatation) energy(k) = energy(k) + m%a*(t_of(model, k)*sums(l, 2))**2
+          if (present(theta)) then
+            theta(k) = 0.0_wp
+            if (options%dilatation) theta(k) = t_of(model, k)*sums(l, 2)
+          else if (options%dilatation) then
+            energy(k) = energy(k) + m%a*(t_of(model, k)*sums(l, 2))**2
+          end if
         end associate
       end do
     end do

@@ -15,6 +15,8 @@ module pd_force_weights
   private
   public :: build_weights, prepare_blocks, block_weights, allocate_weights, weights_now, half_of
 
+  !> Factors of points that differ less are those of one surrounding, off by the order of its sums.
+  real(wp), parameter :: alike = 64*epsilon(1.0_wp)
   integer(i8), parameter :: bytes_per_slot = 100_i8  !! that tables may take beside their room
 
 contains
@@ -43,7 +45,8 @@ contains
     else if (.not. (model%surface .or. allocated(model%scale))) then
       family%class_of = merge(int(model%material, i4), 0_i4, family%alive == 1_i1)
     end if
-    if (model%surface .and. family%has_copies) call part_by_factors(model, family)
+    if (family%partial .and. (model%surface .or. allocated(model%scale))) &
+      & call part_by_factors(model, family)
     call find_kinds(family, model%consistent, workspace, first, uses)
     order = most_used_first(uses)
     allocate (table(size(uses)), first_of_table(size(uses)), table_of(0:size(uses)))
@@ -71,28 +74,33 @@ contains
     deallocate (family%class_of)  ! no longer needed
   end subroutine build_weights
 
-  !> Classes of slots with the same material and surface factors. Copies of other ranks' points have
-  !> their factors from there, while their surroundings here do not tell them.
+  !> Classes of slots with the same material, scale and surface factors, where the lattice does not
+  !> have all bonds that these follow from: copies of other ranks' points have theirs from there. In
+  !> a composite family factors are alike but for the order of sums; on ranks they are so bit by bit.
   subroutine part_by_factors(model, family)
     type(model_type), intent(in) :: model
     type(lattice_family_type), intent(inout) :: family  !! gets other classes
     type(lookup_type) :: known
+    real(wp) :: factors(2*family%dim + 1)
     integer(i8) :: key
     integer, allocatable :: first(:)
     integer :: k, c, number
-    logical :: is_new
+    logical :: is_new, exact
 
+    exact = family%last_owned < huge(family%last_owned)
     allocate (first(family%n_slots), source=0)
     do k = 1, int(family%n_slots)
       if (family%alive(k) == 0_i1) cycle
       key = int(model%material(k), i8)
-      do c = 1, family%dim
-        key = mix(mix(key, transfer(model%D(k, c), key)), transfer(model%S(k, c), key))
+      factors = factors_at(model, k)
+      if (.not. exact) factors = real(real(factors, sp), wp)
+      do c = 1, size(factors)
+        key = mix(key, transfer(factors(c), key))
       end do
       call known%number_of(key, number, is_new)
       if (is_new) first(number) = k
       ! values that have the key of others get a class of their own
-      if (.not. same_factors(model, k, first(number))) then
+      if (.not. same_factors(model, k, first(number), merge(0.0_wp, alike, exact))) then
         call known%own_number(number)
         first(number) = k
       end if
@@ -100,13 +108,27 @@ contains
     end do
   end subroutine part_by_factors
 
-  !> Whether two slots have the same material and surface factors, bit by bit.
-  pure logical function same_factors(model, one, other)
+  !> Surface factors and scale of a slot, 1 where it has none [-].
+  pure function factors_at(model, k) result(factors)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k
+    real(wp) :: factors(2*model%dim + 1)
+
+    factors = 1.0_wp
+    if (model%surface) factors(:2*model%dim) = [model%D(k, :), model%S(k, :)]
+    if (allocated(model%scale)) factors(2*model%dim + 1) = model%scale(k)
+  end function factors_at
+
+  !> Whether two slots have the same material and the same factors within `tolerance`.
+  pure logical function same_factors(model, one, other, tolerance)
     type(model_type), intent(in) :: model
     integer, intent(in) :: one, other
-    same_factors = model%material(one) == model%material(other) &
-      & .and. all(abs(model%D(one, :) - model%D(other, :)) <= 0.0_wp) &
-      & .and. all(abs(model%S(one, :) - model%S(other, :)) <= 0.0_wp)
+    real(wp), intent(in) :: tolerance
+
+    associate (first => factors_at(model, one), second => factors_at(model, other))
+      same_factors = model%material(one) == model%material(other) &
+        & .and. all(abs(first - second) <= tolerance*abs(first))
+    end associate
   end function same_factors
 
   !> Room for what is kept of each block, if there is none: blocks make their weights in every pass

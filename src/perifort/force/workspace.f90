@@ -6,10 +6,11 @@ module pd_force_workspace
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
+  use pd_force_model, only: model_type
   implicit none (type, external)
   private
   public :: workspace_type, lattice_workspace_type, list_workspace_type, weights_type, singles_type
-  public :: generic_workspace_type
+  public :: composite_workspace_type, generic_workspace_type
   public :: at_volume, at_moved, at_p
 
   !> Where things stand in `at`: behind the position come volume, displacement and p.
@@ -83,11 +84,21 @@ module pd_force_workspace
     real(wp), allocatable :: constants(:, :)   !! that the laws have made (reals, n_slots)
   end type generic_workspace_type
 
+  !> Of a composite family: what stands in the slots of its list.
+  type :: composite_workspace_type
+    type(model_type) :: model                  !! parameters of these slots
+    real(wp), allocatable :: u(:, :)           !! displacements (slots of the list, dim) [m]
+    real(wp), allocatable :: p(:)              !! 2 a d delta theta; its size is 0 without one
+    real(wp), allocatable :: force(:, :)       !! force densities [N/m3]
+    integer(i1), allocatable :: strained(:)    !! marks; their number is 0 if no bond can break
+  end type composite_workspace_type
+
   !> Of any family: the part that its loops use is filled, the others are empty.
   type :: workspace_type
     type(lattice_workspace_type) :: lattice
     type(list_workspace_type) :: list
     type(generic_workspace_type) :: generic
+    type(composite_workspace_type) :: composite
   contains
     procedure :: bytes
     procedure :: describe
@@ -101,6 +112,8 @@ contains
 
     bytes = bytes_of_lattice(workspace%lattice) + bytes_of_list(workspace%list) &
       & + bytes_of_generic(workspace%generic)
+    if (allocated(workspace%composite%u)) bytes = bytes + 16*size(workspace%composite%u, kind=i8) &
+      & + 8*size(workspace%composite%p, kind=i8) + size(workspace%composite%strained, kind=i8)
   end function bytes
 
   pure integer(i8) function bytes_of_lattice(workspace) result(bytes)

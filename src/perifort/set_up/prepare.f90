@@ -35,7 +35,8 @@ module pd_set_up_prepare
   use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
     & gravity_of_scene, leave_uncorrected, sides_of_contact
-  use pd_set_up_families, only: axes_of_factors, choose_family, make_family, finish_family
+  use pd_set_up_families, only: axes_of_factors, choose_family, family_choice_type, make_family, &
+    & finish_family
   use pd_set_up_horizons, only: check_horizons, rule_of_scene
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
@@ -88,8 +89,8 @@ contains
     type(volume_rule_type) :: rule
     integer(i8) :: cut
     integer, allocatable :: owner(:)
-    character(:), allocatable :: reason
-    logical :: divided, suits
+    type(family_choice_type) :: choice
+    logical :: divided
     integer :: i, ranks
 
     ranks = 1
@@ -120,21 +121,21 @@ contains
 
       call timer%start('families')
       rule = rule_of_scene(scene, system%body, delta)
-      call choose_family(scene, rule, system%body, suits, reason, error)
+      call choose_family(scene, rule, system%body, laws, divided, choice, error)
       if (allocated(error)) return
       if (present(world)) then
-        if (world%reproducible .and. .not. suits) call scene_fault(error, scene, 'horizon', 1, &
+        if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, 'horizon', 1, &
           & 'family', '--reproducible needs lattice families: on lists forces depend on the '// &
-          & 'ranks in their last digits', reason)
+          & 'ranks in their last digits', choice%reason)
         if (world%reproducible) call find_lowest(system%body)
         system%body%order%reproducible = world%reproducible
       end if
       if (allocated(error)) return
       if (divided) call divide_body(scene, rule, merge(reproducible_layer( &
-        & scene%header%precision == 'mixed'), 1, suits .and. world%reproducible), world, &
+        & scene%header%precision == 'mixed'), 1, choice%regular .and. world%reproducible), world, &
         & system%body, owner, error)
       if (allocated(error)) return
-      call make_family(scene, rule, suits, reason, system, error)
+      call make_family(scene, rule, choice, system, error)
       if (allocated(error)) return
       if (divided) call join_ranks(world, system%body, owner)
       call check_overlap(system%body, system%family, set_up%isolated, error)

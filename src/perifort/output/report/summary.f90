@@ -7,6 +7,7 @@ module pd_output_report_summary
   use pd_base_warnings, only: warnings_type
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_scene_content_types, only: scene_type
+  use pd_family_composite, only: composite_family_type
   use pd_family_lattice, only: lattice_family_type
   use pd_family_list, only: list_family_type
   use pd_force_model, only: model_type
@@ -251,6 +252,8 @@ contains
     type is (lattice_family_type)
       if (family%mixed) text = 'mixed: bonds in single precision, state in double'
     type is (list_family_type)  ! in double precision alone
+      continue
+    type is (composite_family_type)  ! as lists
       continue
     class default
       call internal_fault('precision_of does not know a kind of family')
