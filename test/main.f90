@@ -45,6 +45,7 @@ program main
   use test_extremes_motion, only: collect_extremes_motion
   use test_extremes_steps, only: collect_extremes_steps
   use test_family_cells, only: collect_family_cells
+  use test_family_composite, only: collect_family_composite
   use test_family_cracks, only: collect_family_cracks
   use test_family_joints, only: collect_family_joints
   use test_family_lattice, only: collect_family_lattice
@@ -176,6 +177,7 @@ program main
   call register('extremes_motion', collect_extremes_motion)
   call register('extremes_steps', collect_extremes_steps)
   call register('family_cells', collect_family_cells)
+  call register('family_composite', collect_family_composite)
   call register('family_cracks', collect_family_cracks)
   call register('family_joints', collect_family_joints)
   call register('family_lattice', collect_family_lattice)

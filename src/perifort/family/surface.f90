@@ -138,11 +138,16 @@ contains
     real(wp), intent(in) :: gk(:), gj(:)  !! (dim) D or S of the bond's two ends [-]
     real(wp), intent(in), optional :: axes(:, :)
       !! (dim, dim) directions of the factors in columns, absent: x, y, z
-    if (present(axes)) then
-      G = 1.0_wp/sqrt(sum((2*matmul(n, axes)/(gk + gj))**2))
-    else
-      G = 1.0_wp/sqrt(sum((2*n/(gk + gj))**2))
-    end if
+    real(wp) :: total, along
+    integer :: c
+
+    total = 0.0_wp
+    do c = 1, size(n)
+      along = n(c)
+      if (present(axes)) along = dot_product(n, axes(:, c))
+      total = total + (2*along/(gk(c) + gj(c)))**2
+    end do
+    G = 1.0_wp/sqrt(total)
   end function bond_factor
 
 end module pd_family_surface

@@ -14,8 +14,7 @@ module pd_force_breaking
   use pd_force_generic_points, only: generic_energy_product, generic_point_damage, &
     & generic_point_energy
   use pd_force_model, only: model_type, bond_limit
-  use pd_force_reference, only: bond_state_type, state_of_bond, stretch_of_bond, &
-    & point_energy, energy_product, point_damage
+  use pd_force_reference, only: energies_of_loss, point_damage, stretch_of_bond
   use pd_force_workspace, only: generic_workspace_type
   implicit none (type, external)
   private
@@ -69,7 +68,8 @@ contains
     real(wp), intent(in), optional :: part
       !! of its limit, beyond which a bond breaks; 1 by default [-]
     type(bonds_type) :: bonds
-    real(wp), allocatable :: lost(:, :), before(:)
+    real(wp), allocatable :: lost(:, :), before(:), after(:)
+    logical, allocatable :: gone(:)
     real(wp) :: of_limit
     integer, allocatable :: number(:), first(:), order(:)
     type(running_type) :: running
@@ -81,15 +81,16 @@ contains
     if (present(part)) of_limit = part
     sets = 0
     if (present(others)) sets = size(others, 3)
-    allocate (lost(size(slots), 0:sets), before(0:sets), source=0.0_wp)
+    allocate (lost(size(slots), 0:sets), before(0:sets), after(0:sets), source=0.0_wp)
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
     together = family%bytes_are_shared()
     !$omp parallel default(none) &
     !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
     !$omp shared(of_limit) &
-    !$omp firstprivate(before) private(bonds, g, m, k, i, breaks) if(.not. together)
+    !$omp firstprivate(before, after) private(bonds, gone, g, m, k, i, breaks) if(.not. together)
     call allocate_bonds(family, bonds)
+    allocate (gone(family%most_bonds))
     !$omp do schedule(dynamic, 4)
     do g = 1, size(first) - 1
       do m = first(g), first(g + 1) - 1
@@ -97,21 +98,24 @@ contains
         call family%bonds_of(k, bonds)
         do i = 1, bonds%n
           call decide(model, u, k, bonds, i, of_limit, breaks)
+          gone(i) = breaks
           if (.not. breaks) cycle
-          if (number(m) == 0) call energies(family, model, laws, u, k, bonds, before, others)
           number(m) = number(m) + 1
           call family%break_bond(k, i)
         end do
         if (number(m) == 0) cycle
-        call family%bonds_of(k, bonds)
-        if (model%generic) call refresh_slot(k, bonds, laws)
-        call energies(family, model, laws, u, k, bonds, lost(m, :), others)
-        lost(m, :) = (before - lost(m, :))*body%volume(k)
         if (model%generic) then
+          call energies(family, model, laws, u, k, before, others)
+          call family%bonds_of(k, bonds)
+          call refresh_slot(k, bonds, laws)
+          call energies(family, model, laws, u, k, after, others)
           damage(k) = generic_point_damage(family, model, laws, u, k, bonds)
         else
+          call energies_of_loss(model, u, k, bonds, gone, before, after, others)
+          call family%bonds_of(k, bonds)
           damage(k) = point_damage(bonds)
         end if
+        lost(m, :) = (before - after)*body%volume(k)
       end do
     end do
     !$omp end parallel
@@ -129,29 +133,22 @@ contains
     slots = pack(slots, number > 0)
   end subroutine break_bonds
 
-  !> Energy density of slot `k` [J/m3]: as it is, and with the products of each set of `others`.
-  pure subroutine energies(family, model, laws, u, k, bonds, density, others)
+  !> Energy density of slot `k` by the generic pass [J/m3]: as it is, and with the products of each
+  !> set of `others`.
+  pure subroutine energies(family, model, laws, u, k, density, others)
     class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(generic_workspace_type), intent(in), optional :: laws
     real(wp), intent(in), contiguous :: u(:, :)        !! displacements (n_slots, dim) [m]
     integer, intent(in) :: k
-    type(bonds_type), intent(in) :: bonds              !! of slot `k`
     real(wp), intent(out) :: density(0:)               !! (0:sets) [J/m3]
     real(wp), intent(in), optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
     integer :: o
 
-    if (model%generic) then
-      if (.not. present(laws)) call internal_fault('bonds of laws break without their history')
-      density(0) = generic_point_energy(family, model, laws, u, k)
-      do o = 1, ubound(density, 1)
-        density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k)
-      end do
-      return
-    end if
-    density(0) = point_energy(model, u, k, bonds)
+    if (.not. present(laws)) call internal_fault('bonds of laws break without their history')
+    density(0) = generic_point_energy(family, model, laws, u, k)
     do o = 1, ubound(density, 1)
-      density(o) = energy_product(model, u, others(:, :, o), k, bonds)
+      density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k)
     end do
   end subroutine energies
 
@@ -211,17 +208,16 @@ contains
     integer, intent(in) :: i
     real(wp), intent(in) :: part
     logical, intent(out) :: breaks
-    type(bond_state_type) :: state
-    real(wp) :: lower, upper
+    real(wp) :: lower, upper, stretch
 
     breaks = .false.
     if (.not. bonds%intact(i)) return
     call bond_limit(model, k, int(bonds%j(i)), lower, upper)
-    state = state_of_bond(model, u, k, bonds, i)
+    stretch = stretch_of_bond(model, u, k, bonds, i)
     ! parts of limits that are never reached may be beyond all numbers
     breaks = .false.
-    if (upper < never) breaks = state%stretch > part*upper
-    if (lower > -never) breaks = breaks .or. state%stretch < part*lower
+    if (upper < never) breaks = stretch > part*upper
+    if (lower > -never) breaks = breaks .or. stretch < part*lower
   end subroutine decide
 
   !> The largest mechanical stretch over its limit of the intact bonds of every slot: 0 where none

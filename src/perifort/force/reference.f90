@@ -8,7 +8,7 @@ module pd_force_reference
   implicit none (type, external)
   private
   public :: bond_state_type, state_of_bond, stretch_of_bond, point_dilatation, point_force
-  public :: point_energy, energy_product, point_damage, reference_dilatation, reference_force
+  public :: point_energy, energy_product, energies_of_loss, point_damage, reference_dilatation, reference_force
   public :: reference_energy
 
   !> How a bond is deformed.
@@ -30,20 +30,21 @@ contains
     type(bonds_type), intent(in) :: bonds  !! of slot `k`
     integer, intent(in) :: i               !! number of the bond, from 1
     type(bond_state_type) :: state
-    real(wp) :: xi(size(u, 2)), deformed(size(u, 2)), length, y, gb, gd
-    integer :: j
+    real(wp) :: n(3), deformed(3), length, y, gb, gd
+    integer :: dim, j
 
     j = bonds%j(i)
     length = bonds%length(i)
-    xi = bonds%xi(i, :)
+    dim = size(u, 2)
+    n(:dim) = bonds%xi(i, :dim)/length
     call deform(u, k, bonds, i, deformed, y, state%stretch)
     ! a bond crushed to a point has no direction: no force rather than NaN
-    if (y > 0.0_wp) state%direction(:size(u, 2)) = deformed/y
-    if (model%projected) state%lambda = dot_product(state%direction(:size(u, 2)), xi)/length
+    if (y > 0.0_wp) state%direction = deformed/y
+    if (model%projected) state%lambda = dot_product(state%direction(:dim), n(:dim))
     if (model%thermal) state%stretch = state%stretch - (model%expansion(k) + model%expansion(j))/2
     if (model%surface) then
-      state%Gd = bond_factor(xi/length, model%D(k, :), model%D(j, :), model%axes)
-      state%Gb = bond_factor(xi/length, model%S(k, :), model%S(j, :), model%axes)
+      state%Gd = bond_factor(n(:dim), model%D(k, :), model%D(j, :), model%axes)
+      state%Gb = bond_factor(n(:dim), model%S(k, :), model%S(j, :), model%axes)
     end if
     if (model%consistent) then
       associate (place => model%weights%before(k) + i)
@@ -65,7 +66,7 @@ contains
     integer, intent(in) :: k               !! slot
     type(bonds_type), intent(in) :: bonds  !! of slot `k`
     integer, intent(in) :: i               !! number of the bond, from 1
-    real(wp) :: deformed(size(u, 2)), y
+    real(wp) :: deformed(3), y
     integer :: j
 
     j = bonds%j(i)
@@ -79,15 +80,23 @@ contains
     real(wp), intent(in) :: u(:, :)
     integer, intent(in) :: k, i
     type(bonds_type), intent(in) :: bonds
-    real(wp), intent(out) :: deformed(:), y, stretch
-    real(wp) :: xi(size(u, 2)), eta(size(u, 2)), length
+    real(wp), intent(out) :: deformed(3), y, stretch
+    real(wp) :: eta, length, along, squared
+    integer :: c, j
 
     length = bonds%length(i)
-    xi = bonds%xi(i, :)
-    eta = u(bonds%j(i), :) - u(k, :)
-    deformed = xi + eta
+    j = bonds%j(i)
+    deformed = 0.0_wp
+    along = 0.0_wp
+    squared = 0.0_wp
+    do c = 1, size(u, 2)
+      eta = u(j, c) - u(k, c)
+      deformed(c) = bonds%xi(i, c) + eta
+      along = along + bonds%xi(i, c)*eta
+      squared = squared + eta*eta
+    end do
     y = norm2(deformed)
-    stretch = (2*dot_product(xi, eta) + dot_product(eta, eta))/(length*(y + length))
+    stretch = (2*along + squared)/(length*(y + length))
   end subroutine deform
 
   !> theta of slot `k` (7.39).
@@ -166,6 +175,51 @@ contains
         & *point_dilatation(model, other, k, bonds)
     end associate
   end function energy_product
+
+  !> Energy densities of slot `k` [J/m3] before and after some of its bonds break: `energy_product` of
+  !> `u` with itself, and with each set of `others`. Each bond's states are found once.
+  pure subroutine energies_of_loss(model, u, k, bonds, breaks, before, after, others)
+    type(model_type), intent(in) :: model              !! parameters of the slots
+    real(wp), intent(in) :: u(:, :)                    !! displacements (n_slots, dim) [m]
+    integer, intent(in) :: k                           !! slot
+    type(bonds_type), intent(in) :: bonds              !! of slot `k`, as they were
+    logical, intent(in) :: breaks(:)                   !! (bonds) those that break
+    real(wp), intent(out) :: before(0:), after(0:)     !! (0:sets) [J/m3]
+    real(wp), intent(in), optional :: others(:, :, :)
+      !! (n_slots, dim, sets) other displacements, read at `k` and at the ends of its bonds [m]
+    type(bond_state_type) :: own, state
+    real(wp) :: theta(2, 0:ubound(before, 1)), energy, dilatation
+    integer :: i, o
+
+    before = 0.0_wp
+    after = 0.0_wp
+    theta = 0.0_wp
+    do i = 1, bonds%n
+      if (.not. bonds%intact(i)) cycle
+      own = state_of_bond(model, u, k, bonds, i)
+      state = own
+      do o = 0, ubound(before, 1)
+        if (o > 0) state = state_of_bond(model, others(:, :, o), k, bonds, i)
+        energy = own%Gb*(own%stretch*state%stretch)*bonds%length(i)*bonds%weight(i)
+        dilatation = state%Gd*state%stretch*state%lambda*bonds%weight(i)
+        before(o) = before(o) + energy
+        theta(1, o) = theta(1, o) + dilatation
+        if (breaks(i)) cycle
+        after(o) = after(o) + energy
+        theta(2, o) = theta(2, o) + dilatation
+      end do
+    end do
+    theta = theta*t_of(model, k)
+    associate (m => model%materials(model%material(k)))
+      before = q_of(model, k)/2*before
+      after = q_of(model, k)/2*after
+      if (.not. abs(m%a) > 0.0_wp) return
+      do o = 0, ubound(before, 1)
+        before(o) = before(o) + m%a*theta(1, 0)*theta(1, o)
+        after(o) = after(o) + m%a*theta(2, 0)*theta(2, o)
+      end do
+    end associate
+  end subroutine energies_of_loss
 
   !> Local damage phi of a point [-]: the part of its family's volume behind broken bonds, 0 without
   !> bonds.
