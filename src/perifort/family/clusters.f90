@@ -84,7 +84,7 @@ contains
   !> The members of all clusters of the points `x` (n, dim), which are in the order of `rows`: those
   !> of cluster c stand from `start(c)` to `start(c+1) - 1`, ascending, each with the bits of the
   !> lanes whose family it is in. Two points are neighbours if they are no further apart than the
-  !> sum of their `half_reach` and the larger one of their `own` [m], and do not have the same label.
+  !> sum of their `half_reach` and the larger one of their `own` [m], and if their labels differ.
   subroutine collect_members(x, half_reach, own, label, rows, start, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)  !! (n, dim) positions in the order of `rows` [m]
     real(wp), intent(in), contiguous :: half_reach(:)   !! (n) half of the reach of each point [m]

@@ -64,8 +64,8 @@ module pd_family_lattice
 contains
 
   !> Whether lattice families are possible for a body in point order: every point on a grid, grids
-  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not. In a composite
-  !> family a list has the bonds between grids and those of points on none.
+  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not. In a
+  !> composite family a list has the bonds between grids and those of points on none.
   subroutine lattice_suits(body, rule, suits, reason, joined)
     type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
     type(volume_rule_type), intent(in) :: rule        !! how far families reach
@@ -168,9 +168,9 @@ contains
     end do
   end function extent
 
-  !> Families of a body that `lattice_suits`; the body is arranged in slots, points on no grid behind
-  !> the others and without bonds. `breakable`: bonds may break or be cut, so each gets a bit. `mixed`: bonds in single precision, which 1D has no loops
-  !> for. `key_bits`: the bits of keys that count; with fewer, different surroundings get one key.
+  !> Families of a body that `lattice_suits`; the body is arranged in slots, points on no grid
+  !> behind the others and without bonds. `breakable`: bonds may break or be cut, so each gets a
+  !> bit. `mixed`: bonds in single precision, which 1D has no loops for. `key_bits`: the bits of keys that count; with fewer, different surroundings get one key.
   !> An error is set if the slots are too many for their numbers or for the memory, or if two points
   !> are in one cell.
   subroutine new_lattice_family(body, rule, breakable, mixed, family, error, key_bits, listed)

@@ -1,5 +1,6 @@
-!> The passes over the bonds of a composite family: those of its lattice on the family's slots, those
-!> of its list on the slots of that, whose values are copied from the family's and added to them.
+!> The passes over the bonds of a composite family: those of its lattice on the family's slots,
+!> those of its list on the slots of that, whose values are copied from the family's and added to
+!> them.
 module pd_force_composite
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i4

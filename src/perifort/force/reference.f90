@@ -8,8 +8,8 @@ module pd_force_reference
   implicit none (type, external)
   private
   public :: bond_state_type, state_of_bond, stretch_of_bond, point_dilatation, point_force
-  public :: point_energy, energy_product, energies_of_loss, point_damage, reference_dilatation, reference_force
-  public :: reference_energy
+  public :: point_energy, energy_product, energies_of_loss, point_damage
+  public :: reference_dilatation, reference_force, reference_energy
 
   !> How a bond is deformed.
   type :: bond_state_type
@@ -176,8 +176,8 @@ contains
     end associate
   end function energy_product
 
-  !> Energy densities of slot `k` [J/m3] before and after some of its bonds break: `energy_product` of
-  !> `u` with itself, and with each set of `others`. Each bond's states are found once.
+  !> Energy densities of slot `k` [J/m3] before and after some of its bonds break: `energy_product`
+  !> of `u` with itself, and with each set of `others`. Each bond's states are found once.
   pure subroutine energies_of_loss(model, u, k, bonds, breaks, before, after, others)
     type(model_type), intent(in) :: model              !! parameters of the slots
     real(wp), intent(in) :: u(:, :)                    !! displacements (n_slots, dim) [m]

@@ -76,7 +76,7 @@ contains
 
   !> Classes of slots with the same material, scale and surface factors, where the lattice does not
   !> have all bonds that these follow from: copies of other ranks' points have theirs from there. In
-  !> a composite family factors are alike but for the order of sums; on ranks they are so bit by bit.
+  !> a composite family factors are alike but for the order of sums; on ranks bit by bit.
   subroutine part_by_factors(model, family)
     type(model_type), intent(in) :: model
     type(lattice_family_type), intent(inout) :: family  !! gets other classes

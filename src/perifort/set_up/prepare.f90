@@ -124,8 +124,8 @@ contains
       call choose_family(scene, rule, system%body, laws, divided, choice, error)
       if (allocated(error)) return
       if (present(world)) then
-        if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, 'horizon', 1, &
-          & 'family', '--reproducible needs lattice families: on lists forces depend on the '// &
+        if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, &
+          & 'horizon', 1, 'family', '--reproducible needs lattice families: on lists forces depend on the '// &
           & 'ranks in their last digits', choice%reason)
         if (world%reproducible) call find_lowest(system%body)
         system%body%order%reproducible = world%reproducible
