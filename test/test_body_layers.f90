@@ -365,6 +365,7 @@ contains
     scene%bodies(2)%lower(1:2) = [0.0_wp, 4.0_wp]
     scene%bodies(2)%upper(1:2) = [4.0_wp, 6.0_wp]
     scene%bodies(2)%points(1:2) = [8, 4]
+    scene%horizon%length = 3.015_wp
     call layered(scene, 1)
     scene%boundaries(1)%side = 'y_max'
     call generate(scene, body, counts, error)

@@ -42,9 +42,9 @@ contains
   end subroutine collect_family_composite
 
   !> Two bodies side by side, the right one of half the spacing, turned into 3D where asked.
-  subroutine two_bodies(dim, local, scene)
+  subroutine two_bodies(dim, own, scene)
     integer, intent(in) :: dim
-    logical, intent(in) :: local  !! horizons by the spacing of each body
+    logical, intent(in) :: own  !! horizons by the spacing of each body, else one
     type(scene_type), intent(out) :: scene
     integer :: points(3)
 
@@ -52,7 +52,7 @@ contains
     if (dim == 1) points(1) = 20
     call box_scene(points(:dim), spacing, 0.3_wp, scene)
     scene%horizon%surface_correction = 'energy'
-    scene%horizon%local = local
+    if (.not. own) scene%horizon%length = scene%horizon%ratio*spacing
     scene%bodies = [scene%bodies(1), scene%bodies(1)]
     scene%bodies(2)%name = 'fine'
     scene%bodies(2)%lower(1) = scene%bodies(1)%upper(1)
@@ -96,13 +96,17 @@ contains
     call expect_kind(error, scene, .false., 'asked for')
     call two_bodies(2, .true., scene)
     call expect_kind(error, scene, .true., '% of the bonds that join grids')
-    scene%horizon%local = .false.
+    scene%bodies(2)%lower(1) = scene%bodies(2)%lower(1) + 4*spacing
+    scene%bodies(2)%upper(1) = scene%bodies(2)%upper(1) + 4*spacing
+    call expect_kind(error, scene, .false., '2 grids')
+    call two_bodies(2, .false., scene)
+    scene%horizon%length = 3.015_wp*spacing
     scene%bodies%points(2) = [2, 4]
     scene%horizon%surface_correction = 'consistent'
     call expect_kind(error, scene, .false., &
       & "no composite family: surface_correction = 'consistent'")
     call two_bodies(3, .false., scene)
-    scene%horizon%ratio = 5.0_wp
+    scene%horizon%length = 5*spacing
     call expect_kind(error, scene, .false., 'too many points have bonds beyond their grid')
   end subroutine test_choice
 

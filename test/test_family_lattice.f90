@@ -62,6 +62,7 @@ contains
 
     call box_scene([12, 9], spacing, 0.25_wp, scene)
     scene%horizon%surface_correction = 'energy'
+    scene%horizon%length = ratio*coarser*spacing
     scene%bodies = [scene%bodies(1), scene%bodies(1)]
     scene%bodies(2)%name = 'right'
     scene%bodies(2)%points(:2) = [7, 8]

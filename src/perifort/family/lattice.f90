@@ -115,8 +115,6 @@ contains
     reason = ''
     if (any(body%grid == 0)) then
       reason = 'some points are a cloud, a mesh or cut cells'
-    else if (rule%ratio > 0.0_wp) then
-      reason = 'horizons differ from point to point'
     else if (any(body%grid /= body%grid(1))) then
       allocate (half_reach(body%n_points), across(body%n_points))
       do k = 1, body%n_points

@@ -7,7 +7,7 @@ module pd_set_up_horizons
   use pd_law_weighted, only: weighted_law_type
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: has_own_horizons, scene_type
+  use pd_scene_content_types, only: has_own_horizons, has_refinement, scene_type
   implicit none (type, external)
   private
   public :: rule_of_scene, check_horizons
@@ -66,9 +66,18 @@ contains
     subroutine refuse(group, number, key, what, why)
       character(*), intent(in) :: group, key, what, why
       integer, intent(in) :: number
-      call scene_fault(error, scene, group, number, key, &
-        & trim(merge('&horizon local', '&refine       ', scene%horizon%local))// &
-        & ' does not serve '//what, why)
+      character(:), allocatable :: cause, instead
+
+      instead = ''
+      if (scene%horizon%local) then
+        cause = '&horizon local does'
+      else if (has_refinement(scene)) then
+        cause = '&refine does'
+      else
+        cause = 'lattices of different spacings have horizons of their own, which do'
+        instead = '; &horizon length gives all points one horizon'
+      end if
+      call scene_fault(error, scene, group, number, key, cause//' not serve '//what, why//instead)
     end subroutine refuse
 
   end subroutine check_horizons

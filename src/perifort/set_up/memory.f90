@@ -6,7 +6,7 @@ module pd_set_up_memory
   use pd_base_text, only: to_text, with_unit
   use pd_law_laws, only: law_table_type
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: has_grid, has_refinement, is_lattice, is_set, laws_of, &
+  use pd_scene_content_types, only: has_grid, has_own_horizons, is_lattice, is_set, laws_of, &
     & scene_type
   use pd_body_generate, only: horizon_of
   implicit none (type, external)
@@ -61,8 +61,9 @@ contains
     real(wp), parameter :: block = 8.0_wp                               !! slots with one table
     real(wp), parameter :: per_generic_bond = 33.0_wp                   !! of both directions each
     real(wp), parameter :: per_history = 13.0_wp                        !! a real, two states
+    real(wp), parameter :: in_joints = 0.3_wp                           !! points between grids
     real(wp), parameter :: pi = acos(-1.0_wp)
-    real(wp) :: points, ratio, members, kinds
+    real(wp) :: points, ratio, members, kinds, listed
     integer :: dim, history
     logical :: breaking, generic
 
@@ -82,14 +83,22 @@ contains
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking
-    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies)) .or. &
-      & (scene%horizon%local .and. size(scene%bodies) > 1) .or. has_refinement(scene)) then
-      bytes = bytes + points*(merge(per_generic_point, per_list_point, generic) &
+    ! the part of the points that stands in lists
+    listed = 0.0_wp
+    if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies))) then
+      listed = 1.0_wp
+    else if (has_own_horizons(scene)) then
+      listed = merge(1.0_wp, in_joints, generic)
+    end if
+    if (listed > 0.0_wp) then
+      bytes = bytes + listed*points*(merge(per_generic_point, per_list_point, generic) &
         & + per_list_bond*members)
-      if (scene%horizon%volume_correction == 'exact') bytes = bytes + points*per_exact_bond*members
+      if (scene%horizon%volume_correction == 'exact') &
+        & bytes = bytes + listed*points*per_exact_bond*members
       if (scene%horizon%surface_correction == 'consistent') &
-        & bytes = bytes + points*per_weighted_bond*members
-    else
+        & bytes = bytes + listed*points*per_weighted_bond*members
+    end if
+    if (listed < 1.0_wp) then
       ! blocks near the surfaces have weights of their own
       kinds = min(points/block, (2*min(ratio, 1.0e4_wp) + 1)**dim)
       bytes = bytes + kinds*members*block*per_weight

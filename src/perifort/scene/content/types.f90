@@ -5,6 +5,7 @@
 !> Whoever builds a scene without a file fills these types directly.
 module pd_scene_content_types
   use pd_base_error, only: internal_fault
+  use pd_base_kinds, only: wp
   use pd_law_laws, only: all_laws, law_table_type
   use pd_scene_format_file, only: line_type
   use pd_scene_format_given, only: is_given, is_set, name_length, path_length, &
@@ -145,11 +146,36 @@ contains
     if (allocated(scene%refines)) has_refinement = size(scene%refines) > 0
   end function has_refinement
 
-  !> Whether each point has a horizon of its own: `ratio` times its spacing.
+  !> Whether each point has a horizon of its own: `ratio` times its spacing. Lattices of different
+  !> spacings have, unless a length is given for all.
   pure logical function has_own_horizons(scene)
     type(scene_type), intent(in) :: scene  !! any scene
-    has_own_horizons = scene%horizon%local .or. has_refinement(scene)
+    has_own_horizons = scene%horizon%local .or. has_refinement(scene) &
+      & .or. has_different_grids(scene)
   end function has_own_horizons
+
+  !> Whether all bodies are lattices, whose spacings differ, with horizons by a ratio.
+  pure logical function has_different_grids(scene)
+    type(scene_type), intent(in) :: scene  !! any scene
+    real(wp), parameter :: same = 1.0e-9_wp
+    real(wp) :: spacing, least, most
+    integer :: i
+
+    has_different_grids = .false.
+    if (is_set(scene%horizon%length) .or. .not. allocated(scene%bodies)) return
+    if (.not. all(has_grid(scene%bodies))) return
+    least = huge(least)
+    most = 0.0_wp
+    do i = 1, size(scene%bodies)
+      associate (body => scene%bodies(i))
+        spacing = body%spacing
+        if (.not. is_set(spacing)) spacing = (body%upper(1) - body%lower(1))/max(1, body%points(1))
+        least = min(least, spacing)
+        most = max(most, spacing)
+      end associate
+    end do
+    has_different_grids = most - least > same*most
+  end function has_different_grids
 
   !> The bond laws that a scene may name: its own table, else that of the program.
   function laws_of(scene) result(laws)

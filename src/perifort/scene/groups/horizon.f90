@@ -30,9 +30,11 @@ contains
     class(horizon_group), intent(inout) :: group  !! its components are read or shown
     type(keys_type), intent(inout) :: keys        !! the visitor: reads, describes, writes
 
-    call keys%key('ratio', group%ratio, '-', 'horizon over the largest spacing', at_least=1.0_wp, &
+    call keys%key('ratio', group%ratio, '-', 'horizon over the spacing: of each lattice its own, '// &
+      & 'of other bodies the largest one of the scene', at_least=1.0_wp, &
       & hidden=is_set(group%length))
-    call keys%key('length', group%length, 'm', 'horizon delta, instead of ratio', above=0.0_wp)
+    call keys%key('length', group%length, 'm', 'horizon delta of all points, instead of ratio', &
+      & above=0.0_wp)
     call keys%key('local', group%local, 'each point has its own horizon: `ratio` times its '// &
       & 'spacing; bonds have the larger one of both ends')
     call keys%key('volume_correction', group%volume_correction, 'volumes of cells that the '// &
@@ -47,8 +49,8 @@ contains
       & allowed=[character(11) :: 'unprojected', 'projected'], &
       & default="'unprojected'")
     call keys%key('family', group%family, &
-      & 'how families are kept: a lattice where all points lie on grids, else lists; or one of '// &
-      & 'them on request', &
+      & 'how families are kept: a lattice where all points lie on grids, else lists, and both '// &
+      & 'where grids meet; or one of them on request', &
       & allowed=[character(9) :: 'automatic', 'lattice', 'list'])
   end subroutine visit
 
