@@ -4,6 +4,7 @@
 module test_set_up_horizons
   use bodies, only: at_point, expect_true, noise, shake
   use comparisons, only: expect_close, max_abs, text_of
+  use force_subjects, only: some_gradient
   use meshes, only: write_file
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: pi
@@ -38,6 +39,8 @@ contains
       & new_unittest('momentum, energy and fast loops of clouds', test_forces), &
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('one grid stays as it is', test_one_grid), &
+      & new_unittest('lattices of two spacings have two horizons, unless a length is given', &
+      & test_two_spacings), &
       & new_unittest('away from where grids meet, each is as if alone', test_alone), &
       & new_unittest('a graded bar in tension', test_tension), &
       & new_unittest('waves in a graded bar', test_waves), &
@@ -127,6 +130,16 @@ contains
       & '&material youngs_modulus = 2e11 density = 8e3 '//material//' /'//line// &
       & local//horizon//' /'//line//more
   end function grids
+
+  !> The same two bodies with the given groups alone.
+  function own_grids(more) result(text)
+    character(*), intent(in) :: more
+    character(:), allocatable :: text
+    character(:), allocatable :: of_local
+
+    of_local = grids(8, 'poissons_ratio = 0.2', '', '')
+    text = of_local(:index(of_local, local) - 1)//more
+  end function own_grids
 
   subroutine ready_text(text, set_up, error)
     character(*), intent(in) :: text
@@ -759,6 +772,27 @@ contains
       & 'one horizon moves all')
   end subroutine test_facets
 
+  !> The forces of `local`, bit for bit, without it; one horizon, where that is given.
+  subroutine test_two_spacings(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: own, same, single
+    real(wp), allocatable :: u(:, :), force(:, :), expected(:, :)
+
+    call ready_text(own_grids('&horizon ratio = 3.015 /'//line//relaxes), own, error)
+    call ready_text(own_grids('&horizon ratio = 3.015 local = .true. /'//line//relaxes), same, error)
+    call ready_text(own_grids('&horizon length = 0.3 /'//line//relaxes), single, error)
+    if (allocated(error)) return
+    allocate (u(own%system%body%n_slots, 2), source=0.0_wp)
+    call shake(own%system%body, some_gradient(1.0e-3_wp), 1.0e-5_wp, 3, u)
+    call force_at(own%system, u, force)
+    call force_at(same%system, u, expected)
+    call expect_true(error, max_abs(expected) > 0.0_wp, 'no force')
+    call expect_close(error, force, expected, 0.0_wp, 'with and without local')
+    call expect_true(error, own%system%family%rule%ratio > 0.0_wp, 'one horizon')
+    call expect_close(error, single%system%family%rule%ratio, 0.0_wp, 0.0_wp, 'own horizons')
+    call expect_close(error, single%system%family%rule%delta, 0.3_wp, 1.0e-15_wp, 'the horizon')
+  end subroutine test_two_spacings
+
   subroutine test_refusals(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: solid = 'poissons_ratio = 0.2 '
@@ -777,12 +811,16 @@ contains
     call refuse(grids(8, solid, '', '&time steps = 1 /'//line//"&contact between = 'a', 'b' /"), &
       & '&horizon local does not serve contact')
     call refuse(grids(8, solid, "family = 'lattice'", relaxes), &
-      & 'horizons differ from point to point')
+      & 'bonds join bodies on different grids')
+    call refuse(own_grids("&horizon surface_correction = 'none' /"//line//'&time steps = 1 /'// &
+      & line//"&contact between = 'a', 'b' /"), 'lattices of different spacings have horizons '// &
+      & 'of their own, which do not serve contact', '&horizon length gives all points one horizon')
 
   contains
 
-    subroutine refuse(text, parts)
+    subroutine refuse(text, parts, instead)
       character(*), intent(in) :: text, parts
+      character(*), intent(in), optional :: instead
       type(scene_type) :: scene
       type(set_up_type) :: set_up
       type(fault_type), allocatable :: fault
@@ -791,6 +829,7 @@ contains
       call read_scene_text(text, '', scene, fault)
       if (.not. allocated(fault)) call prepare(scene, set_up, fault)
       call expect_parts(error, fault, parts)
+      if (present(instead)) call expect_parts(error, fault, instead)
     end subroutine refuse
 
   end subroutine test_refusals

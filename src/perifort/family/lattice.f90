@@ -168,7 +168,8 @@ contains
 
   !> Families of a body that `lattice_suits`; the body is arranged in slots, points on no grid
   !> behind the others and without bonds. `breakable`: bonds may break or be cut, so each gets a
-  !> bit. `mixed`: bonds in single precision, which 1D has no loops for. `key_bits`: the bits of keys that count; with fewer, different surroundings get one key.
+  !> bit. `mixed`: bonds in single precision, which 1D has no loops for. `key_bits`: the bits of
+  !> keys that count; with fewer, different surroundings get one key.
   !> An error is set if the slots are too many for their numbers or for the memory, or if two points
   !> are in one cell.
   subroutine new_lattice_family(body, rule, breakable, mixed, family, error, key_bits, listed)

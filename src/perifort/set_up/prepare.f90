@@ -125,8 +125,8 @@ contains
       if (allocated(error)) return
       if (present(world)) then
         if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, &
-          & 'horizon', 1, 'family', '--reproducible needs lattice families: on lists forces depend on the '// &
-          & 'ranks in their last digits', choice%reason)
+          & 'horizon', 1, 'family', '--reproducible needs lattice families: on lists forces '// &
+          & 'depend on the ranks in their last digits', choice%reason)
         if (world%reproducible) call find_lowest(system%body)
         system%body%order%reproducible = world%reproducible
       end if

@@ -30,8 +30,8 @@ contains
     class(horizon_group), intent(inout) :: group  !! its components are read or shown
     type(keys_type), intent(inout) :: keys        !! the visitor: reads, describes, writes
 
-    call keys%key('ratio', group%ratio, '-', 'horizon over the spacing: of each lattice its own, '// &
-      & 'of other bodies the largest one of the scene', at_least=1.0_wp, &
+    call keys%key('ratio', group%ratio, '-', 'horizon over the spacing: of each lattice its '// &
+      & 'own, of other bodies the largest one of the scene', at_least=1.0_wp, &
       & hidden=is_set(group%length))
     call keys%key('length', group%length, 'm', 'horizon delta of all points, instead of ratio', &
       & above=0.0_wp)
