@@ -40,7 +40,7 @@ contains
       & new_unittest('pressure that varies has the right force and moment', test_varying), &
       & new_unittest('boundaries move the points near facets', test_boundary), &
       & new_unittest('regions and materials by names', test_names), &
-      & new_unittest('energy of uniform strain on meshes of every shape', test_patch), &
+      & new_unittest('long: energy of uniform strain on meshes of every shape', test_patch), &
       & new_unittest('tension of a meshed plate', test_tension), &
       & new_unittest('a mesh beside a lattice and another mesh', test_together), &
       & new_unittest('pieces and nodes on each other are warned of', test_warnings), &

@@ -31,7 +31,7 @@ contains
   subroutine collect_motion_pins(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('a lever on a pin and a spring', test_lever), &
+      & new_unittest('long: a lever on a pin and a spring', test_lever), &
       & new_unittest('a roller moves along', test_roller), &
       & new_unittest('a pin in 3D turns about any axis', test_turned), &
       & new_unittest('a pendulum', test_pendulum), &

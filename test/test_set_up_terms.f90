@@ -25,7 +25,7 @@ contains
     testsuite = [ &
       & new_unittest('bodies of different density fall alike', test_fall), &
       & new_unittest('a hanging bar is stretched by its weight', test_hanging), &
-      & new_unittest('springs yield by force over stiffness', test_springs), &
+      & new_unittest('long: springs yield by force over stiffness', test_springs), &
       & new_unittest('an absorbing boundary takes in a longitudinal wave', test_absorbing), &
       & new_unittest('combinations that mean nothing are refused', test_refused)]
   end subroutine collect_set_up_terms
