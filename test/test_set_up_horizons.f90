@@ -779,7 +779,8 @@ contains
     real(wp), allocatable :: u(:, :), force(:, :), expected(:, :)
 
     call ready_text(own_grids('&horizon ratio = 3.015 /'//line//relaxes), own, error)
-    call ready_text(own_grids('&horizon ratio = 3.015 local = .true. /'//line//relaxes), same, error)
+    call ready_text(own_grids('&horizon ratio = 3.015 local = .true. /'//line//relaxes), same, &
+      & error)
     call ready_text(own_grids('&horizon length = 0.3 /'//line//relaxes), single, error)
     if (allocated(error)) return
     allocate (u(own%system%body%n_slots, 2), source=0.0_wp)
