@@ -38,6 +38,7 @@ contains
       & new_unittest('all cells refined are a fine lattice', test_all), &
       & new_unittest('pressure on coarse and fine rows of a side', test_loads), &
       & new_unittest('layers of sides that are not refined', test_layers), &
+      & new_unittest('layers of refined sides', test_fine_layers), &
       & new_unittest('a pulse is hardly reflected', test_reflection), &
       & new_unittest('what is refused', test_refusals)]
   end subroutine collect_body_refine
@@ -318,7 +319,7 @@ contains
 
   end subroutine test_loads
 
-  !> Layers join unrefined sides, two at once; the refined side has none.
+  !> Layers join unrefined sides, two at once.
   subroutine test_layers(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: refined = "&refine shape = 'box' lower = 0.5, -0.3 upper = 1, 0.4 /"
@@ -333,10 +334,84 @@ contains
       if (.not. allocated(error)) call check(error, count(body%layer == 2 .and. body%point > 0), &
         & 60, 'second layer')
     end associate
-    call refuse(error, plate//relaxes//refined//line// &
-      & "&boundary side = 'x_max' displacement_x = 0 /", &
-      & "the layer at side 'x_max' joins refined cells|&refine does not serve layers there")
   end subroutine test_layers
+
+  !> A layer takes spacing and horizon from the rows that it joins: three rows of 0.1 m before coarse
+  !> columns, three of 0.05 m before fine ones. Fine cells behind coarse ones change nothing.
+  subroutine test_fine_layers(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: pulled = "&boundary name = 'right' side = 'x_max' "// &
+      & 'displacement_x = 1e-6 /'//line//"&boundary name = 'left' side = 'x_min' "// &
+      & 'displacement_x = 0 /'//line
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: depth(:)
+
+    call ready_text(plate//relaxes//pulled// &
+      & "&refine shape = 'box' lower = 0.5, -0.3 upper = 1, 0.4 /", set_up, error)
+    if (allocated(error)) return
+    associate (body => set_up%system%body)
+      call check(error, count(body%layer == 1 .and. body%spacing > 0.07_wp), 13*3, 'coarse layer')
+      if (.not. allocated(error)) call check(error, count(body%layer == 1 .and. &
+        & body%spacing < 0.07_wp), 14*3, 'fine layer')
+      if (.not. allocated(error)) call check(error, count(body%layer == 2), 60, 'the other side')
+      if (allocated(error)) return
+      ! each in the three rows before the side, and none behind another
+      depth = (pack(body%x(:, 1), body%layer == 1) - 1)/pack(body%spacing, body%layer == 1)
+      call expect_close(error, minval(depth), 0.5_wp, 1.0e-9_wp, 'the first row')
+      call expect_close(error, maxval(depth), 2.5_wp, 1.0e-9_wp, 'the last row')
+      call expect_close(error, sum(body%volume, mask=body%layer == 1), &
+        & 13*3*0.1_wp**2 + 14*3*0.05_wp**2, 1.0e-12_wp, 'volume')
+      call expect_true(error, all(abs(pack(body%x(:, 2), body%layer == 1 .and. &
+        & body%spacing < 0.07_wp) - 0.05_wp) < 0.35_wp), 'columns of the fine layer')
+    end associate
+    ! a corner that is cut: cells that both layers reach for belong to the earlier one
+    call ready_text(plate//relaxes//"&refine shape = 'box' lower = 0.5, 0.5 levels = 2 /"//line// &
+      & "&remove shape = 'box' lower = 0.81, 0.81 /"//line// &
+      & "&boundary side = 'x_max' displacement_x = 0 /"//line// &
+      & "&boundary side = 'y_max' displacement_y = 0 /", set_up, error)
+    if (allocated(error)) return
+    call expect_true(error, minval(set_up%system%body%spacing, mask=set_up%system%body%layer == 2) &
+      & < 0.03_wp, 'no layer at the refined corner')
+    call pulled_plate(error, '', 0.0_wp)
+    call pulled_plate(error, "&refine shape = 'box' lower = 0.4, -0.3 levels = 2 /"//line, 0.02_wp)
+
+  contains
+
+    !> Reactions of both sides are in balance, the energy is half of what the moved side has done,
+    !> and both are those of the plate without finer cells within `tolerance`: a layer holds about
+    !> half a spacing outside of its face, and 0.04 m of 2 m are that much less.
+    subroutine pulled_plate(error, refinement, tolerance)
+      type(error_type), allocatable, intent(inout) :: error
+      character(*), intent(in) :: refinement
+      real(wp), intent(in) :: tolerance
+      type(scene_type) :: scene
+      type(answer_type) :: answer
+      type(fault_type), allocatable :: fault
+      real(wp), allocatable :: strain(:), left(:), right(:)
+      real(wp), save :: expected = 0.0_wp
+
+      if (allocated(error)) return
+      call read_scene_text(plate//relaxes//pulled//refinement// &
+        & "&output fields = 'displacement' /", '', scene, fault)
+      if (.not. allocated(fault)) call run_scene(scene, run_options_type(quiet=.true., &
+        & files=.false.), fault, answer=answer)
+      if (.not. allocated(fault)) call answer%get_column('strain_energy', strain, fault)
+      if (.not. allocated(fault)) call answer%get_column('left_reaction_x', left, fault)
+      if (.not. allocated(fault)) call answer%get_column('right_reaction_x', right, fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      associate (n => size(strain))
+        call expect_close(error, left(n), -right(n), 1.0e-5_wp*abs(right(n)), 'balance')
+        call expect_close(error, strain(n), right(n)*0.5e-6_wp, 1.0e-4_wp*strain(n), 'energy')
+        if (tolerance > 0.0_wp) call expect_close(error, right(n), expected, &
+          & tolerance*expected, 'reaction')
+        expected = right(n)
+      end associate
+    end subroutine pulled_plate
+
+  end subroutine test_fine_layers
 
   !> A pulse of displacement, 20 coarse spacings long, runs into a part of half the spacing. What
   !> comes back, the difference to a bar of the coarse spacing, is 1.5 % of it (measured), of which

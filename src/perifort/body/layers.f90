@@ -2,16 +2,18 @@
 !>
 !> A layer continues the lattice of its body, column by column. Seen from the side, a column's layer
 !> starts outside the outermost cell that is left of it, if that cell lies within the horizon of the
-!> outermost cell of all columns.
+!> outermost cell of all columns. Where cells are refined, columns are those of the cells that stand
+!> outermost, and their layers have the spacing and the horizon of these.
 module pd_body_layers
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_error, only: error_type
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
   use pd_scene_content_rules, only: scene_fault
-  use pd_scene_content_types, only: adds_layer, has_own_horizons, scene_type
+  use pd_scene_content_types, only: adds_layer, has_own_horizons, has_refinement, scene_type
   use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
   use pd_body_lattices, only: box_of_cells, cell_of, place_in
+  use pd_body_refine, only: finer, level_of
   implicit none (type, external)
   private
   public :: add_layers, layer_rows, layer_count_type, layer_count_text
@@ -31,21 +33,23 @@ module pd_body_layers
     integer :: shared = 0       !! points left out, because an earlier layer has their cell
   end type layer_count_type
 
-  !> The side of one lattice body: the remaining cells of each column. Levels are numbers of cells
-  !> along the axis, counted so that they grow outwards.
+  !> The side of one lattice body, or of its cells of one level of `&refine`: the remaining cells of
+  !> each column. Heights are numbers of cells along the axis, counted so that they grow outwards.
   type :: side_type
     type(grid_type) :: grid
     integer(i2) :: number = 0_i2       !! of the grid; 0: nothing is left of the body
     integer(i2) :: material = 0_i2     !! number of its material
     integer :: body = 0                !! number of the body
+    integer :: parts = 1               !! columns along each axis into which one of the body's
+                                       !! lattice is divided
     integer :: rows = 0                !! of the layer
     real(wp) :: delta = 0.0_wp         !! horizon of its points [m]
-    integer, allocatable :: top(:, :)  !! level of each column's outermost cell, or `nothing`
-    integer, allocatable :: fine(:, :) !! of its outermost divided cell (`&refine`), or `nothing`
+    integer, allocatable :: top(:, :)  !! height of each column's outermost cell, or `nothing`
+    logical, allocatable :: hidden(:, :)  !! whether cells of another side stand before the column
     logical, allocatable :: has(:, :)  !! whether the column gets the layer
   end type side_type
 
-  integer, parameter :: nothing = -huge(0)  !! level of a column of which nothing is left
+  integer, parameter :: nothing = -huge(0)  !! height of a column of which nothing is left
 
 contains
 
@@ -103,14 +107,6 @@ contains
       outward = merge(-1, 1, boundary%side(3:5) == 'min')
       call find_sides(scene, boundary%body, body, n_body, axis, outward, delta, sides)
       call choose_columns(body%dim, axis, outward, sides, tally)
-      do i = 1, size(sides)
-        if (.not. any(sides(i)%has .and. sides(i)%fine >= sides(i)%top)) cycle
-        call scene_fault(error, scene, 'boundary', tally%boundary, 'side', &
-          & 'the layer at side '''//trim(boundary%side)//''' joins refined cells', &
-          & '&refine does not serve layers there: refine at a distance from the side, or move '// &
-          & 'the points of a region')
-        return
-      end do
       call allocate_points(layer, body%dim, 0)
       do i = 1, size(sides)
         if (.not. any(sides(i)%has)) cycle
@@ -149,8 +145,8 @@ contains
     end function why_empty
   end subroutine make_layer
 
-  !> The sides of the bodies that a boundary names, or of all lattice bodies: those of which
-  !> something is left.
+  !> The sides of the bodies that a boundary names, or of all lattice bodies, one for each level of
+  !> their cells: those of which something is left.
   subroutine find_sides(scene, name, body, n_body, axis, outward, delta, sides)
     type(scene_type), intent(in) :: scene
     character(*), intent(in) :: name       !! of the body, '' for all
@@ -159,42 +155,48 @@ contains
     integer, intent(in) :: axis            !! across the side: 1, 2, 3
     integer, intent(in) :: outward         !! 1 at an upper side, -1 at a lower one
     real(wp), intent(in) :: delta          !! horizon [m]
-    type(side_type), allocatable, intent(out) :: sides(:)  !! in the order of the bodies
-    type(side_type), allocatable :: all_sides(:)
-    integer :: b, c(2), k, n, cell(3), points(3)
+    type(side_type), allocatable, intent(out) :: sides(:)
+      !! in the order of the bodies, the coarsest level first
+    type(side_type), allocatable :: all_sides(:, :)
+    integer :: b, c(2), k, n, cell(3), points(3), level, levels
 
     c = across(axis)
-    allocate (all_sides(size(scene%bodies)))
+    levels = 0
+    if (has_refinement(scene)) levels = maxval(scene%refines%levels)
+    allocate (all_sides(0:levels, size(scene%bodies)))
     do k = 1, n_body
       b = body%body(k)
       if (body%grid(k) == 0) cycle
       if (name /= '' .and. scene%bodies(b)%name /= name) cycle
-      associate (side => all_sides(b))
+      level = level_of(body, k)
+      associate (side => all_sides(level, b))
         if (side%number == 0_i2) then
           side%number = body%grid(k)
           side%material = body%material(k)
           side%body = b
-          side%grid = body%lattices(b)%grid
+          side%grid = finer(body%lattices(b)%grid, level)
+          side%parts = 2**level
           side%delta = delta
           if (has_own_horizons(scene)) side%delta = scene%horizon%ratio*side%grid%spacing
           side%rows = layer_rows(side%delta, side%grid%spacing)
           points = body%lattices(b)%cells
+          points(:body%dim) = points(:body%dim)*side%parts
           allocate (side%top(points(c(1)), points(c(2))), source=nothing)
-          allocate (side%fine(points(c(1)), points(c(2))), source=nothing)
-          allocate (side%has(points(c(1)), points(c(2))), source=.false.)
+          allocate (side%hidden(points(c(1)), points(c(2))), side%has(points(c(1)), &
+            & points(c(2))), source=.false.)
         end if
         cell = cell_of(side%grid, body%x(k, :))
         side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), outward*cell(axis))
-        if (body%spacing(k) < 0.75_wp*side%grid%spacing) side%fine(cell(c(1)), cell(c(2))) &
-          & = max(side%fine(cell(c(1)), cell(c(2))), outward*cell(axis))
       end associate
     end do
     allocate (sides(count(all_sides%number /= 0_i2)))
     n = 0
-    do b = 1, size(all_sides)
-      if (all_sides(b)%number == 0_i2) cycle
-      n = n + 1
-      sides(n) = all_sides(b)
+    do b = 1, size(all_sides, 2)
+      do level = 0, levels
+        if (all_sides(level, b)%number == 0_i2) cycle
+        n = n + 1
+        sides(n) = all_sides(level, b)
+      end do
     end do
   end subroutine find_sides
 
@@ -211,9 +213,8 @@ contains
     integer, intent(in) :: axis, outward            !! as in `find_sides`
     type(side_type), intent(inout) :: sides(:)      !! `has` is set
     type(layer_count_type), intent(inout) :: tally  !! columns are added
-    logical, allocatable :: hidden(:, :)
     real(wp) :: outer(size(sides)), outermost
-    integer :: i, j
+    integer :: i, j, first
 
     do i = 1, size(sides)
       outer(i) = face_of(sides(i), axis, outward, maxval(sides(i)%top))
@@ -221,56 +222,82 @@ contains
     outermost = maxval(outer)
     do i = 1, size(sides)
       associate (side => sides(i), h => sides(i)%grid%spacing)
-        allocate (hidden(size(side%top, 1), size(side%top, 2)), source=.false.)
         do j = 1, size(sides)
           if (j == i .or. outermost - outer(i) > side%delta + same_place*h) cycle
           ! flat sides at one level, the usual case, hide nothing of each other
           if (outer(j) <= face_of(side, axis, outward, minval(side%top, &
             & mask=side%top /= nothing)) + same_place*h) cycle
-          call hide(side, sides(j), dim, axis, outward, hidden)
+          call hide(side, sides(j), dim, axis, outward, side%hidden)
         end do
-        call mark(side, hidden)
-        deallocate (hidden)
+        side%has = side%top /= nothing .and. .not. (side%hidden .or. too_far(side))
       end associate
     end do
+    first = 1
+    do i = 1, size(sides)
+      if (i < size(sides)) then
+        if (sides(i + 1)%body == sides(i)%body) cycle
+      end if
+      call count_columns(sides(first:i))
+      first = i + 1
+    end do
+
   contains
 
-    !> Mark the columns of one side that get the layer, and count.
-    subroutine mark(side, hidden)
-      type(side_type), intent(inout) :: side
-      logical, intent(in) :: hidden(:, :)  !! its columns that another body covers
-      integer :: m, n, farther, empty, covered
+    !> Which columns begin farther in than the horizon.
+    pure function too_far(side)
+      type(side_type), intent(in) :: side
+      logical :: too_far(size(side%top, 1), size(side%top, 2))
+      integer :: m, n
 
-      farther = 0
-      empty = 0
-      covered = 0
       do n = 1, size(side%top, 2)
         do m = 1, size(side%top, 1)
-          if (side%top(m, n) == nothing) then
-            empty = empty + 1
-          else if (hidden(m, n)) then
-            covered = covered + 1
-          else if (outermost - face_of(side, axis, outward, side%top(m, n)) &
-            & > side%delta + same_place*side%grid%spacing) then
-            farther = farther + 1
-          else
-            side%has(m, n) = .true.
-          end if
+          too_far(m, n) = .false.
+          if (side%top(m, n) /= nothing) too_far(m, n) = outermost &
+            & - face_of(side, axis, outward, side%top(m, n)) &
+            & > side%delta + same_place*side%grid%spacing
         end do
       end do
-      if (.not. any(side%has)) return
-      tally%columns = tally%columns + count(side%has)
-      tally%farther_in = tally%farther_in + farther
-      tally%empty = tally%empty + empty
-      tally%covered = tally%covered + covered
-    end subroutine mark
+    end function too_far
+
+    !> Count the columns of one body, those of its lattice: one has the layer where a part of it has.
+    subroutine count_columns(levels)
+      type(side_type), intent(in) :: levels(:)  !! sides of the body
+      integer, allocatable :: kind(:, :)
+      integer, parameter :: empty = 0, farther_in = 1, covered = 2, joined = 3
+      integer :: l, m, n, at(2), c(2), this
+
+      if (.not. any([(any(levels(l)%has), l=1, size(levels))])) return
+      c = across(axis)
+      at = shape(levels(1)%top)
+      where (c <= dim) at = at/levels(1)%parts
+      allocate (kind(at(1), at(2)), source=empty)
+      do l = 1, size(levels)
+        associate (side => levels(l))
+          do n = 1, size(side%top, 2)
+            do m = 1, size(side%top, 1)
+              if (side%top(m, n) == nothing) cycle
+              this = farther_in
+              if (side%hidden(m, n)) this = covered
+              if (side%has(m, n)) this = joined
+              at = [m, n]
+              where (c <= dim) at = (at - 1)/side%parts + 1
+              kind(at(1), at(2)) = max(kind(at(1), at(2)), this)
+            end do
+          end do
+        end associate
+      end do
+      tally%columns = tally%columns + count(kind == joined)
+      tally%farther_in = tally%farther_in + count(kind == farther_in)
+      tally%empty = tally%empty + count(kind == empty)
+      tally%covered = tally%covered + count(kind == covered)
+    end subroutine count_columns
   end subroutine choose_columns
 
-  !> How far out the outer face of a level lies [m], growing outwards.
+  !> How far out the outer face of a cell lies [m], growing outwards.
   pure real(wp) function face_of(side, axis, outward, level) result(face)
     type(side_type), intent(in) :: side
     integer, intent(in) :: axis, outward  !! as in `find_sides`
-    integer, intent(in) :: level          !! of a cell
+    integer, intent(in) :: level          !! height of the cell
     face = outward*side%grid%origin(axis) + (level + merge(1, 0, outward < 0)) &
       & *side%grid%spacing
   end function face_of

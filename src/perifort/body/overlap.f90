@@ -1,13 +1,15 @@
 !> Bodies and layers that overlap: found by the arithmetic of their grids, in time linear in the
 !> number of points.
 module pd_body_overlap
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_lookup, only: lookup_type, mix
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: adds_layer, has_grid, scene_type
   use pd_body_body, only: body_type, grid_type
   use pd_body_lattices, only: cell_of, place_in
+  use pd_body_refine, only: finer, level_of
   implicit none (type, external)
   private
   public :: check_lattices
@@ -21,8 +23,16 @@ module pd_body_overlap
     integer :: n = 0                             !! points of the body, a cloud's too
     integer :: low(3) = huge(0)                  !! the box of cells around them
     integer :: high(3) = -huge(0)
-    integer(i4), allocatable :: point(:, :, :)   !! the point in each cell of the box, 0 for none
+    integer(i4), allocatable :: point(:, :, :)   !! the point in each cell of the box, 0 for none; of
+                                                 !! a divided cell the last one
   end type cells_type
+
+  !> Cells of the levels of `&refine` from 1 on: those that hold a point, and those of which a part
+  !> does, each with such a point.
+  type :: parts_type
+    type(lookup_type) :: whole, divided
+    integer(i4), allocatable :: in_whole(:), in_divided(:)
+  end type parts_type
 
 contains
 
@@ -129,8 +139,10 @@ contains
     integer, intent(in) :: points(:)                 !! of one body, its layers included
     type(cells_type), intent(inout) :: cells         !! with its box; `point` is made
     type(error_type), allocatable, intent(out) :: error
-    integer :: i, at(3)
+    type(parts_type) :: parts
+    integer :: i, other, at(3)
 
+    allocate (parts%in_whole(0), parts%in_divided(0))
     associate (low => cells%low, high => cells%high)
       allocate (cells%point(low(1):high(1), low(2):high(2), low(3):high(3)), source=0_i4)
     end associate
@@ -145,6 +157,11 @@ contains
         end if
         there = int(points(i), i4)
       end associate
+      if (.not. is_refined(points(i))) cycle
+      call place_part(body, cells%grid, points(i), parts, other)
+      if (other == 0) cycle
+      call report(scene, body, other, points(i), error)
+      return
     end do
 
   contains
@@ -152,10 +169,70 @@ contains
     !> Whether a point is one of several in a cell that is divided.
     pure logical function is_refined(k)
       integer, intent(in) :: k
-      is_refined = body%layer(k) == 0 .and. body%spacing(k) < 0.75_wp*cells%grid%spacing
+      is_refined = body%spacing(k) < 0.75_wp*cells%grid%spacing
     end function is_refined
 
   end subroutine place_points
+
+  !> Put a refined point into the cells of its level and note the cells of which it is a part;
+  !> `other` is a point with which it shares one, or 0.
+  subroutine place_part(body, grid, k, parts, other)
+    type(body_type), intent(in) :: body
+    type(grid_type), intent(in) :: grid         !! of the body's lattice
+    integer, intent(in) :: k                    !! the point
+    type(parts_type), intent(inout) :: parts
+    integer, intent(out) :: other
+    integer(i8) :: key(level_of(body, k))
+    integer :: n, m
+
+    n = size(key)
+    do m = 1, n
+      key(m) = key_of(m)
+      other = found_in(parts%whole, parts%in_whole, key(m))
+      if (other > 0) return
+    end do
+    other = found_in(parts%divided, parts%in_divided, key(n))
+    if (other > 0) return
+    call put(parts%whole, parts%in_whole, key(n))
+    do m = 1, n - 1
+      call put(parts%divided, parts%in_divided, key(m))
+    end do
+
+  contains
+
+    !> The cell of level `m` in which the point lies.
+    pure integer(i8) function key_of(m)
+      integer, intent(in) :: m
+      integer :: at(3)
+      at = cell_of(finer(grid, m), body%x(k, :))
+      key_of = mix(mix(mix(int(m, i8), int(at(1), i8)), int(at(2), i8)), int(at(3), i8))
+    end function key_of
+
+    !> The point that a table has under a key, if its cell meets that of this point; else 0.
+    pure integer function found_in(table, point, key) result(j)
+      type(lookup_type), intent(in) :: table
+      integer(i4), intent(in) :: point(:)
+      integer(i8), intent(in) :: key
+      j = table%look(key)
+      if (j == 0) return
+      j = point(j)
+      if (any(abs(body%x(j, :) - body%x(k, :)) > (0.5_wp - tolerance)*(body%spacing(j) &
+        & + body%spacing(k)))) j = 0
+    end function found_in
+
+    subroutine put(table, point, key)
+      type(lookup_type), intent(inout) :: table
+      integer(i4), allocatable, intent(inout) :: point(:)
+      integer(i8), intent(in) :: key
+      integer :: number
+      logical :: is_new
+      call table%number_of(key, number, is_new)
+      if (.not. is_new) return
+      if (number > size(point)) point = [point, spread(0_i4, 1, max(1024, number))]
+      point(number) = int(k, i4)
+    end subroutine put
+
+  end subroutine place_part
 
   !> An error if one of these points of another body lies in the cells; points of clouds must not
   !> lie in those of layers.
