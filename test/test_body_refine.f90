@@ -336,8 +336,8 @@ contains
     end associate
   end subroutine test_layers
 
-  !> A layer takes spacing and horizon from the rows that it joins: three rows of 0.1 m before coarse
-  !> columns, three of 0.05 m before fine ones. Fine cells behind coarse ones change nothing.
+  !> A layer takes spacing and horizon from the rows that it joins: three rows of 0.1 m before
+  !> coarse columns, three of 0.05 m before fine ones. Fine cells behind coarse ones change nothing.
   subroutine test_fine_layers(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: pulled = "&boundary name = 'right' side = 'x_max' "// &

@@ -259,7 +259,8 @@ contains
       end do
     end function too_far
 
-    !> Count the columns of one body, those of its lattice: one has the layer where a part of it has.
+    !> Count the columns of one body, those of its lattice: one has the layer where a part of it
+    !> has.
     subroutine count_columns(levels)
       type(side_type), intent(in) :: levels(:)  !! sides of the body
       integer, allocatable :: kind(:, :)

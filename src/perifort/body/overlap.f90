@@ -23,8 +23,8 @@ module pd_body_overlap
     integer :: n = 0                             !! points of the body, a cloud's too
     integer :: low(3) = huge(0)                  !! the box of cells around them
     integer :: high(3) = -huge(0)
-    integer(i4), allocatable :: point(:, :, :)   !! the point in each cell of the box, 0 for none; of
-                                                 !! a divided cell the last one
+    integer(i4), allocatable :: point(:, :, :)   !! the point in each cell of the box, 0 for none;
+                                                 !! of a divided cell the last one
   end type cells_type
 
   !> Cells of the levels of `&refine` from 1 on: those that hold a point, and those of which a part
