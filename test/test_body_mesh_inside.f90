@@ -1,9 +1,11 @@
 !> Places inside of meshes, and lattices that are cut by them.
 module test_body_mesh_inside
   use pd_base_error, only: fault_type => error_type
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
   use pd_body_generate, only: generate_body
+  use pd_body_mesh_elements, only: kind_tetrahedron, kind_triangle, kind_wedge, shape_functions, &
+    & shape_numbered, shape_type
   use pd_body_mesh_inside, only: places_in_mesh
   use pd_body_mesh_mesh, only: mesh_type
   use pd_body_mesh_read, only: read_mesh_text
@@ -20,6 +22,9 @@ module test_body_mesh_inside
   public :: collect_body_mesh_inside
 
   character(1), parameter :: lf = achar(10)
+  real(wp), parameter :: pi = acos(-1.0_wp)
+  real(wp), parameter :: ratio(3) = [0.8191725133961645_wp, 0.6710436067037893_wp, &
+    & 0.5497004779019703_wp]  !! multiples of these, without their whole parts, fill a cube evenly
   real(wp), parameter :: lengths(3) = [3.0_wp, 1.5_wp, 0.8_wp]
   character(*), parameter :: steel = "&material youngs_modulus = 2e11 poissons_ratio = 0.25 "// &
     & 'density = 7850 /'//lf//'&time steps = 1 /'//lf
@@ -33,7 +38,8 @@ contains
     testsuite = [ &
       & new_unittest('places in bent blocks of every shape', test_blocks), &
       & new_unittest('places in a skewed block of every shape', test_skewed), &
-      & new_unittest('nodes and middles of faces belong to a mesh', test_surface), &
+      & new_unittest('nodes belong to a mesh, and what is within the tolerance', test_surface), &
+      & new_unittest('places in one element that is an arc', test_arcs), &
       & new_unittest('lattices that are cut by meshes', test_cuts), &
       & new_unittest('what is refused', test_refused)]
   end subroutine collect_body_mesh_inside
@@ -83,8 +89,6 @@ contains
     real(wp), intent(in) :: bend, skew
     type(error_type), allocatable, intent(inout) :: error
     integer, parameter :: n = 20000
-    real(wp), parameter :: ratio(3) = [0.8191725133961645_wp, 0.6710436067037893_wp, &
-      & 0.5497004779019703_wp]
     type(mesh_type) :: mesh
     real(wp) :: x(n, 3), own(3)
     logical :: expected(n)
@@ -152,6 +156,58 @@ contains
     call places_in_mesh(mesh, 3, x, 1.1e-3_wp, inside)
     call expect_true(error, all(inside), 'places within the tolerance')
   end subroutine test_surface
+
+  !> One element, bent to an arc of 50 degrees between the radii 1 and 2: what its map gives of its
+  !> reference coordinates is inside, and what is beyond its radii or its angle is not.
+  subroutine test_arcs(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: shapes(7) = [5, 7, 8, 10, 12, 13, 15], n = 4000
+    type(shape_type) :: shape
+    type(mesh_type) :: mesh
+    real(wp) :: x(n, 3), away(n, 3), xi(3), values(27), gradients(3, 27), nodes(3, 27), low, r, a
+    logical, allocatable :: inside(:)
+    logical :: is_new
+    integer :: s, i, k
+
+    do s = 1, size(shapes)
+      shape = shape_numbered(shapes(s))
+      mesh = mesh_type(file='arc')
+      low = merge(0.0_wp, -1.0_wp, any(shape%kind == [kind_triangle, kind_tetrahedron, kind_wedge]))
+      do i = 1, shape%nodes
+        r = 1 + (shape%reference(1, i) - low)/(1 - low)
+        a = 50*pi/180*(shape%reference(2, i) - low)/(1 - low)
+        nodes(:, i) = [r*cos(a), r*sin(a), shape%reference(3, i)]
+        call mesh%add_node(int(i, i8), nodes(:, i), is_new)
+      end do
+      call mesh%add_element(1_i8, shapes(s), [(int(i, i4), i=1, shape%nodes)], is_new)
+      k = 0
+      do i = 1, 40*n
+        if (k == n) exit
+        xi = low + (1 - low)*modulo(i*ratio, 1.0_wp)
+        if (shape%kind == kind_triangle .and. sum(xi(:2)) > 1) cycle
+        if (shape%kind == kind_tetrahedron .and. sum(xi) > 1) cycle
+        if (shape%kind == kind_wedge) then
+          if (sum(xi(:2)) > 1) cycle
+          xi(3) = 2*xi(3) - 1
+        end if
+        k = k + 1
+        call shape_functions(shape, xi, values(:shape%nodes), gradients(:, :shape%nodes))
+        x(k, :) = matmul(nodes(:, :shape%nodes), values(:shape%nodes))
+        r = merge(0.97_wp - modulo(i*ratio(1), 0.9_wp), 2.03_wp + modulo(i*ratio(1), 1.0_wp), &
+          & mod(k, 2) == 0)
+        a = modulo(i*ratio(2), 1.0_wp)
+        away(k, :) = [r*cos(a), r*sin(a), x(k, 3)]
+        if (mod(k, 3) == 0) away(k, :2) = r*[cos(-0.02_wp - a), sin(-0.02_wp - a)]
+      end do
+      call expect_true(error, k == n, 'too few places')
+      call places_in_mesh(mesh, shape%dim, x(:, :shape%dim), 0.0_wp, inside)
+      call expect_true(error, all(inside), 'places in an arc of shape '//achar(48 + shapes(s)/10) &
+        & //achar(48 + mod(shapes(s), 10)))
+      call places_in_mesh(mesh, shape%dim, away(:, :shape%dim), 0.0_wp, inside)
+      call expect_true(error, .not. any(inside), 'places beside an arc')
+      if (allocated(error)) return
+    end do
+  end subroutine test_arcs
 
   subroutine points_of(text, body, scene, error)
     character(*), intent(in) :: text
@@ -223,14 +279,14 @@ contains
     call refuse("&keep mesh = 'no.msh' /", "cannot find the file 'no.msh'|inside.nml:5")
     call refuse("&keep shape = 'sphere' radius = 1 scale = 2 /", &
       & "'scale' without a surface or mesh")
-    call refuse("&region name = 'r' mesh = 'mirrored.msh' /", 'differ in it|mirrored.msh')
+    call refuse("&region name = 'r' mesh = 'mirrored.msh' /", 'in a scene of dimension 2|mirrored.msh')
     call refuse("&no_fail region = 'r' mesh = 'inside.msh' /", "'region' and 'mesh' are both given")
     call refuse("&keep mesh = 'inside.msh' scale = 1e-3 /", 'no points')
     if (allocated(error)) return
     call refuse_solid("&region name = 'r' mesh = 'mirrored.msh' /", &
-      & 'is inverted|mirrored.msh|inside.nml:4')
+      & 'is inverted|mirrored.msh')
     call refuse_solid("&no_fail mesh = 'inside.msh' /", &
-      & 'no elements of dimension 3|inside.msh|inside.nml:4')
+      & 'no elements of dimension 3|inside.msh')
 
   contains
 

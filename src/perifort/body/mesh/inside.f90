@@ -1,8 +1,8 @@
 !> Places inside of the elements of a mesh, curved ones included.
 module pd_body_mesh_inside
   use pd_base_kinds, only: wp, i4, i8
-  use pd_body_mesh_elements, only: kind_hexahedron, kind_line, kind_pyramid, kind_quadrilateral, &
-    & kind_tetrahedron, kind_triangle, kind_wedge, most_nodes, n_shapes, shape_functions, shape_type
+  use pd_body_mesh_elements, only: kind_pyramid, kind_tetrahedron, kind_triangle, kind_wedge, &
+    & most_nodes, n_shapes, shape_functions, shape_type
   use pd_body_mesh_mesh, only: all_shapes, mesh_type
   implicit none (type, external)
   private
@@ -20,6 +20,7 @@ module pd_body_mesh_inside
   integer, parameter :: most_steps = 40       !! of Newton's method
   real(wp), parameter :: bulge = 0.25_wp      !! of its box, that a curved element may stick out
   real(wp), parameter :: converged = 1.0e-11_wp  !! residual over the size of an element
+  real(wp), parameter :: rounding = 1.0e-10_wp   !! of a size, that a place may be off
 
 contains
 
@@ -176,30 +177,35 @@ contains
     number = number_of(cells, place)
   end function cell_of
 
-  !> Whether a place is inside of an element: its reference coordinates are within those of the
-  !> shape. They are sought from the centre, then from near each corner.
+  !> Whether a place is inside of an element, or within the tolerance of the one that its reference
+  !> coordinates are moved to if they are outside of the shape. They are sought from the centre, then
+  !> from near each corner.
   logical function in_element(mesh, shape, e, x, tolerance) result(inside)
     type(mesh_type), intent(in) :: mesh
     type(shape_type), intent(in) :: shape
     integer, intent(in) :: e
     real(wp), intent(in) :: x(:), tolerance
-    real(wp) :: nodes(3, most_nodes), centre(3), xi(3), length, room
+    real(wp) :: nodes(3, most_nodes), values(most_nodes), gradients(3, most_nodes)
+    real(wp) :: centre(3), xi(3), length, apart
     integer :: start
     logical :: found
 
     nodes(:, :shape%nodes) = mesh%x(:, mesh%nodes_of(e))
     length = maxval(maxval(nodes(:, :shape%nodes), dim=2) - minval(nodes(:, :shape%nodes), dim=2))
-    room = max(1.0e-9_wp, 2*tolerance/length)
     centre = sum(shape%reference(:, :shape%corners), dim=2)/shape%corners
     inside = .false.
     do start = 0, shape%corners
       xi = centre
       if (start > 0) xi = (centre + shape%reference(:, start))/2
       call seek(shape, nodes(:, :shape%nodes), x, length, xi, found)
-      if (found) inside = within(shape%kind, xi, room)
+      if (.not. found) cycle
+      call shape_functions(shape, place_in_shape(shape%kind, xi), values(:shape%nodes), &
+        & gradients(:, :shape%nodes))
+      apart = norm2(x - matmul(nodes(:shape%dim, :shape%nodes), values(:shape%nodes)))
+      inside = apart <= max(tolerance, rounding*length)
       if (inside) return
-      ! a map that is linear has one place only
-      if (found .and. .not. shape%quadratic) return
+      ! A curved map has other places, far outside; where edges are straight there is none
+      if (.not. shape%quadratic .or. all(abs(xi - place_in_shape(shape%kind, xi)) < 1.0_wp)) return
     end do
   end function in_element
 
@@ -289,33 +295,26 @@ contains
       & - a(3)*b(2))
   end function triple
 
-  !> Whether reference coordinates are those of a place in a shape.
-  pure logical function within(kind, xi, room)
+  !> The place in a shape that is near a place in reference coordinates, which may be outside.
+  pure function place_in_shape(kind, xi) result(place)
     integer, intent(in) :: kind     !! one of `kind_*`
     real(wp), intent(in) :: xi(3)
-    real(wp), intent(in) :: room    !! how far outside still counts [-]
-    real(wp) :: low
+    real(wp) :: place(3)
 
-    within = .false.
+    place = min(1.0_wp, max(-1.0_wp, xi))
     select case (kind)
-    case (kind_line)
-      within = abs(xi(1)) <= 1 + room
-    case (kind_quadrilateral)
-      within = all(abs(xi(:2)) <= 1 + room)
-    case (kind_hexahedron)
-      within = all(abs(xi) <= 1 + room)
-    case (kind_triangle)
-      low = min(xi(1), xi(2), 1 - xi(1) - xi(2))
-      within = low >= -room
+    case (kind_triangle, kind_wedge)
+      place(:2) = max(0.0_wp, xi(:2))
+      place(:2) = place(:2)/max(1.0_wp, sum(place(:2)))
     case (kind_tetrahedron)
-      low = min(xi(1), xi(2), xi(3), 1 - sum(xi))
-      within = low >= -room
-    case (kind_wedge)
-      low = min(xi(1), xi(2), 1 - xi(1) - xi(2))
-      within = low >= -room .and. abs(xi(3)) <= 1 + room
+      place = max(0.0_wp, xi)
+      place = place/max(1.0_wp, sum(place))
     case (kind_pyramid)
-      within = xi(3) >= -room .and. all(abs(xi(:2)) <= 1 - xi(3) + room)
+      place(3) = max(0.0_wp, place(3))
+      place(:2) = min(1 - place(3), max(place(3) - 1, xi(:2)))
+    case default  ! lines, quadrilaterals, hexahedra
+      return
     end select
-  end function within
+  end function place_in_shape
 
 end module pd_body_mesh_inside
