@@ -279,7 +279,8 @@ contains
     call refuse("&keep mesh = 'no.msh' /", "cannot find the file 'no.msh'|inside.nml:5")
     call refuse("&keep shape = 'sphere' radius = 1 scale = 2 /", &
       & "'scale' without a surface or mesh")
-    call refuse("&region name = 'r' mesh = 'mirrored.msh' /", 'in a scene of dimension 2|mirrored.msh')
+    call refuse("&region name = 'r' mesh = 'mirrored.msh' /", &
+      & 'in a scene of dimension 2|mirrored.msh')
     call refuse("&no_fail region = 'r' mesh = 'inside.msh' /", "'region' and 'mesh' are both given")
     call refuse("&keep mesh = 'inside.msh' scale = 1e-3 /", 'no points')
     if (allocated(error)) return

@@ -15,7 +15,8 @@ module pd_body_regions
 contains
 
   !> An error is set if the expression of a region has no finite value at a point of the bodies, if
-  !> a name of a mesh or surface means no points or facets, or if the file of a region cannot be read.
+  !> a name of a mesh or surface means no points or facets, or if the file of a region cannot be
+  !> read.
   subroutine check_regions(scene, body, error)
     type(scene_type), intent(in) :: scene  !! a checked scene
     type(body_type), intent(in) :: body    !! its points, layers included

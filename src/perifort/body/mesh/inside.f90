@@ -178,8 +178,8 @@ contains
   end function cell_of
 
   !> Whether a place is inside of an element, or within the tolerance of the one that its reference
-  !> coordinates are moved to if they are outside of the shape. They are sought from the centre, then
-  !> from near each corner.
+  !> coordinates are moved to if they are outside of the shape. They are sought from the centre,
+  !> then from near each corner.
   logical function in_element(mesh, shape, e, x, tolerance) result(inside)
     type(mesh_type), intent(in) :: mesh
     type(shape_type), intent(in) :: shape

@@ -18,8 +18,8 @@ module pd_scene_content_check
     & check_unique, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_relaxation, only: safety_of
-  use pd_scene_content_types, only: group_table, is_box, is_of_file, scene_type, shape_group, is_set, &
-    & name_length
+  use pd_scene_content_types, only: group_table, is_box, is_of_file, scene_type, shape_group, &
+    & is_set, name_length
   implicit none (type, external)
   private
   public :: check_scene, allocate_groups

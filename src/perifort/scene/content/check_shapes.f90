@@ -59,8 +59,8 @@ contains
       call need_direction()
     case default
       call rule_fault(error, group, number, 'shape', 'group &'//group//" lacks the key 'shape'", &
-        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space', or the key 'surface' or "// &
-        & "'mesh'"//alternatives(group), source)
+        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space', or the key 'surface' "// &
+        & "or 'mesh'"//alternatives(group), source)
     end select
     if (allocated(error)) return
     call check_finite_box(shape%lower, shape%upper, group, number, error, source)
