@@ -238,6 +238,8 @@ contains
     end if
     call expect_true(error, set_up%system%body%n_points == 1000, 'a full box')
     call expect_true(error, set_up%warnings%has('shells of surface 1'), 'is warned of')
+    call expect_true(error, index(set_up%warnings%text(), 'the first near (3.5, 3.5, 3.5) m') > 0, &
+      & 'with its place')
     call expect_true(error, .not. set_up%warnings%has('volume of surface 1'), 'the volume fits')
     ! a sheet of one cell is thicker than the surface
     call write_file('part.stl', binary_stl(box_facets([o, o, o], [9.0_wp, 9.0_wp, 0.4_wp])))
