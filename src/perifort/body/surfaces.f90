@@ -79,8 +79,8 @@ contains
       if (any(windings > 1_i1)) call warnings%add('shells of surface '//to_text(number), &
         & name_of(scene, number)//': '//to_text(count(windings > 1_i1))//' cells are inside of '// &
         & 'several shells of its surface, and count once, the first near '// &
-        & place_text(findloc(windings > 1_i1, .true.))//'; shells that overlap or a surface that '// &
-        & 'passes through itself do that; the facets of a cavity face into it', tell=.false.)
+        & place_text(findloc(windings > 1_i1, .true.))//'; shells that overlap or a surface '// &
+        & 'that passes through itself do that; the facets of a cavity face into it', tell=.false.)
     end associate
 
   contains
