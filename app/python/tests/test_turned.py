@@ -3,6 +3,7 @@ import itertools
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import perifort
@@ -66,6 +67,23 @@ class TestTurned(unittest.TestCase):
             gradient = np.array([[1.02, 0.1], [-0.03, 0.95]])
             moved = points[:, :2] @ gradient.T
             np.testing.assert_allclose(cells.quads(part, moved), shown @ gradient.T, atol=1e-12)
+
+    def test_many_cells_are_an_image_without_gaps(self):
+        for angle in (3.0, 10.0, 17.0, 22.5, 30.0, 36.0, 40.0, 45.0, 60.0):
+            a = np.radians(angle)
+            axes = np.array([[np.cos(a), np.sin(a), 0.0], [-np.sin(a), np.cos(a), 0.0], [0, 0, 1]])
+            points = (lattice((80, 80)) - [0.04, 0.04, 0.0]) @ axes
+            view = View(self.results(points, group(axes[0, :2])), deform=0.0)
+            with mock.patch("perifort.pictures.fields.MOST_CELLS", 1000):
+                image = figure_of(view, ["damage"], 0).axes[0].images[0]
+            shown = np.ma.getmaskarray(image.get_array())
+            left, right, low, high = image.get_extent()
+            rows, columns = shown.shape
+            x, y = np.meshgrid(left + (np.arange(columns) + 0.5) / columns * (right - left),
+                               low + (np.arange(rows) + 0.5) / rows * (high - low))
+            inside = np.hypot(x, y) < 0.036
+            self.assertGreater(inside.sum(), 1500)
+            self.assertFalse(shown[inside].any())
 
     def test_bodies(self):
         first = np.array([3.0, 1.0, 0.0])

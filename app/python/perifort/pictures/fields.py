@@ -336,9 +336,7 @@ def _draw_image(axes: Axes, part: Part, positions: Array, values: Array, norm: N
     size = float(np.median(part.sizes))
     low = positions[:, :2].min(axis=0) - size / 2
     span = positions[:, :2].max(axis=0) + size / 2 - low
-    # A square of this size holds a point of a lattice, however it is turned
-    least = np.sqrt(2) * size if part.lattice is not None and part.lattice.turned else size
-    pixel = max(least, float(span.max()) / 1500)
+    pixel = max(size, float(span.max()) / 1500)
     counts = np.maximum(np.ceil(span / pixel - 1e-6).astype(int), 1)
     at = np.minimum(((positions[:, :2] - low) / pixel).astype(int), counts - 1)
     line = at[:, 1] * counts[0] + at[:, 0]
@@ -349,7 +347,7 @@ def _draw_image(axes: Axes, part: Part, positions: Array, values: Array, norm: N
     else:
         image = np.bincount(line, values, int(counts.prod())) / np.maximum(number_of, 1)
     image = np.where(number_of > 0, image, np.nan).reshape(counts[1], counts[0])
-    # A stretched body leaves pixels between its cells empty
+    # A stretched body, or a turned one, leaves pixels between its cells empty
     for axis in (0, 1):
         before, after = np.roll(image, 1, axis), np.roll(image, -1, axis)
         gap = np.isnan(image) & ~np.isnan(before) & ~np.isnan(after)
