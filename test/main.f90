@@ -31,6 +31,7 @@ program main
   use test_law_strength, only: collect_law_strength
   use test_law_plastic, only: collect_law_plastic
   use test_body_mesh_elements, only: collect_body_mesh_elements
+  use test_body_mesh_inside, only: collect_body_mesh_inside
   use test_body_mesh_part, only: collect_body_mesh_part
   use test_body_mesh_read, only: collect_body_mesh_read
   use test_body_meshes, only: collect_body_meshes
@@ -163,6 +164,7 @@ program main
   call register('law_strength', collect_law_strength)
   call register('law_plastic', collect_law_plastic)
   call register('body_mesh_elements', collect_body_mesh_elements)
+  call register('body_mesh_inside', collect_body_mesh_inside)
   call register('body_mesh_part', collect_body_mesh_part)
   call register('body_mesh_read', collect_body_mesh_read)
   call register('body_meshes', collect_body_meshes)

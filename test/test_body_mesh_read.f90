@@ -258,6 +258,7 @@ contains
     call expect_true(error, mesh%sets(4)%of == set_of_elements .and. mesh%sets(4)%n == 3, &
       & 'a set of a set')
     call expect_true(error, mesh%skipped == 3, 'other keywords are counted')
+    call expect_true(error, mesh%first_skipped == '*boundary', 'the first of them is kept')
   end subroutine test_abaqus_text
 
   !> Every file, cut at many places, is an error that names the file; the last line end may go.

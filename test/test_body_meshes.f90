@@ -420,6 +420,15 @@ contains
       & error)
     call expect_true(error, set_up%warnings%has('pieces of mesh 1') .and. &
       & set_up%warnings%has('twins of mesh 1'), 'both warnings')
+    call expect_true(error, .not. set_up%warnings%has('skipped of mesh 1'), 'nothing is skipped')
+    call write_file('two.inp', '*HEADING'//lf//'a square'//lf//'*NODE'//lf//'1,0,0'//lf//'2,1,0'// &
+      & lf//'3,1,1'//lf//'4,0,1'//lf//'5,2,0'//lf//'6,2,1'//lf//'*ELEMENT, TYPE=CPS4'//lf// &
+      & '1,1,2,3,4'//lf//'2,2,5,6,3'//lf//'*MATERIAL, NAME=A'//lf//'*ELASTIC'//lf//'1, 0'//lf)
+    call ready_from("&scene dimension = 2 /"//lf//"&body mesh = 'two.inp' /"//lf//steel, set_up, &
+      & error)
+    if (allocated(error)) return
+    call expect_true(error, index(set_up%warnings%text(), '2 keywords of its file are '// &
+      & "skipped, first '*material'") > 0, 'what a scene says itself')
     call put_block(6, [4, 3, 1], [4.0_wp, 3.0_wp, 0.0_wp])
     call ready_from(head(2), set_up, error)
     call expect_true(error, set_up%warnings%count() == 0, 'none for a sound mesh')

@@ -1,6 +1,10 @@
-"""A bracket from a STL file: volume, force at the wall, and the bending of its arm beside that of a
-beam.
+"""A bracket from a STL file, as a mesh and from shapes: volume, force at the wall, and the bending of
+its arm beside that of a beam.
 """
+import os
+import subprocess
+import sys
+
 import numpy as np
 from common import Case, change
 from make_surface import THICK, WIDTH, LONG, area, profile
@@ -51,9 +55,45 @@ def main():
                   bent[fill, size], 1.0, absolute=0.06 * size)
     case.below("fill = 'centre', 1 mm over 2 mm: error of the curvature [-]",
                (bent["centre", 1.0] - 1) / (bent["centre", 2.0] - 1), 0.5)
+    three_ways(case, shown, bent["centre", 1.0], volume, beam)
     if case.options.pictures:
         picture(case, shown)
     case.finish()
+
+
+def three_ways(case, surface, bent, volume, beam):
+    """The lattice in the STL file, the same lattice from shapes, and a mesh of tetrahedra with about the
+    same spacing: the same arm.
+    """
+    lattice = case.run("lattice.nml")
+    case.equal("from shapes: points", len(lattice.points), len(surface.points))
+    # The same points in the same order
+    case.below("from shapes: distance of the points from those in the STL file [m]",
+               np.abs(lattice.points - surface.points).max(), 1e-9)
+    u, v = (results.field("displacement") for results in (lattice, surface))
+    # The outermost row is half a spacing inside of the end, where facets have their moment: the arm
+    # of the force is 0.5 mm of 70 mm shorter, and the end of a beam 3/2 of that less deflected
+    case.below("from shapes: difference of displacements over the largest [-]",
+               np.abs(u - v).max() / np.abs(v).max(), 1.1 * 1.5 * 0.5 / (LONG - THICK))
+    if "CASE_PYTHON" not in os.environ:
+        sys.exit("error: start this as ./pf verify bracket: CASE_PYTHON names no python with gmsh")
+    subprocess.run([os.environ["CASE_PYTHON"], str(case.folder / "make_mesh.py"),
+                    str(case.out / "bracket.msh"), "2"], check=True)
+    text = case.scene("bracket.nml").replace("  surface = 'bracket.stl'\n", "").replace(
+        "  spacing = 1e-3\n", "")
+    mesh = case.run("mesh.nml", change(text, "body", mesh="'bracket.msh'"))
+    case.show("mesh: points, and in the STL file", len(mesh.points), len(surface.points))
+    case.near("mesh: volume [m3]", mesh.volume.sum(), volume, relative=1e-9)
+    case.near("mesh: force at the wall [N]", abs(mesh.history["wall_reaction_z"][-1]), FORCE,
+              relative=1e-3)
+    case.near("mesh: curvature of the arm over that of a beam [-]", curvature(mesh) / beam, 1.0,
+              absolute=0.06)
+    case.near("mesh: curvature of the arm over that in the STL file [-]",
+              curvature(mesh) / beam / bent, 1.0, absolute=0.03)
+    ends = [results.field("displacement")[results.points[:, 0] > 79e-3, 2].mean()
+            for results in (surface, mesh)]
+    case.near("mesh: deflection of the end over that in the STL file [-]", ends[1] / ends[0], 1.0,
+              absolute=0.03)
 
 
 def picture(case, results):

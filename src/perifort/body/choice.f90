@@ -5,14 +5,19 @@ module pd_body_choice
   use pd_base_field, only: field_type, field_values, new_field
   use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type, not_finite_text
+  use pd_body_mesh_geometry, only: mesh_points
+  use pd_body_mesh_inside, only: places_in_mesh
+  use pd_body_mesh_mesh, only: mesh_type
+  use pd_body_mesh_read, only: read_mesh
   use pd_body_shapes, only: inside, touch
   use pd_body_surfaces, only: inside_surface
   use pd_scene_content_expressions, only: expression_of
   use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_content_types, only: scene_type, shape_group
+  use pd_scene_content_types, only: scene_type, shape_group, is_of_file
+  use pd_scene_format_file, only: resolve_path
   implicit none (type, external)
   private
-  public :: choose_points, field_on, values_on
+  public :: choose_points, field_on, inside_file, values_on
 
 contains
 
@@ -53,10 +58,8 @@ contains
     integer(i4), allocatable :: points(:)
     integer :: k
 
-    if (group%surface /= '') then
-      call inside_surface(scene, group%surface, group%scale, body%x, minval(body%spacing), chosen, &
-        & error)
-      call place_fault(error, scene, name, number, 'surface')
+    if (is_of_file(group)) then
+      call inside_file(scene, group, body%x, minval(body%spacing), name, number, chosen, error)
       if (allocated(error)) return
     else if (group%shape /= '') then
       chosen = inside(group, body%x, touch*minval(body%spacing))
@@ -69,6 +72,50 @@ contains
     if (allocated(error)) return
     chosen(points) = abs(values) > 0.0_wp
   end subroutine choose
+
+  !> The places inside of the surface or the mesh of a group. An error, with its place, if the file
+  !> cannot be read, or holds no surface or mesh.
+  subroutine inside_file(scene, group, x, spacing, name, number, inside, error)
+    type(scene_type), intent(in) :: scene        !! a checked scene
+    class(shape_group), intent(in) :: group      !! with a surface or a mesh
+    real(wp), intent(in) :: x(:, :)              !! (places, dim) [m]
+    real(wp), intent(in) :: spacing              !! of the points [m]
+    character(*), intent(in) :: name             !! of the group, without `&`
+    integer, intent(in) :: number                !! which group of this name
+    logical, allocatable, intent(out) :: inside(:)  !! (places)
+    type(error_type), allocatable, intent(out) :: error
+
+    if (group%surface /= '') then
+      call inside_surface(scene, group%surface, group%scale, x, spacing, inside, error)
+      call place_fault(error, scene, name, number, 'surface')
+    else
+      call inside_mesh(scene, group%mesh, group%scale, x, touch*spacing, inside, error)
+      call place_fault(error, scene, name, number, 'mesh')
+    end if
+  end subroutine inside_file
+
+  !> The places inside of the elements of a mesh, curved ones included. An error if it cannot be
+  !> read, or has no elements of the scene's dimension, or such without volume.
+  subroutine inside_mesh(scene, name, scale, x, tolerance, inside, error)
+    type(scene_type), intent(in) :: scene           !! whose folder the file is looked for in
+    character(*), intent(in) :: name                !! of the file, as the scene says it
+    real(wp), intent(in) :: scale                   !! metres of one unit of it
+    real(wp), intent(in) :: x(:, :)                 !! (places, dim) [m]
+    real(wp), intent(in) :: tolerance               !! how far outside still counts [m]
+    logical, allocatable, intent(out) :: inside(:)  !! (places)
+    type(error_type), allocatable, intent(out) :: error
+    type(mesh_type) :: mesh
+    real(wp), allocatable :: centre(:, :), volume(:)
+    integer(i4), allocatable :: element(:)
+
+    associate (dim => scene%header%dimension)
+      call read_mesh(resolve_path(trim(name), scene%file), dim, scale, mesh, error)
+      if (.not. allocated(error)) call mesh_points(mesh, dim, 1, 1.0_wp, centre, volume, element, &
+        & error)
+      if (allocated(error)) return
+      call places_in_mesh(mesh, dim, x(:, :dim), tolerance, inside)
+    end associate
+  end subroutine inside_mesh
 
   !> An expression of a checked scene at some points.
   subroutine field_on(scene, text, body, slots, field)

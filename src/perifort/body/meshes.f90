@@ -3,7 +3,7 @@
 module pd_body_meshes
   use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp, i2, i4
-  use pd_base_text, only: counted, to_text
+  use pd_base_text, only: counted, printable, to_text
   use pd_base_warnings, only: warnings_type
   use pd_body_body, only: body_type, allocate_points
   use pd_body_mesh_geometry, only: mesh_points
@@ -83,6 +83,11 @@ contains
     name = 'body '//to_text(part%body)
     if (scene%bodies(part%body)%name /= '') name = "the body '"// &
       & trim(scene%bodies(part%body)%name)//"'"
+    if (allocated(part%mesh%first_skipped)) call warnings%add('skipped of mesh '// &
+      & to_text(part%body), name//': '//counted(part%mesh%skipped, 'keyword')//' of its file '// &
+      & trim(merge('is ', 'are', part%mesh%skipped == 1))//" skipped, first '"// &
+      & printable(part%mesh%first_skipped)//"': materials, supports and loads are those of the "// &
+      & 'scene', tell=.false.)
     pieces = count_pieces(part)
     if (pieces > 1) call warnings%add('pieces of mesh '//to_text(part%body), name//': its mesh '// &
       & 'falls into '//to_text(pieces)//' pieces that share no node; points within the horizon '// &

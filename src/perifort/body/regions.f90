@@ -4,12 +4,10 @@ module pd_body_regions
   use pd_base_field, only: field_type, field_values
   use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type
-  use pd_body_choice, only: field_on, values_on
+  use pd_body_choice, only: field_on, inside_file, values_on
   use pd_body_meshes, only: check_set, names_set, set_mask
   use pd_body_shapes, only: inside, touch
-  use pd_body_surfaces, only: inside_surface
-  use pd_scene_content_rules, only: place_fault
-  use pd_scene_content_types, only: scene_type, shape_group
+  use pd_scene_content_types, only: scene_type, shape_group, is_of_file
   implicit none (type, external)
   private
   public :: check_regions, in_region, in_shape, region_mask
@@ -17,7 +15,8 @@ module pd_body_regions
 contains
 
   !> An error is set if the expression of a region has no finite value at a point of the bodies, if
-  !> a name of a mesh or surface means no points or facets, or if a region's surface cannot be read.
+  !> a name of a mesh or surface means no points or facets, or if the file of a region cannot be
+  !> read.
   subroutine check_regions(scene, body, error)
     type(scene_type), intent(in) :: scene  !! a checked scene
     type(body_type), intent(in) :: body    !! its points, layers included
@@ -30,11 +29,11 @@ contains
     if (allocated(error)) return
     slots = pack([(int(k, i4), k=1, body%n_slots)], body%point > 0)
     do r = 1, size(scene%no_fail)
-      call try_surface(scene, scene%no_fail(r), 'no_fail', r, error)
+      call try_file(scene, scene%no_fail(r), 'no_fail', r, error)
       if (allocated(error)) return
     end do
     do r = 1, size(scene%regions)
-      call try_surface(scene, scene%regions(r), 'region', r, error)
+      call try_file(scene, scene%regions(r), 'region', r, error)
       if (allocated(error)) return
       if (scene%regions(r)%where == '') cycle
       call values_on(scene, scene%regions(r)%where, body, slots, 'region', r, 'where', values, &
@@ -43,8 +42,8 @@ contains
     end do
   end subroutine check_regions
 
-  !> Read the surface of a shape, if it has one, for its errors.
-  subroutine try_surface(scene, shape, group, number, error)
+  !> Read the surface or mesh of a shape, if it has one, for its errors.
+  subroutine try_file(scene, shape, group, number, error)
     type(scene_type), intent(in) :: scene
     class(shape_group), intent(in) :: shape
     character(*), intent(in) :: group
@@ -53,25 +52,24 @@ contains
     real(wp) :: nowhere(0, 3)
     logical, allocatable :: inside_it(:)
 
-    if (shape%surface == '') return
-    call inside_surface(scene, shape%surface, shape%scale, nowhere, 1.0_wp, inside_it, error)
-    call place_fault(error, scene, group, number, 'surface')
-  end subroutine try_surface
+    if (is_of_file(shape)) call inside_file(scene, shape, nowhere, 1.0_wp, group, number, &
+      & inside_it, error)
+  end subroutine try_file
 
-  !> The slots with points in a shape, or inside of its surface.
+  !> The slots with points in a shape, or inside of its surface or mesh.
   function in_shape(scene, body, shape) result(mask)
     type(scene_type), intent(in) :: scene     !! a checked scene
     type(body_type), intent(in) :: body       !! its points, arranged in slots
-    class(shape_group), intent(in) :: shape   !! a group of it, whose surface can be read
+    class(shape_group), intent(in) :: shape   !! a group of it, whose file can be read
     logical, allocatable :: mask(:)
     type(error_type), allocatable :: error
 
-    if (shape%surface == '') then
-      mask = inside(shape, body%x, touch*minval(body%spacing, mask=body%point > 0))
+    if (is_of_file(shape)) then
+      call inside_file(scene, shape, body%x, minval(body%spacing, mask=body%point > 0), '', 0, &
+        & mask, error)
+      if (allocated(error)) call internal_fault('a file that could be read')
     else
-      call inside_surface(scene, shape%surface, shape%scale, body%x, minval(body%spacing, &
-        & mask=body%point > 0), mask, error)
-      if (allocated(error)) call internal_fault('a surface that could be read')
+      mask = inside(shape, body%x, touch*minval(body%spacing, mask=body%point > 0))
     end if
     mask = mask .and. body%point > 0
   end function in_shape
@@ -144,7 +142,7 @@ contains
 
     associate (region => scene%regions(number))
       mask = body%point > 0
-      if (region%shape /= '' .or. region%surface /= '' .or. region%where == '') &
+      if (region%shape /= '' .or. is_of_file(region) .or. region%where == '') &
         & mask = in_shape(scene, body, region)
       if (region%where == '') return
       slots = pack([(int(k, i4), k=1, body%n_slots)], mask)

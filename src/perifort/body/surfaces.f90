@@ -78,11 +78,23 @@ contains
         & "smaller spacing, or fill = 'volume'", tell=.false.)
       if (any(windings > 1_i1)) call warnings%add('shells of surface '//to_text(number), &
         & name_of(scene, number)//': '//to_text(count(windings > 1_i1))//' cells are inside of '// &
-        & 'several shells of its surface, and count once; the facets of a cavity face into it', &
-        & tell=.false.)
+        & 'several shells of its surface, and count once, the first near '// &
+        & place_text(findloc(windings > 1_i1, .true.))//'; shells that overlap or a surface '// &
+        & 'that passes through itself do that; the facets of a cavity face into it', tell=.false.)
     end associate
 
   contains
+
+    !> Where the centre of a cell is.
+    function place_text(cell) result(text)
+      integer, intent(in) :: cell(3)
+      character(:), allocatable :: text
+      real(wp) :: place(3)
+
+      place = lattice%grid%origin + lattice%grid%spacing*(cell - 0.5_wp)
+      text = '('//to_text(place(1), 5)//', '//to_text(place(2), 5)//', '//to_text(place(3), 5)// &
+        & ') m'
+    end function place_text
 
     !> Move what a skin needs; the rest goes with the solid.
     subroutine move_surface(from, to)

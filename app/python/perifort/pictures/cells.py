@@ -9,19 +9,24 @@ import numpy as np
 import numpy.typing as npt
 
 from ..results import Cells, Results
+from ..scene import Scene
+from .rigid import vector
 
 Array = npt.NDArray[Any]
 
 
 class Lattice:
     """Points on a grid of one spacing in 1, 2 or 3 dimensions. `place` (n, dimension): whole
-    numbers, the cell of each point.
+    numbers, the cell of each point; `axes` (dimension, dimension): the directions of its rows, those
+    of x, y and z if not given.
     """
 
-    def __init__(self, place: Array, spacing: float) -> None:
+    def __init__(self, place: Array, spacing: float, axes: Array | None = None) -> None:
         self.place = place - place.min(axis=0) + 1
         self.spacing = spacing
         self.dimension = place.shape[1]
+        self.turned = axes is not None
+        self.axes: Array = np.eye(self.dimension) if axes is None else axes
         # A rim of one empty cell, so that every cell has neighbours to look at
         self.extents = tuple(int(n) for n in self.place.max(axis=0) + 2)
         self.number = np.full(int(np.prod(self.extents)), -1, dtype=np.int64)
@@ -46,8 +51,7 @@ class Lattice:
         n, d = positions.shape
         found = np.empty((n, d, d))
         for axis in range(d):
-            rest = np.zeros(d)
-            rest[axis] = self.spacing
+            rest = self.spacing * self.axes[axis]
             best = np.tile(rest, (n, 1))
             least = np.full(n, 1.5 * self.spacing)
             for step in (1, -1):
@@ -86,6 +90,16 @@ class Lattice:
                 count[near] += 1
             found[:, slot] = total / np.maximum(count, 1)[:, None]
         return found
+
+    @property
+    def reach(self) -> Array:
+        """How far a cell at rest extends from its point along x, y and z (dimension)."""
+        return np.asarray(0.5 * self.spacing * np.abs(self.axes).sum(axis=0))
+
+    def corners_at_rest(self, points: Array) -> Array:
+        """The corners (n, 2^dimension, component) of the cells of points, in the order of `signs`.
+        """
+        return np.asarray(points[:, None] + 0.5 * self.spacing * self.signs @ self.axes)
 
     def faces(self, kept: Array) -> list[tuple[Array, list[int]]]:
         """The faces of 3D cells behind which there is none: for each of the six directions the
@@ -135,10 +149,12 @@ def spacing_of(points: Array, dimension: int) -> float:
     return best if best > 0.2 * mean else mean
 
 
-def lattice_of(points: Array, dimension: int) -> Lattice | None:
-    """The lattice the points are on, None if they are on none."""
-    used = points[:, :dimension]
-    spacing = spacing_of(points, dimension)
+def lattice_of(points: Array, dimension: int, axes: Array | None = None) -> Lattice | None:
+    """The lattice with rows along `axes`, or along x, y and z, that the points are on, None if they
+    are on none.
+    """
+    used = points[:, :dimension] if axes is None else points[:, :dimension] @ axes.T
+    spacing = spacing_of(used, dimension)
     at = (used - used.min(axis=0)) / spacing
     place = np.round(at).astype(np.int64)
     # Positions in single precision keep 1e-4 of a spacing
@@ -146,13 +162,34 @@ def lattice_of(points: Array, dimension: int) -> Lattice | None:
         return None
     if len(np.unique(place, axis=0)) < len(place):
         return None
-    return Lattice(place, spacing)
+    return Lattice(place, spacing, axes)
+
+
+def axes_of(results: Results) -> dict[int, Array]:
+    """The directions (dimension, dimension) of the rows of turned lattices, by the numbers of their
+    bodies: `axis_1`, in 3D the part of `axis_2` that is normal to it, and what is normal to these.
+    """
+    found: dict[int, Array] = {}
+    if "axis_1" not in results.scene:
+        return found
+    for number, group in enumerate(Scene.parse(results.scene, check=False).all("body"), 1):
+        if "axis_1" not in group:
+            continue
+        first = vector(group, "axis_1")
+        first /= np.linalg.norm(first)
+        second = vector(group, "axis_2", (-first[1], first[0], 0.0))
+        second -= (second @ first) * first
+        second /= np.linalg.norm(second)
+        axes = np.stack([first, second, np.cross(first, second)])
+        found[number] = axes[:results.dimension, :results.dimension]
+    return found
+
 
 
 def parts_of(results: Results) -> list[Part]:
     """The body's points, without layers: on one lattice if they all are, else body by body (and
-    level by level of a refined one), each on its own or as a cloud. Meshes whose elements are known
-    are one part.
+    level by level of a refined one), each on its own, which may be turned, or as a cloud. Meshes
+    whose elements are known are one part.
     """
     dimension = results.dimension
     inside = np.flatnonzero(results.body)
@@ -165,7 +202,15 @@ def parts_of(results: Results) -> list[Part]:
         inside = inside[~results.cells.of_mesh[inside]]
         if not len(inside):
             return found
-    whole = lattice_of(results.points[inside], dimension) if len(inside) > 1 else None
+    turned = axes_of(results)
+    bodies = results.marks.get("body", np.ones(len(results.points), dtype=int))
+    # Of all bodies, if their rows have the same directions
+    axes = [turned.get(int(body)) for body in np.unique(bodies[inside])]
+    alike = all(one is axes[0] or (one is not None and axes[0] is not None
+                                   and np.allclose(one, axes[0], rtol=0, atol=1e-12))
+                for one in axes)
+    whole = (lattice_of(results.points[inside], dimension, axes[0])
+             if len(inside) > 1 and alike else None)
     if whole is not None:
         return [*found, Part(inside, np.full(len(inside), whole.spacing), whole)]
     marks = np.stack([results.marks.get(name, np.zeros(len(results.points)))[inside]
@@ -173,7 +218,8 @@ def parts_of(results: Results) -> list[Part]:
     kinds, kind = np.unique(marks, axis=0, return_inverse=True)
     for number in range(len(kinds)):
         points = inside[kind.ravel() == number]
-        lattice = lattice_of(results.points[points], dimension) if len(points) > 1 else None
+        lattice = (lattice_of(results.points[points], dimension, turned.get(int(kinds[number][0])))
+                   if len(points) > 1 else None)
         if lattice is not None:
             sizes = np.full(len(points), lattice.spacing)
         else:

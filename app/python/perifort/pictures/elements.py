@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..results import Cells
+from .cells import Lattice
 
 Array = npt.NDArray[Any]
 Faces = Sequence[Sequence[int]]
@@ -108,37 +109,68 @@ def cut_of(cells: Cells, rest: Array, moved: Array, axis: int, at: float) -> tup
     """Where the plane at `at` along an axis cuts solid cells: polygons (n, 4, 3) in the deformed
     body, and the numbers of their cells. Cells count by their corners.
     """
-    found, which = [], []
+    found, which = [np.empty((0, 4, 3))], [np.empty(0, dtype=int)]
     for kind in np.unique(cells.types):
         linear, _ = LINEAR.get(int(kind), (int(kind), 0))
-        if linear not in TETRAHEDRA:
-            continue
-        every = np.flatnonzero(cells.types == kind)
-        nodes = cells.nodes_of(every)
-        for four in TETRAHEDRA[linear]:
-            corner = nodes[:, four]
-            # A plane through nodes lies a hair below them
-            height = rest[corner, axis] - at
-            above = height >= 0
-            for side in (True, False):
-                alone = np.flatnonzero((above == side).sum(axis=1) == 1)
-                if len(alone):
-                    one = np.argmax(above[alone] == side, axis=1)
-                    others = np.array([[c for c in range(4) if c != k] for k in range(4)])[one]
-                    shown = [_between(corner[alone], height[alone], moved, one, others[:, k])
-                             for k in (0, 1, 2, 2)]
-                    found.append(np.stack(shown, axis=1))
-                    which.append(every[alone])
-            two = np.flatnonzero(above.sum(axis=1) == 2)
-            if len(two):
-                order = np.argsort(~above[two], axis=1, kind="stable").T
-                shown = [_between(corner[two], height[two], moved, order[a], order[b])
-                         for a, b in ((0, 2), (0, 3), (1, 3), (1, 2))]
-                found.append(np.stack(shown, axis=1))
-                which.append(every[two])
-    if not found:
-        return np.empty((0, 4, 3)), np.empty(0, dtype=int)
+        if linear in TETRAHEDRA:
+            every = np.flatnonzero(cells.types == kind)
+            shown, of = cut_of_kind(linear, cells.nodes_of(every), rest[:, axis] - at, moved)
+            found.append(shown)
+            which.append(every[of])
     return np.concatenate(found), np.concatenate(which)
+
+
+def cut_of_kind(kind: int, nodes: Array, heights: Array, moved: Array) -> tuple[Array, Array]:
+    """Where a plane cuts cells of one linear kind: polygons (n, 4, 3) and the rows of `nodes` (cells,
+    nodes of one) that they belong to. `heights` are those of all nodes above the plane at rest.
+    """
+    found, which = [np.empty((0, 4, 3))], [np.empty(0, dtype=int)]
+    for four in TETRAHEDRA[kind]:
+        corner = nodes[:, four]
+        # A plane through nodes lies a hair below them
+        height = heights[corner]
+        above = height >= 0
+        for side in (True, False):
+            alone = np.flatnonzero((above == side).sum(axis=1) == 1)
+            if len(alone):
+                one = np.argmax(above[alone] == side, axis=1)
+                others = np.array([[c for c in range(4) if c != k] for k in range(4)])[one]
+                shown = [_between(corner[alone], height[alone], moved, one, others[:, k])
+                         for k in (0, 1, 2, 2)]
+                found.append(np.stack(shown, axis=1))
+                which.append(alone)
+        two = np.flatnonzero(above.sum(axis=1) == 2)
+        if len(two):
+            order = np.argsort(~above[two], axis=1, kind="stable").T
+            shown = [_between(corner[two], height[two], moved, order[a], order[b])
+                     for a, b in ((0, 2), (0, 3), (1, 3), (1, 2))]
+            found.append(np.stack(shown, axis=1))
+            which.append(two)
+    return np.concatenate(found), np.concatenate(which)
+
+
+def cut_of_lattice(lattice: Lattice, points: Array, positions: Array, axis: int,
+                   at: float) -> tuple[Array, Array]:
+    """Where the plane at `at` along an axis cuts the cells of a turned lattice: polygons (n, 4, 3) in
+    the deformed body, and the numbers of their points. `points` and `positions` (all points of the
+    lattice, 3): at rest and deformed.
+    """
+    hair = 1e-3 * lattice.spacing
+    # Of planes in the faces of the body, the cells inside
+    reach = lattice.reach[axis]
+    low, high = points[:, axis].min() - reach, points[:, axis].max() + reach
+    if low - hair <= at <= high + hair:
+        at = float(np.clip(at, low + hair, high - hair))
+    near = np.flatnonzero(np.abs(points[:, axis] - at) <= reach + hair)
+    heights = lattice.corners_at_rest(points[near])[:, :, axis].ravel() - at
+    # The same corners of two cells are on the same side
+    heights[np.abs(heights) < 1e-6 * lattice.spacing] = 0.0
+    moved = lattice.corners(positions, near).reshape(-1, 3)
+    # Corners in VTK's order
+    order = [0, 4, 6, 2, 1, 5, 7, 3]
+    nodes = np.arange(8 * len(near)).reshape(-1, 8)[:, order]
+    found, which = cut_of_kind(12, nodes, heights, moved)
+    return found, near[which]
 
 
 def _between(corner: Array, height: Array, moved: Array, a: Array, b: Array) -> Array:

@@ -20,7 +20,7 @@ from ..reference import nearest
 from ..results import Results
 from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing_of
 from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
-from .elements import cut_of, outer_faces, polygons
+from .elements import cut_of, cut_of_lattice, outer_faces, polygons
 from .layout import FONT, Panel, Place, lay_out, write_caption
 from .rigid import draw_outlines, draw_silhouettes, rigid_bodies
 from .units import Scale, number, scale_of, state_text, words
@@ -73,6 +73,12 @@ class View:
     def spacing(self) -> float:
         """The largest size of a cell."""
         return float(max(part.sizes.max() for part in self.parts))
+
+    @cached_property
+    def reach(self) -> float:
+        """How far cells extend at most from their points, along x, y or z."""
+        return max(0.5 * self.spacing, *(float(part.lattice.reach.max()) for part in self.parts
+                                         if part.lattice is not None), 0.0)
 
     @cached_property
     def scale(self) -> float:
@@ -341,7 +347,7 @@ def _draw_image(axes: Axes, part: Part, positions: Array, values: Array, norm: N
     else:
         image = np.bincount(line, values, int(counts.prod())) / np.maximum(number_of, 1)
     image = np.where(number_of > 0, image, np.nan).reshape(counts[1], counts[0])
-    # A stretched body leaves pixels between its cells empty
+    # A stretched body, or a turned one, leaves pixels between its cells empty
     for axis in (0, 1):
         before, after = np.roll(image, 1, axis), np.roll(image, -1, axis)
         gap = np.isnan(image) & ~np.isnan(before) & ~np.isnan(after)
@@ -358,8 +364,8 @@ def frame_of(view: View, output: int, axes: Sequence[int] = (0, 1),
     if view.window is not None:
         return [(float(view.window[c][0]), float(view.window[c][1])) for c in (0, 1)]
     seen = view.seen(output) if within is None else within
-    half = 0.5 * view.spacing
-    limits = [(float(seen[:, c].min()) - half, float(seen[:, c].max()) + half) for c in axes]
+    limits = [(float(seen[:, c].min()) - view.reach, float(seen[:, c].max()) + view.reach)
+              for c in axes]
     margin = 0.015 * max(high - low for low, high in limits)
     return [(low - margin, high + margin) for low, high in limits]
 
@@ -505,7 +511,7 @@ def position_of(view: View, clip: Clip) -> float:
     middle = 0.5 * float(along.min() + along.max())
     if clip.at is None:
         return middle
-    if not along.min() - view.spacing / 2 <= clip.at <= along.max() + view.spacing / 2:
+    if not along.min() - view.reach <= clip.at <= along.max() + view.reach:
         raise ValueError(f"the cut at {'xyz'[clip.axis]} = {clip.at:g} m misses the body, which "
                          f"lies between {along.min():.6g} and {along.max():.6g} m")
     return clip.at
@@ -579,6 +585,12 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
             corners, cells = cut_of(part.mesh, part.mesh.nodes, view.nodes(output), clip.axis, plane)
             _draw_polygons(axes, corners[:, :, shown],
                            values_of(results, name, output, "cells")[cells], colours, scale.factor)
+            continue
+        if part.lattice is not None and part.lattice.turned:
+            corners, cells = cut_of_lattice(part.lattice, results.points[part.points],
+                                            positions[part.points], clip.axis, plane)
+            _draw_polygons(axes, corners[:, :, shown], values[part.points[cells]], colours,
+                           scale.factor)
             continue
         apart = np.abs(results.points[part.points, clip.axis] - plane)
         near = np.flatnonzero(apart <= part.sizes / 2 * (1 + 1e-6))

@@ -195,7 +195,10 @@ contains
       state%in_assembly = .true.
     case ('*end assembly')
       state%in_assembly = .false.
+    case ('*heading', '*preprint')
+      continue
     case default  ! steps, materials, loads: a scene says these itself
+      if (.not. allocated(mesh%first_skipped)) mesh%first_skipped = keyword
       mesh%skipped = mesh%skipped + 1
     end select
   end subroutine read_keyword

@@ -40,6 +40,7 @@ module pd_body_mesh_mesh
     type(set_type), allocatable :: sets(:)     !! (n_sets or more)
     logical :: repeats = .false.               !! an element stands once for each of its groups
     integer :: skipped = 0                     !! blocks of the file that mean nothing here
+    character(:), allocatable :: first_skipped !! the first of them that a scene says itself
     type(lookup_type) :: nodes                 !! numbers of nodes by their tags
     type(lookup_type) :: elements              !! numbers of elements by their tags
   contains

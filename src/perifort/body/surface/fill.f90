@@ -7,14 +7,15 @@ module pd_body_surface_fill
   use pd_body_surface_edges, only: check_edges, edges_type
   use pd_body_surface_rows, only: bin_of, new_rows, row_windings, rows_type
   use pd_body_surface_stl, only: read_stl
-  use pd_body_surface_surface, only: place_of_facet, surface_fault, surface_type
+  use pd_body_surface_surface, only: of_single, place_of_facet, surface_fault, surface_type, &
+    & weld_vertices
   use pd_body_surface_winding, only: new_tree, tree_type, winding_number
   implicit none (type, external)
   private
   public :: solid_type, new_solid, read_solid, fill_cells, points_inside, gaps_text
 
-  !> What counts as on the surface: parts of a spacing, and of single precision.
-  real(wp), parameter :: touch = 1.0e-6_wp, of_single = 2.4e-7_wp, most_touch = 1.0e-2_wp
+  !> What counts as on the surface: parts of a spacing, and at most of that.
+  real(wp), parameter :: touch = 1.0e-6_wp, most_touch = 1.0e-2_wp
   integer, parameter :: most_winding = 100
   real(wp), parameter :: hem = 0.5_wp   !! around holes, where seams may part [spacings]
 
@@ -43,10 +44,16 @@ contains
   subroutine new_solid(solid, error)
     type(solid_type), intent(inout) :: solid  !! with its surface
     type(error_type), allocatable, intent(out) :: error
+    integer :: welded
 
     associate (surface => solid%surface)
       call check_edges(surface, solid%edges, error)
       if (allocated(error)) return
+      if (solid%edges%n_open > 0) then
+        call weld_vertices(surface, welded)
+        if (welded > 0) call check_edges(surface, solid%edges, error)
+        if (allocated(error)) return
+      end if
       if (.not. surface%volume > 1.0e-12_wp*maxval(surface%high - surface%low)**3) then
         if (surface%volume < 0.0_wp) then
           call surface_fault(surface, 'the surface is inside out: its facets face inwards', error, &

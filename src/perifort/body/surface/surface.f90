@@ -8,8 +8,10 @@ module pd_body_surface_surface
   use pd_scene_format_given, only: name_length
   implicit none (type, external)
   private
-  public :: surface_type, add_facet, finish_surface, corners_of, area_vector, centre_of, &
-    & surface_fault, place_of_facet, extent_text
+  public :: surface_type, add_facet, finish_surface, weld_vertices, corners_of, area_vector, &
+    & centre_of, of_single, surface_fault, place_of_facet, extent_text
+
+  real(wp), parameter :: of_single = 2.4e-7_wp   !! rounding of single precision, over a length
 
   type :: surface_type
     character(:), allocatable :: file           !! where it was read from, for messages
@@ -133,6 +135,60 @@ contains
       surface%volume = surface%volume + dot_product(x(:, 1) - middle, area_vector(surface, f))/3
     end do
   end subroutine finish_surface
+
+  !> Make vertices one that differ by the rounding of single precision, as -8.7e-8 and 0 do. Facets
+  !> that have two such corners are left out: their edges cancel each other.
+  subroutine weld_vertices(surface, welded)
+    type(surface_type), intent(inout) :: surface  !! finished
+    integer, intent(out) :: welded                !! vertices that became others
+    real(wp), parameter :: cell = 16.0_wp         !! edge of the cells that vertices are sought in
+    type(lookup_type) :: cells
+    integer(i4), allocatable :: first(:), next(:), becomes(:)
+    integer(i8) :: low(3), high(3), i, j, k
+    integer :: v, number, f, n
+    integer(i4) :: other, at(3)
+    real(wp) :: near
+    logical :: is_new
+
+    near = of_single*max(maxval(abs(surface%low)), maxval(abs(surface%high)))
+    allocate (first(surface%n_vertices), next(surface%n_vertices), source=0_i4)
+    becomes = [(int(v, i4), v=1, surface%n_vertices)]
+    do v = 1, surface%n_vertices
+      low = floor((surface%x(:, v) - near)/(cell*near), i8)
+      high = floor((surface%x(:, v) + near)/(cell*near), i8)
+      do k = low(3), high(3)
+        do j = low(2), high(2)
+          do i = low(1), high(1)
+            number = cells%look(mix(mix(mix(0_i8, i), j), k))
+            if (number == 0) cycle
+            other = first(number)
+            do while (other > 0_i4)
+              if (all(abs(surface%x(:, v) - surface%x(:, other)) <= near)) becomes(v) = other
+              other = next(other)
+            end do
+          end do
+        end do
+      end do
+      if (becomes(v) /= v) cycle
+      low = floor(surface%x(:, v)/(cell*near), i8)
+      call cells%number_of(mix(mix(mix(0_i8, low(1)), low(2)), low(3)), number, is_new)
+      next(v) = first(number)
+      first(number) = int(v, i4)
+    end do
+    welded = count([(becomes(v) /= v, v=1, surface%n_vertices)])
+    if (welded == 0) return
+    n = 0
+    do f = 1, surface%n_facets
+      at = becomes(surface%corner(:, f))
+      if (at(1) == at(2) .or. at(2) == at(3) .or. at(3) == at(1)) cycle
+      n = n + 1
+      surface%corner(:, n) = at
+      surface%solid(n) = surface%solid(f)
+      surface%number(n) = surface%number(f)
+      surface%line(n) = surface%line(f)
+    end do
+    surface%n_facets = n
+  end subroutine weld_vertices
 
   !> The corners of a facet, each in a column [m].
   pure function corners_of(surface, facet) result(x)

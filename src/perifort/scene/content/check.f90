@@ -18,8 +18,8 @@ module pd_scene_content_check
     & check_unique, check_vector
   use pd_scene_format_source, only: source_type
   use pd_scene_groups_relaxation, only: safety_of
-  use pd_scene_content_types, only: group_table, is_box, scene_type, shape_group, is_set, &
-    & name_length
+  use pd_scene_content_types, only: group_table, is_box, is_of_file, scene_type, shape_group, &
+    & is_set, name_length
   implicit none (type, external)
   private
   public :: check_scene, allocate_groups
@@ -71,7 +71,7 @@ contains
       end do
       do i = 1, size(scene%regions)
         if (scene%regions(i)%where == '' .or. scene%regions(i)%shape /= '' .or. &
-          & scene%regions(i)%surface /= '') &
+          & is_of_file(scene%regions(i))) &
           & call check_shape(scene%regions(i), d, scene%file, 'region', i, error, source)
         call check_expression(scene, scene%regions(i)%where, 'region', i, 'where', 'xyz', &
           & at_the_start, error, source)
@@ -252,7 +252,7 @@ contains
     call check_expression(scene, cut%where, group, number, 'where', 'xyz', at_the_start, error, &
       & source)
     if (allocated(error)) return
-    if (cut%shape /= '' .or. cut%surface /= '' .or. (cut%region == '' .and. cut%where == '')) &
+    if (cut%shape /= '' .or. is_of_file(cut) .or. (cut%region == '' .and. cut%where == '')) &
       & call check_shape(cut, scene%header%dimension, scene%file, group, number, error, source)
   end subroutine check_cut
 
@@ -300,7 +300,7 @@ contains
     type(source_type), intent(in), optional :: source
 
     associate (zone => scene%no_fail(number))
-      if (zone%region == '' .and. zone%shape == '' .and. zone%surface == '') then
+      if (zone%region == '' .and. zone%shape == '' .and. .not. is_of_file(zone)) then
         call rule_fault(error, 'no_fail', number, '', &
           & "group &no_fail lacks the key 'region' or 'shape'", 'expected one of them', source)
       else if (zone%region /= '' .and. zone%shape /= '') then
@@ -309,6 +309,9 @@ contains
       else if (zone%region /= '' .and. zone%surface /= '') then
         call rule_fault(error, 'no_fail', number, 'surface', "'region' and 'surface' are both "// &
           & 'given', 'give one of them', source)
+      else if (zone%region /= '' .and. zone%mesh /= '') then
+        call rule_fault(error, 'no_fail', number, 'mesh', "'region' and 'mesh' are both given", &
+          & 'give one of them', source)
       else if (zone%region /= '') then
         call check_region(scene, zone%region, 'no_fail', number, 'region', error, source)
       else

@@ -5,7 +5,7 @@ module pd_scene_content_check_shapes
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: rule_fault, given, check_file, check_finite_box, check_vector
   use pd_scene_format_source, only: source_type
-  use pd_scene_content_types, only: shape_group, crack_group, side_group, is_set
+  use pd_scene_content_types, only: shape_group, crack_group, side_group, is_of_file, is_set
   implicit none (type, external)
   private
   public :: check_shape, check_side, check_crack
@@ -25,12 +25,12 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(source_type), intent(in), optional :: source  !! the scanned file, for places
 
-    if (shape%surface /= '') then
-      call check_shape_surface()
+    if (is_of_file(shape)) then
+      call check_shape_file()
       return
     else if (abs(shape%scale - 1.0_wp) > 0.0_wp) then
-      call rule_fault(error, group, number, 'scale', "'scale' without a surface", &
-        & "it belongs to the key 'surface'", source)
+      call rule_fault(error, group, number, 'scale', "'scale' without a surface or mesh", &
+        & "it belongs to the keys 'surface' and 'mesh'", source)
       return
     end if
     select case (shape%shape)
@@ -59,27 +59,36 @@ contains
       call need_direction()
     case default
       call rule_fault(error, group, number, 'shape', 'group &'//group//" lacks the key 'shape'", &
-        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space', or the key 'surface'"// &
-        & alternatives(group), source)
+        & "expected 'box', 'sphere', 'cylinder', 'cone' or 'half_space', or the key 'surface' "// &
+        & "or 'mesh'"//alternatives(group), source)
     end select
     if (allocated(error)) return
     call check_finite_box(shape%lower, shape%upper, group, number, error, source)
 
   contains
 
-    !> A surface instead of a shape.
-    subroutine check_shape_surface()
-      if (dimension /= 3) then
+    !> A surface or a mesh instead of a shape.
+    subroutine check_shape_file()
+      character(:), allocatable :: key
+
+      key = trim(merge('surface', 'mesh   ', shape%surface /= ''))
+      if (shape%surface /= '' .and. shape%mesh /= '') then
+        call rule_fault(error, group, number, 'mesh', "'mesh' beside a surface", &
+          & 'give one of them', source)
+      else if (shape%surface /= '' .and. dimension /= 3) then
         call rule_fault(error, group, number, 'surface', 'a surface in a scene of dimension '// &
-          & to_text(dimension), 'facets enclose a volume in 3D only', source)
+          & to_text(dimension), "facets enclose a volume in 3D only; a 'mesh' may have any "// &
+          & 'dimension', source)
       else if (shape%shape /= '' .or. any(is_set([shape%lower, shape%upper, shape%direction])) &
         & .or. any(is_set([shape%radius, shape%height, shape%angle]))) then
-        call rule_fault(error, group, number, 'surface', "'surface' beside a shape", &
+        call rule_fault(error, group, number, key, "'"//key//"' beside a shape", &
           & 'give one of them', source)
-      else
+      else if (key == 'surface') then
         call check_file(shape%surface, scene_file, group, number, error, source, 'surface')
+      else
+        call check_file(shape%mesh, scene_file, group, number, error, source, 'mesh')
       end if
-    end subroutine check_shape_surface
+    end subroutine check_shape_file
 
     !> An error if a key of another kind of shape is given.
     subroutine refuse(keys)

@@ -30,7 +30,7 @@ module pd_scene_content_types
   use pd_scene_groups_relaxation, only: relaxation_group
   use pd_scene_groups_rigid, only: rigid_group
   use pd_scene_groups_section, only: section_group
-  use pd_scene_groups_shape, only: no_fail_group, region_group, shape_group
+  use pd_scene_groups_shape, only: is_of_file, no_fail_group, region_group, shape_group
   use pd_scene_groups_side, only: side_group
   use pd_scene_groups_study, only: study_group
   use pd_scene_groups_time, only: time_group
@@ -38,10 +38,11 @@ module pd_scene_content_types
   implicit none (type, external)
   private
   public :: scene_type, header_type, define_group, body_group, shape_group, region_group, &
-    & no_fail_group, material_group, horizon_group, crack_group, initial_group, boundary_group, &
-    & load_group, time_group, relaxation_group, output_group, probe_group, tip_group, &
-    & section_group, line_group, j_integral_group, side_group, study_group, contact_group, &
-    & rigid_group, refine_group, name_length, path_length, text_length, unset, is_set, is_given
+    & is_of_file, no_fail_group, material_group, horizon_group, crack_group, initial_group, &
+    & boundary_group, load_group, time_group, relaxation_group, output_group, probe_group, &
+    & tip_group, section_group, line_group, j_integral_group, side_group, study_group, &
+    & contact_group, rigid_group, refine_group, name_length, path_length, text_length, unset, &
+    & is_set, is_given
   public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned
   public :: has_refinement, has_own_horizons, laws_of, added_type, group_entry, group_table, &
     & group_interface, groups_interface

@@ -6,7 +6,7 @@ module pd_scene_groups_shape
   use pd_scene_groups_group, only: group_type
   implicit none (type, external)
   private
-  public :: shape_group, region_group, no_fail_group, shape_names, axes
+  public :: shape_group, region_group, no_fail_group, is_of_file, shape_names, axes
 
   !> Kinds of shapes.
   character(10), parameter :: shape_names(5) = [character(10) :: 'box', 'sphere', 'cylinder', &
@@ -27,7 +27,8 @@ module pd_scene_groups_shape
     character(name_length) :: region = ''        !! a region's points, too
     character(text_length) :: where = ''         !! an expression of x, y, z: inside if not 0
     character(path_length) :: surface = ''       !! instead of a shape: closed facets, .stl
-    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the surface
+    character(path_length) :: mesh = ''          !! instead of a shape: elements, .msh or .inp
+    real(wp) :: scale = 1.0_wp                   !! metres of one unit of the surface or mesh
   contains
     procedure :: visit => visit_cut
   end type shape_group
@@ -46,6 +47,12 @@ module pd_scene_groups_shape
   end type no_fail_group
 
 contains
+
+  !> Whether a file says what is inside: a surface or a mesh.
+  elemental logical function is_of_file(group)
+    class(shape_group), intent(in) :: group  !! that may have a shape instead
+    is_of_file = group%surface /= '' .or. group%mesh /= ''
+  end function is_of_file
 
   !> The keys of `&remove` and `&keep`.
   subroutine visit_cut(group, keys)
@@ -105,9 +112,11 @@ contains
     call keys%key('angle', group%angle, 'degrees', 'cone: opening angle, from side to side', &
       & above=0.0_wp, below=180.0_wp)
     call keys%key('surface', group%surface, 'closed facets instead of a shape (3D): a STL file')
-    call keys%key('scale', group%scale, 'm', 'surface: length of its unit, 1e-3 for '// &
-      & 'millimetres', above=0.0_wp, &
-      & hidden=keys%mode == mode_write .and. group%surface == '')
+    call keys%key('mesh', group%mesh, 'elements of the dimension of the scene instead of a '// &
+      & 'shape: a file of Gmsh (.msh) or of Abaqus and CalculiX (.inp)')
+    call keys%key('scale', group%scale, 'm', 'surface, mesh: length of its unit, 1e-3 for '// &
+      & 'millimetres', above=0.0_wp, hidden=keys%mode == mode_write .and. &
+      & .not. is_of_file(group))
   end subroutine visit_shape
 
 end module pd_scene_groups_shape
