@@ -4,6 +4,7 @@ module test_study_trade_plan
   use pd_base_kinds, only: wp
   use pd_scene_format_file, only: line_type
   use pd_study_trade_front, only: mark_front, observed_orders, on_front, order_type
+  use pd_study_trade_lines, only: finest_of
   use pd_study_trade_plan, only: plan_from_text, plan_type
   use pd_study_trade_trial, only: outcome_type
   use bodies, only: expect, expect_true
@@ -29,6 +30,7 @@ contains
       & new_unittest('groups go together', test_together), &
       & new_unittest('orders of a list of runs', test_listed_orders), &
       & new_unittest('points follow in proportion', test_points), &
+      & new_unittest('levels of finer cells', test_levels), &
       & new_unittest('vectors take several values', test_vectors), &
       & new_unittest('columns', test_columns), &
       & new_unittest('invalid plans', test_refused), &
@@ -142,6 +144,42 @@ contains
     call plan_from_text(head//"&study vary = 'points' values = 40, 25"//rest, 'a.nml', plan, found)
     call expect_parts(error, found, "bad value '25'|a.nml:6|expected a multiple of 2")
   end subroutine test_points
+
+  !> Points, bonds and work of refined lattices are those of all levels; the most levels are the
+  !> finest, and orders are those of the finest spacing.
+  subroutine test_levels(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(plan_type) :: plan
+    type(outcome_type) :: outcomes(3)
+    type(order_type), allocatable :: orders(:)
+    character(:), allocatable :: reason
+    integer :: finest, t
+
+    ! of 300 cells those with x < 0.25: 50, and of 2 levels a rim of 4 columns of ten
+    call planned("&refine shape = 'box' upper(1) = 0.25 levels = 1 /"//line// &
+      & "&study vary = 'refine%levels' values = 1, 2"//rest, plan, error)
+    if (allocated(error)) return
+    call expect(error, plan%trials(1)%points, 250.0_wp + 50*4, 0.0_wp, 'points of a level')
+    call expect(error, plan%trials(2)%points, 210.0_wp + 40*4 + 50*16, 0.0_wp, 'points of two')
+    call expect(error, plan%trials(2)%bonds/plan%trials(1)%bonds, plan%trials(2)%points &
+      & /plan%trials(1)%points, 1.0e-12_wp, 'bonds')
+    call expect_true(error, plan%trials(2)%work > plan%trials(1)%work, 'work')
+    call finest_of(plan, finest, reason)
+    call expect_true(error, finest == 2, 'the finest run: '//reason)
+    call planned("&refine shape = 'box' upper(1) = 0.25 levels = 1 /"//line// &
+      & "&study vary = 'refine%levels' values = 1, 2, 3"//rest, plan, error)
+    if (allocated(error)) return
+    outcomes%done = .true.
+    outcomes%judged = .true.
+    do t = 1, 3
+      outcomes(t)%error = 0.25_wp**t  ! a quarter with half of the spacing: second order
+    end do
+    call observed_orders(plan, outcomes, orders)
+    call expect_true(error, size(orders) == 2, 'two orders')
+    if (allocated(error)) return
+    call expect(error, orders(1)%order, 2.0_wp, 1.0e-12_wp, 'order')
+    call expect(error, orders(2)%order, 2.0_wp, 1.0e-12_wp, 'order')
+  end subroutine test_levels
 
   subroutine test_vectors(error)
     type(error_type), allocatable, intent(out) :: error

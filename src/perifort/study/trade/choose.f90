@@ -146,9 +146,10 @@ contains
     character(path_length), allocatable :: words(:)
     real(wp) :: h, expected
     integer :: i, multiple
-    logical :: refines
+    logical :: refines, levels
 
     refines = plan%variables(free)%refines
+    levels = plan%variables(free)%levels
     multiple = count_step(plan, plan%variables(free))
     ! the runs themselves: their results are known
     do i = 1, law%n
@@ -160,6 +161,8 @@ contains
     do while (h > law%h(law%n)/reach)
       if (refines) then
         h = 1/real(multiple*ceiling(fine/h/multiple - 1.0e-9_wp), wp)
+      else if (levels) then
+        h = h/2
       else
         h = h/fine
       end if
@@ -207,6 +210,7 @@ contains
         if (variable%axis /= plan%variables(free)%axis) cycle
         value = h
         if (plan%variables(free)%refines) value = 1/h
+        if (plan%variables(free)%levels) value = log(1/h)/log(2.0_wp)
         if (v /= free) value = companion(plan%variables(free)%numbers, variable%numbers, value)
         if (index(variable%target%kind, 'integer') > 0) then
           words(v) = to_text(nint(value))

@@ -49,8 +49,8 @@ contains
     end do
   end function on_front
 
-  !> The step of a variable: what grows as the error does. Points count as the spacing they make,
-  !> other numbers as they are.
+  !> The step of a variable: what grows as the error does. Points and levels of finer cells count as
+  !> the spacing they make, other numbers as they are.
   pure real(wp) function step_variable(plan, variable, value) result(step)
     type(plan_type), intent(in) :: plan  !! of the study
     integer, intent(in) :: variable      !! number of the variable
@@ -58,15 +58,16 @@ contains
                                          !! points
     step = value
     if (plan%variables(variable)%refines) step = 1/value
+    if (plan%variables(variable)%levels) step = 2**(-value)
   end function step_variable
 
-  !> Whether the error ought to vanish with a variable: points, the time step and its safety, the
-  !> tolerance.
+  !> Whether the error ought to vanish with a variable: points, levels of finer cells, the time step
+  !> and its safety, the tolerance.
   pure logical function is_step(plan, v)
     type(plan_type), intent(in) :: plan  !! of the study
     integer, intent(in) :: v             !! number of the variable
     associate (variable => plan%variables(v))
-      is_step = variable%refines .or. variable%target%group == 'time' .and. &
+      is_step = variable%refines .or. variable%levels .or. variable%target%group == 'time' .and. &
         & (variable%target%key == 'step' .or. variable%target%key == 'safety') .or. &
         & variable%target%group == 'relaxation' .and. variable%target%key == 'tolerance'
       is_step = is_step .and. variable%numeric

@@ -16,7 +16,7 @@ module pd_study_trade_lines
 
 contains
 
-  !> The run that is the finest in every variable that refines (points, time step, safety,
+  !> The run that is the finest in every variable that refines (points, levels, time step, safety,
   !> tolerance). Among several the one with the smallest spacing, then with the smallest time step
   !> or tolerance, then the first. `reason` is '' unless there is no such run.
   subroutine finest_of(plan, finest, reason)
@@ -47,8 +47,8 @@ contains
       reason = 'no run is the finest in every varied key: none has '//wanted
       return
     else if (refining == 0 .and. minval(step) >= maxval(step)*(1 - 1.0e-9_wp)) then
-      reason = 'no run is finer than the others: no varied key refines points, time step, '// &
-        & 'safety or tolerance'
+      reason = 'no run is finer than the others: no varied key refines points, levels, '// &
+        & 'time step, safety or tolerance'
       return
     end if
     do t = 1, size(plan%trials)

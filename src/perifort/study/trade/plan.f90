@@ -17,7 +17,7 @@ module pd_study_trade_plan
   use pd_scene_content_read, only: read_scene_source
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_scene_format_source, only: scan_source, source_fault, source_type, token_type
-  use pd_scene_content_types, only: is_lattice, is_set, name_length, path_length, scene_type
+  use pd_scene_content_types, only: has_own_horizons, has_refinement, is_lattice, is_set, name_length, path_length, scene_type
   use pd_scene_format_values, only: parse_integer, parse_real
   implicit none (type, external)
   private
@@ -39,6 +39,7 @@ module pd_study_trade_plan
     real(wp), allocatable :: numbers(:)               !! the same as numbers, if they are
     logical :: numeric = .false.
     logical :: refines = .false.                      !! it is the number of points of a body
+    logical :: levels = .false.                       !! it is the number of levels of `&refine`
     integer :: step = 1                               !! refines: counts are multiples of this
     integer :: axis = 0                               !! variables of one axis go in step
   end type variable_type
@@ -227,6 +228,7 @@ contains
       variable%name = trim(plan%scene%studies(i)%vary)
       if (any(result_columns == variable%name) .or. scan(variable%name, ',"') > 0) &
         & variable%name = full_name(plan%source, variable%target)
+      variable%levels = variable%target%group == 'refine' .and. variable%target%key == 'levels'
       variable%refines = variable%target%group == 'body' .and. variable%target%key == 'points' &
         & .and. .not. allocated(variable%target%subscript)
       if (.not. variable%refines) return
@@ -454,42 +456,48 @@ contains
                                               !! set
     type(error_type), allocatable, intent(out) :: error
     type(body_type) :: body
-    real(wp) :: delta, steps, speed, extent
+    real(wp) :: delta, steps, speed, extent, spacing, finest
     integer :: i, dim
 
     call check_memory(trial%scene, error)
     if (allocated(error)) return
     trial%points = 0.0_wp
     trial%spacing = 0.0_wp
+    finest = huge(finest)
     extent = 0.0_wp
     associate (scene => trial%scene)
       dim = scene%header%dimension
-      if (any(.not. is_lattice(scene%bodies))) then
+      if (any(.not. is_lattice(scene%bodies)) .or. has_refinement(scene)) then
         call generate_body(scene, body, delta, error)
         if (allocated(error)) return
         trial%points = body%n_points
         trial%spacing = maxval(body%spacing)
+        finest = minval(body%spacing)
         extent = maxval(maxval(body%x, 1) - minval(body%x, 1))
       else
         do i = 1, size(scene%bodies)
           trial%points = trial%points + product(real(scene%bodies(i)%points(:dim), wp))
-          trial%spacing = max(trial%spacing, (scene%bodies(i)%upper(1) &
-            & - scene%bodies(i)%lower(1))/scene%bodies(i)%points(1))
+          spacing = (scene%bodies(i)%upper(1) - scene%bodies(i)%lower(1)) &
+            & /scene%bodies(i)%points(1)
+          trial%spacing = max(trial%spacing, spacing)
+          finest = min(finest, spacing)
           extent = max(extent, maxval(scene%bodies(i)%upper(:dim) - scene%bodies(i)%lower(:dim)))
         end do
       end if
       delta = horizon_of(scene, trial%spacing)
       speed = sqrt(maxval(scene%materials%youngs_modulus/scene%materials%density))
       if (scene%time%method == 'relaxation') then
-        steps = 10*scene%relaxation%load_steps*extent/trial%spacing
+        steps = 10*scene%relaxation%load_steps*extent/finest
       else if (scene%time%steps > 0) then
         steps = scene%time%steps
       else if (is_set(scene%time%step)) then
         steps = scene%time%duration/scene%time%step
       else
-        steps = scene%time%duration*speed/(scene%time%safety*trial%spacing)
+        steps = scene%time%duration*speed/(scene%time%safety*finest)
       end if
-      trial%bonds = trial%points*horizon_volume(dim, delta, 1.0_wp)/trial%spacing**dim
+      ! families of points with horizons of their own have about the same number of members
+      spacing = merge(trial%spacing, finest, has_own_horizons(scene))
+      trial%bonds = trial%points*horizon_volume(dim, delta, 1.0_wp)/spacing**dim
       trial%work = trial%bonds*steps
     end associate
   end subroutine size_up
