@@ -16,6 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import scaling
 from common import Case, change
 
 PARALLEL = os.environ.get("PERIFORT_MPI", "")
@@ -220,6 +221,16 @@ def check_ends(case):
         case.equal("results can be read", len(arrays(folder)) > 3, True)
 
 
+def check_messages(case, ranks):
+    """Ranks send what the formula says: displacements, forces and dilatation of each copy."""
+    path = scaling.scene(case.out, 16, 1)
+    for n in ranks:
+        _, sent, messages = scaling.run(path, n, 1)
+        formula = scaling.bytes_of_step(3, scaling.halo_of(path, n), scaling.STEPS)
+        case.below(f"{n} ranks: bytes of a step beside the formula", abs(sent / formula - 1), 1e-5)
+        case.equal(f"{n} ranks: there are messages", messages > 0, True)
+
+
 def wait_for(path, seconds=60):
     """Until a file is there, and a little longer."""
     limit = time.time() + seconds
@@ -266,6 +277,7 @@ def main():
         sys.exit("error: PERIFORT_MPI does not name the program with MPI; start this as ./pf verify mpi")
     ranks = [int(n) for n in (case.options.ranks or ("3" if case.options.short else "2,3,4,7")).split(",")]
     compare_scenes(case, ranks)
+    check_messages(case, ranks)
     check_ends(case)
     case.finish()
 

@@ -82,6 +82,7 @@ contains
     watchers%recorder => output%recorder
     if (present(observer)) watchers%own => observer
     call watch_for_interrupt()
+    call world%count_anew()
 
     ! integration in time (7.3) or load steps to equilibrium (7.5), with breaking (7.9, 7.10)
     call move(set_up%system, set_up%plan, watchers, error)

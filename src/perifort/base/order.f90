@@ -17,6 +17,11 @@ module pd_base_order
 
   !> What ranks say to each other. Every rank makes the same calls in the same order.
   type, abstract :: ranks_type
+    integer(i8) :: bytes = 0_i8               !! that this rank has sent of its points' values
+    integer(i8) :: messages = 0_i8            !! in so many messages
+    integer(i8) :: sums = 0_i8                !! reductions over all ranks
+    real(wp) :: sharing = 0.0_wp              !! time spent with the messages [s]
+    real(wp) :: summing = 0.0_wp              !! with reductions, waiting for other ranks included [s]
   contains
     procedure(all_values), deferred :: add_all       !! each value summed over the ranks
     procedure(all_values), deferred :: take_largest  !! the largest of each value

@@ -42,13 +42,29 @@ contains
   end procedure abort_world
 
   module procedure add_all
+    real(wp) :: begin
+
+    begin = wall_time()
     call MPI_Allreduce(MPI_IN_PLACE, values, size(values), MPI_DOUBLE_PRECISION, MPI_SUM, &
       & MPI_COMM_WORLD)
+    call count_sum(self, begin)
   end procedure add_all
+
+  !> Count a reduction that began at a time [s].
+  subroutine count_sum(self, begin)
+    class(world_type), intent(inout) :: self
+    real(wp), intent(in) :: begin
+
+    self%sums = self%sums + 1_i8
+    self%summing = self%summing + wall_time() - begin
+  end subroutine count_sum
 
   module procedure take_largest
     real(wp), parameter :: beyond = 2*(huge(1.0_wp)/2)
+    real(wp) :: begin
     integer :: i
+
+    begin = wall_time()
 
     ! ranks may reduce in different orders, in which comparisons with NaN would differ
     do i = 1, size(values)
@@ -56,14 +72,17 @@ contains
     end do
     call MPI_Allreduce(MPI_IN_PLACE, values, size(values), MPI_DOUBLE_PRECISION, MPI_MAX, &
       & MPI_COMM_WORLD)
+    call count_sum(self, begin)
   end procedure take_largest
 
   module procedure share
     real(wp), asynchronous :: sent(size(values, 2)*size(self%send_slot))
     real(wp), asynchronous :: taken(size(values, 2)*size(self%take_slot))
     type(MPI_Request) :: request(2*size(self%neighbour))
+    real(wp) :: begin
     integer :: c, i, n, m, first, number, at
 
+    begin = wall_time()
     m = size(values, 2)
     do n = 1, size(self%neighbour)
       first = self%take_first(n)
@@ -95,6 +114,9 @@ contains
         end do
       end do
     end do
+    self%bytes = self%bytes + 8_i8*m*size(self%send_slot)
+    self%messages = self%messages + size(self%neighbour)
+    self%sharing = self%sharing + wall_time() - begin
   end procedure share
 
   module procedure join

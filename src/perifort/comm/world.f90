@@ -28,6 +28,7 @@ module pd_comm_world
     procedure :: collect
     procedure :: number_before
     procedure :: wait_for_all
+    procedure :: count_anew
   end type world_type
 
   interface
@@ -106,6 +107,17 @@ module pd_comm_world
   end interface
 
 contains
+
+  !> Forget what has been counted of messages, so that what follows is counted alone.
+  pure subroutine count_anew(self)
+    class(world_type), intent(inout) :: self
+
+    self%bytes = 0_i8
+    self%messages = 0_i8
+    self%sums = 0_i8
+    self%sharing = 0.0_wp
+    self%summing = 0.0_wp
+  end subroutine count_anew
 
   !> Before an error message: let the first rank speak, which then ends the others. Most errors are
   !> the same on all ranks.

@@ -1,7 +1,7 @@
 !> The summary printed at the end of a run.
 module pd_output_report_after
-  use pd_base_kinds, only: wp
-  use pd_base_reduce, only: largest_over
+  use pd_base_kinds, only: wp, i8
+  use pd_base_reduce, only: count_of_ranks, largest_of_ranks, largest_over
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_motion_system, only: system_type
   use pd_output_report_recorder, only: recorder_type
@@ -29,6 +29,8 @@ contains
       & ' ns per bond and '//unit//', '//to_text(steps/max(1.0e-9_wp, seconds), 4)// &
       & ' '//unit//'s/s')
     if (recorder%team%report() /= '') text = text//line('threads', recorder%team%report())
+    if (associated(system%body%order%ranks)) text = text//messages_of(system, max(1, steps), &
+      & seconds, unit)
     if (recorder%gave_way > 0) text = text//line('solver', counted(recorder%gave_way, &
       & 'load step')//' left to dynamic relaxation by the conjugate gradient')
     associate (now => recorder%balance%energies)
@@ -59,5 +61,29 @@ contains
       text = text//line('results', directory)
     end if
   end function summary_after
+
+  !> What ranks have sent each other: of all together, and the time of the rank that took longest.
+  function messages_of(system, steps, seconds, unit) result(text)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: steps           !! steps or iterations
+    real(wp), intent(in) :: seconds        !! of all of them [s]
+    character(*), intent(in) :: unit       !! what a step is called
+    character(:), allocatable :: text
+    real(wp) :: sharing, summing
+    integer(i8) :: bytes, messages
+
+    associate (order => system%body%order)
+      bytes = count_of_ranks(order, order%ranks%bytes)
+      messages = count_of_ranks(order, order%ranks%messages)
+      sharing = largest_of_ranks(order, order%ranks%sharing)
+      summing = largest_of_ranks(order, order%ranks%summing)
+      text = line('messages', with_unit(real(bytes, wp)/steps, 'B', 6)//' in '// &
+        & to_text(real(messages, wp)/steps, 4)//' messages a '//unit//' of all ranks, '// &
+        & to_text(100*sharing/max(seconds, tiny(seconds)), 2)//' % of the time') &
+        & //line('sums', to_text(real(order%ranks%sums, wp)/steps, 3)//' over all ranks a '// &
+        & unit//', '//to_text(100*summing/max(seconds, tiny(seconds)), 2)// &
+        & ' % of the time with waiting')
+    end associate
+  end function messages_of
 
 end module pd_output_report_after
