@@ -40,10 +40,10 @@ SCENE = """&scene dimension = 3 /
 
 
 def bytes_of_step(dim, halo, steps):
-    """What all ranks send in a step on average [bytes]: displacements and forces of each copy and
-    its dilatation, once for each step and once at the start.
+    """What all ranks send in a step on average [bytes]: displacements of each copy and its
+    dilatation, once for each step and once at the start.
     """
-    return 8 * (2 * dim + 1) * halo * (steps + 1) / steps
+    return 8 * (dim + 1) * halo * (steps + 1) / steps
 
 
 def scene(folder, n, cubes):
@@ -97,14 +97,14 @@ def measure(rows, repeats):
 
 def model(points, cores, of_bond, of_copy, latency, bandwidth):
     """Seconds of a step and its efficiency, of cubes of points on so many cores, a rank each:
-    bonds, copies whose bonds a rank computes too, three messages to each of 26 neighbours, two
+    bonds, copies whose bonds a rank computes too, two messages to each of 26 neighbours, two
     sums over all ranks.
     """
     side = (points / cores) ** (1 / 3)
     copies = (side + 2 * REACH) ** 3 - side ** 3 if cores > 1 else 0.0
     bonds = 122 * points / cores
     alone = bonds * of_bond
-    messages = 3 * 26 * latency if cores > 1 else 0.0
+    messages = 2 * 26 * latency if cores > 1 else 0.0
     sent = bytes_of_step(3, copies, STEPS) * min(cores, CORES_OF_A_NODE) / bandwidth if cores > 1 else 0.0
     sums = 2 * latency * math.ceil(math.log2(cores)) if cores > 1 else 0.0
     step = alone + copies * of_copy + messages + sent + sums

@@ -222,7 +222,7 @@ def check_ends(case):
 
 
 def check_messages(case, ranks):
-    """Ranks send what the formula says: displacements, forces and dilatation of each copy."""
+    """Ranks send what the formula says: displacements and dilatation of each copy."""
     path = scaling.scene(case.out, 16, 1)
     for n in ranks:
         _, sent, messages = scaling.run(path, n, 1)

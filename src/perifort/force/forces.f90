@@ -31,7 +31,8 @@ contains
   !> if the forces have one, then the forces. Whoever needs internal forces calls this. Values at
   !> points that other processes own come from there: dilatation and forces here, displacements from
   !> whoever calls.
-  subroutine internal_force(body, family, model, options, workspace, u, p, force, strained, part)
+  subroutine internal_force(body, family, model, options, workspace, u, p, force, strained, part, &
+    & of_copies)
     type(body_type), intent(in) :: body                 !! what the process owns of it
     class(family_type), intent(in) :: family            !! the bonds of each point
     type(model_type), intent(in) :: model               !! parameters of the slots
@@ -45,7 +46,13 @@ contains
                                                         !! (nearly) beyond its limit, else 0
                                                         !! (n_slots), of size 0 if none can break
     integer, intent(in), optional :: part               !! `whole` by default
+    logical, intent(in), optional :: of_copies
+      !! the forces of copies of other processes' points are asked for; they are by default
+    logical :: asked
     integer :: now
+
+    asked = .true.
+    if (present(of_copies)) asked = of_copies
 
     now = whole
     if (present(part)) now = part
@@ -62,7 +69,7 @@ contains
     else if (now /= after_marks) then
       call force_pass(family, model, options, workspace, u, p, force, strained)
     end if
-    if (now /= up_to_marks) call share_halo(body, force)
+    if (asked .and. now /= up_to_marks) call share_halo(body, force)
   end subroutine internal_force
 
   !> Take the dilatation of copies from the ranks that own their points. Where results must not

@@ -242,21 +242,25 @@ contains
     real(wp), intent(in) :: t  !! [s]
     integer, intent(in), optional :: part  !! `whole`, `up_to_marks` or `after_marks`
     type(term_view_type) :: view
+    logical :: of_copies
     integer :: now
 
     system%time = t
+    ! explicit steps take displacements of copies from their owners before each evaluation; their
+    ! forces are needed for the energy of bonds that break after the forces alone
+    of_copies = system%static .or. system%break_late
     now = whole
     if (present(part)) now = part
     if (now /= after_marks) call share_halo(system%body, system%state%u)
     associate (state => system%state)
       call internal_force(system%body, system%family, system%model, options_of(system%model), &
-        & system%workspace, state%u, state%p, state%force, system%strained, now)
+        & system%workspace, state%u, state%p, state%force, system%strained, now, of_copies)
     end associate
     if (system%terms%inside == 0 .or. now == up_to_marks) return
     call view_of(system, t, view)
     call system%terms%search(view)
     call system%terms%add_force(view, system%state%force)
-    call share_halo(system%body, system%state%force)
+    if (of_copies) call share_halo(system%body, system%state%force)
   end subroutine renew_forces
 
   !> Bring conditions that are expressions of t to time `t`. The first value that is not finite is
