@@ -86,6 +86,7 @@ program main
   use test_output_measures_boundary, only: collect_output_measures_boundary
   use test_output_measures_fragments, only: collect_output_measures_fragments
   use test_output_measures_tip, only: collect_output_measures_tip
+  use test_output_report_rigid_surfaces, only: collect_output_report_rigid_surfaces
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_cells, only: collect_output_results_cells
   use test_output_results_base64, only: collect_output_results_base64
@@ -224,6 +225,7 @@ program main
   call register('output_measures_j_integral', collect_output_measures_j_integral)
   call register('output_measures_section', collect_output_measures_section)
   call register('output_report_contact', collect_output_report_contact)
+  call register('output_report_rigid_surfaces', collect_output_report_rigid_surfaces)
   call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)
   call register('output_results_layout', collect_output_results_layout)
