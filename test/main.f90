@@ -54,6 +54,7 @@ program main
   use test_force_breaking, only: collect_force_breaking
   use test_force_contact, only: collect_force_contact
   use test_force_closed, only: collect_force_closed
+  use test_force_normals, only: collect_force_normals
   use test_force_rigid, only: collect_force_rigid
   use test_force_search, only: collect_force_search
   use test_force_contract, only: collect_force_contract
@@ -187,6 +188,7 @@ program main
   call register('force_breaking', collect_force_breaking)
   call register('force_contact', collect_force_contact)
   call register('force_closed', collect_force_closed)
+  call register('force_normals', collect_force_normals)
   call register('force_rigid', collect_force_rigid)
   call register('force_search', collect_force_search)
   call register('force_contract', collect_force_contract)

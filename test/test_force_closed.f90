@@ -13,7 +13,7 @@ module test_force_closed
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
-  use pd_set_up_prepare, only: set_up_type
+  use pd_set_up_prepare, only: prepare, set_up_type
   use bodies, only: diary_type, expect, expect_true, noise, ready_alone, rotation_matrix
   use comparisons, only: expect_close
   use meshes, only: write_file
@@ -478,17 +478,11 @@ contains
       character(*), intent(in) :: text, parts
       type(scene_type) :: scene
       type(set_up_type) :: set_up
-      type(error_type), allocatable :: unexpected
       type(fault_type), allocatable :: fault
 
       if (allocated(error)) return
       call read_scene_text(text, 'build/tool.nml', scene, fault)
-      if (.not. allocated(fault)) then
-        call ready_alone(scene, set_up, unexpected)
-        allocate (fault)
-        fault%message = 'none'
-        if (allocated(unexpected)) fault%message = unexpected%message
-      end if
+      if (.not. allocated(fault)) call prepare(scene, set_up, fault)
       call expect_parts(error, fault, parts)
     end subroutine refused
   end subroutine test_refused
