@@ -1,5 +1,5 @@
-!> Rigid bodies that are closed surfaces from files: distances, normals, mass and motion against those
-!> of boxes, spheres and tori, and what is refused.
+!> Rigid bodies that are closed surfaces from files: distances, normals, mass and motion against
+!> those of boxes, spheres and tori, and what is refused.
 module test_force_closed
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp
@@ -224,10 +224,8 @@ contains
     x = box_facets([-1.0_wp, -1.0_wp, -1.0_wp], [1.0_wp, 1.0_wp, 1.0_wp])
     call facets_of(x, plain, error)
     do k = 1, 3
-      if (all(any(abs(spread(x(:, mod(k, 3) + 1, 1), 2, 3) - x(:, :, 2)) <= 0.0_wp, dim=1) .neqv. &
-        & [.true., .true., .true.])) cycle
       f = k
-      if (common(x(:, k, 1)) .and. common(x(:, mod(k, 3) + 1, 1))) exit
+      if (is_common(x(:, k, 1)) .and. is_common(x(:, mod(k, 3) + 1, 1))) exit
     end do
     middle = (x(:, f, 1) + x(:, mod(f, 3) + 1, 1))/2
     x = joined(x, x(:, :, [1, 1]))
@@ -251,12 +249,12 @@ contains
   contains
 
     !> Whether a corner is one of the second triangle.
-    logical function common(corner)
+    logical function is_common(corner)
       real(wp), intent(in) :: corner(3)
       integer :: n
 
-      common = any([(all(abs(corner - x(:, n, 2)) <= 0.0_wp), n=1, 3)])
-    end function common
+      is_common = any([(all(abs(corner - x(:, n, 2)) <= 0.0_wp), n=1, 3)])
+    end function is_common
   end subroutine test_odd
 
   !> Of a box in any place, a prism, and a ball of more and more facets, whose error is of second
@@ -451,7 +449,8 @@ contains
     x = box_facets([-1.0_wp, -1.0_wp, 1.0_wp], [1.0_wp, 1.0_wp, 2.0_wp])
     call write_file('tool.stl', ascii_stl(x, 'tool'))
     call refused('&scene dimension = 2 /'//line//'&material youngs_modulus = 1e9 density = 1e3 '// &
-      & 'poissons_ratio = 0.25 /'//line//"&body name = 'block' lower = 0, 0 upper = 1, 1 points = 9, 9 /"//line//tool//file// &
+      & 'poissons_ratio = 0.25 /'//line//"&body name = 'block' lower = 0, 0 upper = 1, 1 "// &
+      & 'points = 9, 9 /'//line//tool//file// &
       & '/'//rest, 'surface in 2D')
     call refused(block//tool//'density = 1 /'//rest, "lacks the key 'surface'")
     call refused(block//tool//"surface = 'no.stl' density = 1 /"//rest, 'no.stl')
@@ -459,7 +458,8 @@ contains
     call refused(block//"&rigid name = 'tool' shape = 'sphere' centre = 0, 0, 3 radius = 1 "// &
       & file//'/'//rest, "'surface' of a sphere")
     call refused(block//tool//"surface = 'tool.stl' /"//rest, "'mass' or 'density'")
-    call refused(block//tool//file//'centre = 0, 0, -0.5e-3 scale = 1e-3 /'//rest, 'tool|within|start')
+    call refused(block//tool//file//'centre = 0, 0, -0.5e-3 scale = 1e-3 /'//rest, &
+      & 'tool|within|start')
     call write_file('tool.stl', ascii_stl(x(:, :, [1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12]), 'tool'))
     call refused(block//tool//file//'/'//rest, 'closed|3 edges|tool.stl:')
     call write_file('tool.stl', ascii_stl(reversed(x), 'tool'))

@@ -1,5 +1,5 @@
-!> Contact along smoothed normals: the normals, forces as gradients of the energy, sliding, rebounds,
-!> and what is refused.
+!> Contact along smoothed normals: the normals, forces as gradients of the energy, sliding,
+!> rebounds, and what is refused.
 module test_force_normals
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, i4
@@ -53,8 +53,8 @@ contains
       & new_unittest('what is refused', test_refused)]
   end subroutine collect_force_normals
 
-  !> On a face they are exact, of a ball within the roughness of its lattice, within bodies there are
-  !> none; they turn with the body.
+  !> On a face they are exact, of a ball within the roughness of its lattice, within bodies there
+  !> are none; they turn with the body.
   subroutine test_normals(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type), target :: set_up
@@ -66,7 +66,8 @@ contains
 
     call run('&scene dimension = 3 /'//line//soft// &
       & "&body name = 'box' lower = -6e-3, -6e-3, -6e-3 upper = 6e-3, 6e-3, 6e-3 "// &
-      & 'points = 12, 12, 12 /'//line//"&body name = 'ball' shape = 'sphere' centre = 0, 0, 0.03 "// &
+      & 'points = 12, 12, 12 /'//line// &
+      & "&body name = 'ball' shape = 'sphere' centre = 0, 0, 0.03 "// &
       & 'radius = 8e-3 spacing = 1e-3 /'//line//"&contact between = 'box', 'ball' normals = "// &
       & "'smoothed' /"//line//'&time steps = 1 /', set_up, error)
     if (allocated(error)) return
@@ -224,7 +225,8 @@ contains
       if (allocated(error)) return
       call expect_scene(error, '&scene dimension = 2 /'//line//soft// &
         & "&body name = 'base' lower = 0, -0.01 upper = 0.6, 0.03 points = 60, 4 /"//line// &
-        & "&body name = 'block' lower = 0.1, 0.02909 upper = 0.4, 0.06909 points = 30, 4 /"//line// &
+        & "&body name = 'block' lower = 0.1, 0.02909 upper = 0.4, 0.06909 points = 30, 4 /"// &
+        & line// &
         & "&region name = 'low' where = 'y < 0.0295' /"//line// &
         & "&region name = 'high' where = 'y > 0.0295' /"//line// &
         & "&boundary region = 'low' displacement_x = 0 displacement_y = 0 /"//line// &

@@ -16,7 +16,7 @@ module test_output_report_rigid_surfaces
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: set_up_type
   use bodies, only: diary_type, expect, expect_true, ready_alone
-  use comparisons, only: expect_close
+  use comparisons, only: expect_close, max_abs
   use meshes, only: write_file
   use surfaces, only: binary_stl, box_facets
   use test_scene_expect, only: line
@@ -124,12 +124,12 @@ contains
     end do
     spread_of_patch = maxval(places(size(drawn%of) - 3:, :), dim=1) &
       & - minval(places(size(drawn%of) - 3:, :), dim=1)
-    call expect_true(error, maxval(spread_of_patch) > 0.012_wp, 'the patch is smaller than the body')
+    call expect_true(error, maxval(spread_of_patch) > 0.012_wp, 'the patch is too small')
     ! nothing touches: so they go on
     call move_rigid_bodies(set_up%system, set_up%system%time, 1.0e-10_wp)
     call drawn%place(set_up%system, later, ignored)
     call expect_close(error, (later - places)/1.0e-10_wp, velocity, 1.0e-4_wp, 'velocity')
-    call expect_true(error, maxval(abs(velocity(:, 3))) > 50.0_wp, 'nothing turns')
+    call expect_true(error, max_abs(velocity(:, 3)) > 30.0_wp, 'nothing turns')
   end subroutine test_space
 
   !> A circle, a rectangle and a patch of a half-plane, as areas.

@@ -5,8 +5,8 @@
 !> constant of the mean of both materials. What separates pushes less if there is a restitution e,
 !> by e^2; or a dashpot acts along the line. Friction acts across it.
 !>
-!> With smoothed normals the overlap is that along the normal of both surfaces, shared among all that
-!> are beside each other (`pd_force_normals`).
+!> With smoothed normals the overlap is that along the normal of both surfaces, shared among all
+!> that are beside each other (`pd_force_normals`).
 !>
 !> Pairs are searched in cells whose reach is D and a skin; the pairs are kept until some point has
 !> moved by half the skin, so that none is missed: two points that were farther apart than D and the
@@ -66,8 +66,8 @@ module pd_force_contact
     integer, allocatable :: side(:)          !! of each of these
     real(wp), allocatable :: reach(:)        !! half of D of each, and its half of the skin [m]
     real(wp), allocatable :: begun(:, :)     !! (n_slots, dim) where points were at the start [m]
-    real(wp), allocatable :: normals(:, :)   !! (dim, n_slots) normals of their surfaces then, if the
-                                             !! rule is smoothed
+    real(wp), allocatable :: normals(:, :)   !! (dim, n_slots) normals of their surfaces then, if
+                                             !! the rule is smoothed
     real(wp) :: skin = 0.0_wp                !! [m]
     real(wp) :: delta = 1.0_wp               !! horizon [m]
     logical :: follows = .false.             !! it stands behind the term of the normal force of
@@ -312,9 +312,9 @@ contains
     !$omp end parallel
   end subroutine sum_pairs
 
-  !> Sum up near pairs of surfaces, point by point. Along normals that stay the force is the gradient
-  !> of the energy K w (b - g)^2/2, with the overlap b - g along the normal and the weight w across
-  !> it, whose gradient is the part across.
+  !> Sum up near pairs of surfaces, point by point. Along normals that stay the force is the
+  !> gradient of the energy K w (b - g)^2/2, with the overlap b - g along the normal and the weight
+  !> w across it, whose gradient is the part across.
   subroutine sum_smoothed(self, pairs, view, force, energy)
     class(contact_type), intent(in) :: self
     type(pairs_type), intent(in) :: pairs
@@ -333,8 +333,8 @@ contains
     points = int(view%body%point(pairs%slots), i8)
     !$omp parallel do if (size(pairs%slots) >= worth_threads) default(none) &
     !$omp schedule(dynamic, at_once) shared(self, pairs, view, force, energy, normals, points) &
-    !$omp private(patch, r, n, v, total, begins, stiffness, stored, push, critical, speed, back, i, &
-    !$omp e, k, j)
+    !$omp private(patch, r, n, v, total, begins, stiffness, stored, push, critical, speed, back, &
+    !$omp i, e, k, j)
     do i = 1, size(pairs%slots)
       k = pairs%slots(i)
       total = 0.0_wp

@@ -1,5 +1,5 @@
-!> Smoothed normals of surface points (doc/theory.md, 17): against the side on which a point's family
-!> is, as it lies now, so that they turn with the body.
+!> Smoothed normals of surface points (doc/theory.md, 17): against the side on which a point's
+!> family is, as it lies now, so that they turn with the body.
 module pd_force_normals
   use pd_base_kinds, only: wp, i4
   use pd_family_family, only: allocate_bonds, bonds_type
@@ -82,8 +82,8 @@ contains
     end if
   end function normal_of_pair
 
-  !> How two points meet: the weights (1 - t^2/R^2)^2 of all others on a lattice add up to about 1, t
-  !> the distance across the normal.
+  !> How two points meet: the weights (1 - t^2/R^2)^2 of all others on a lattice add up to about 1,
+  !> t the distance across the normal.
   pure subroutine meet(r, n, spacing, begins, patch)
     real(wp), intent(in) :: r(:)        !! from one to the other [m]
     real(wp), intent(in) :: n(:)        !! normal of the pair, a unit vector

@@ -1,10 +1,10 @@
 !> Signed distance of places from a closed surface, with its normal there.
 !>
-!> The nearest place of the surface lies within a facet, on an edge or at a vertex. Within a facet its
-!> normal tells the side; on an edge and at a vertex the sum of normals of the facets there does, at
-!> a vertex each times its angle (Baerentzen and Aanaes, IEEE Trans. Vis. Comput. Graph. 11 (2005)
-!> 243). Where edges have four facets, or facets no area, the winding number tells it instead. Facets
-!> are searched in a binary tree of boxes.
+!> The nearest place of the surface lies within a facet, on an edge or at a vertex. Within a facet
+!> its normal tells the side; on an edge and at a vertex the sum of normals of the facets there
+!> does, at a vertex each times its angle (Baerentzen and Aanaes, IEEE Trans. Vis. Comput. Graph. 11
+!> (2005) 243). Where edges have four facets, or facets no area, the winding number tells it
+!> instead. Facets are searched in a binary tree of boxes.
 module pd_body_surface_distance
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4, i8
@@ -22,8 +22,8 @@ module pd_body_surface_distance
   real(wp), parameter :: at_surface = 1.0e-12_wp  !! of the largest radius: no direction is left
   real(wp), parameter :: aside = 1.0e-6_wp      !! of a facet's size, where its sides are tested
   real(wp), parameter :: beside = 0.9_wp        !! of the way to a corner, where it is tested, too
-  !> Where a nearest place is: within the facet, at corner i, or on the edge from corner i - 3 to the
-  !> next.
+  !> Where a nearest place is: within the facet, at corner i, or on the edge from corner i - 3 to
+  !> the next.
   integer, parameter :: within = 0
 
   !> A closed surface, ready for distances. Facets are in the order of the tree.
@@ -232,8 +232,8 @@ contains
     if (side < 0.0_wp) gap = -gap
   end subroutine facet_gap
 
-  !> The nearest place of the surface: nodes that are nearer than what was found are looked into, the
-  !> nearer one of two first.
+  !> The nearest place of the surface: nodes that are nearer than what was found are looked into,
+  !> the nearer one of two first.
   pure subroutine find_nearest(facets, place, facet, feature, foot)
     type(facets_type), intent(in) :: facets
     real(wp), intent(in) :: place(3)

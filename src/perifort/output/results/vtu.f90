@@ -12,8 +12,8 @@ module pd_output_results_vtu
   use pd_output_results_layout, only: block_rows
   use pd_output_results_sink, only: sink_type
   use pd_output_results_types, only: field_type
-  use pd_output_results_xml, only: array_type, begin_array, end_array, member, put_bytes, put_reals, &
-    & put_vectors, remove_series, write_list
+  use pd_output_results_xml, only: array_type, begin_array, end_array, member, put_bytes, &
+    & put_reals, put_vectors, remove_series, write_list
   implicit none (type, external)
   private
   public :: vtu_series, vtu_ending
@@ -85,7 +85,8 @@ contains
     call write_list(self%directory, self%stem, vtu_ending, self%times(:self%outputs), error)
     if (allocated(error)) return
     call remove_series(self%directory, self%stem, vtu_ending, self%outputs)
-    call remove_file(in_directory(self%directory, member(self%stem, self%outputs, vtu_ending)//'.part'))
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs, &
+      & vtu_ending)//'.part'))
   end subroutine resume
 
   !> Wait until all complete outputs are on the disk.
@@ -109,7 +110,8 @@ contains
     character(24) :: n
 
     write (n, '(i0)') size(self%positions, 1)
-    call self%sink%open(in_directory(self%directory, member(self%stem, self%outputs, vtu_ending)//'.part'), &
+    call self%sink%open(in_directory(self%directory, member(self%stem, self%outputs, &
+      & vtu_ending)//'.part'), &
       & error)
     if (allocated(error)) return
     call self%sink%line('<?xml version="1.0"?>'//newline &
@@ -230,7 +232,8 @@ contains
 
     if (.not. self%sink%is_open()) return
     call self%sink%close(ignored)
-    call remove_file(in_directory(self%directory, member(self%stem, self%outputs, vtu_ending)//'.part'))
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs, &
+      & vtu_ending)//'.part'))
   end subroutine abandon
 
 end module pd_output_results_vtu

@@ -43,8 +43,8 @@ contains
     call keys%key('distance', group%distance, 'm', 'distance of points below which they push; '// &
       & 'with a rigid body that of points from its surface', above=0.0_wp, &
       & default='0.9 of the smaller spacing; from a surface 0.5')
-    call keys%key('normals', group%normals, 'along what points of bodies push: the line between '// &
-      & 'their centres, or normals of both surfaces', allowed=contact_normals)
+    call keys%key('normals', group%normals, 'along what points of bodies push: the line '// &
+      & 'between their centres, or normals of both surfaces', allowed=contact_normals)
     call keys%key('friction', group%friction, '', 'Coulomb''s coefficient of friction', &
       & at_least=0.0_wp)
     call keys%key('restitution', group%restitution, '', 'speed after an impact over that '// &

@@ -68,8 +68,8 @@ contains
     call keys%key('mass', group%mass, 'kg', 'mass of the body', above=0.0_wp)
     call keys%key('density', group%density, 'kg/m3', 'instead of mass: density', above=0.0_wp)
     call keys%key('inertia', group%inertia, 'kg m2', 'moments of inertia about the axes of the '// &
-      & 'shape, the last along that of a cylinder, of a surface about x, y, z of its file; in 2D '// &
-      & 'three values, of which the last counts', &
+      & 'shape, the last along that of a cylinder, of a surface about x, y, z of its file; in '// &
+      & '2D three values, of which the last counts', &
       & default='those of the shape')
     call keys%triple('velocity', group%velocity, 'm/s', 'velocity of the centre at the start', '0')
     call keys%triple('displacement', group%displacement, 'm', 'imposed displacement of the '// &
