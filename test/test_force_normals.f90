@@ -30,6 +30,14 @@ module test_force_normals
     procedure :: observe
   end type gauge_type
 
+  !> Compares forces from lists with those of a search that reaches ten times as far.
+  type, extends(observer_type) :: judge_type
+    integer :: touching = 0         !! steps with forces
+    real(wp) :: off = 0.0_wp        !! largest deviation of a force over the largest force
+  contains
+    procedure :: observe => compare
+  end type judge_type
+
 contains
 
   subroutine observe(observer, system, instant, error)
@@ -42,6 +50,35 @@ contains
     if (instant%step < 0) allocate (error)
   end subroutine observe
 
+  subroutine compare(observer, system, instant, error)
+    class(judge_type), intent(inout) :: observer
+    type(system_type), intent(inout) :: system
+    type(instant_type), intent(in) :: instant
+    type(fault_type), allocatable, intent(out) :: error
+    type(term_view_type) :: view
+    type(contact_type) :: far
+    real(wp), allocatable :: force(:, :), known(:, :)
+    integer :: t
+
+    allocate (force(system%body%n_slots, 3), known(system%body%n_slots, 3), source=0.0_wp)
+    call view_of(system, instant%time, view)
+    do t = 1, system%terms%number()
+      select type (term => system%terms%items(t)%term)
+      type is (contact_type)
+        call term%add_force(view, force)
+        far = term
+        far%reach = 10*term%reach
+        far%movement%noted = .false.
+        call far%add_force(view, known)
+      class default
+        continue
+      end select
+    end do
+    if (max_abs(known) > 0.0_wp) observer%touching = observer%touching + 1
+    if (.not. max_abs(force - known) <= 1.0e-11_wp*max_abs(known)) observer%off = 1.0_wp
+    if (instant%step < 0) allocate (error)
+  end subroutine compare
+
   subroutine collect_force_normals(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
@@ -49,6 +86,7 @@ contains
       & new_unittest('forces are the gradient of the energy', test_gradient), &
       & new_unittest('a block slides over another', test_slide), &
       & new_unittest('discs rebound', test_rebound), &
+      & new_unittest('bodies that come fast', test_fast), &
       & new_unittest('the same bits on any number of threads', test_threads), &
       & new_unittest('what is refused', test_refused)]
   end subroutine collect_force_normals
@@ -268,6 +306,36 @@ contains
       call expect_true(error, minval(diary%kinetic) < 0.9_wp*start, 'they hardly touch')
     end associate
   end subroutine test_rebound
+
+  !> A small body flies into a block at 50 and 800 m/s: no pair is missed from step to step.
+  subroutine test_fast(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: speeds(2) = [character(3) :: '50', '800']
+    type(set_up_type) :: set_up
+    type(scene_type) :: scene
+    type(judge_type) :: judge
+    type(fault_type), allocatable :: fault
+    integer :: i
+
+    do i = 1, 2
+      call expect_scene(error, '&scene dimension = 3 /'//line//soft// &
+        & "&body name = 'block' lower = -4e-3, -4e-3, -3e-3 upper = 4e-3, 4e-3, 0 "// &
+        & 'points = 8, 8, 3 /'//line//"&body name = 'shot' lower = -1e-3, -1e-3, 1e-3 "// &
+        & 'upper = 1e-3, 1e-3, 3e-3 points = 2, 2, 2 /'//line// &
+        & "&region name = 'shot' where = 'z > 0.5e-3' /"//line// &
+        & "&initial region = 'shot' velocity_z = -"//trim(speeds(i))//' velocity_x = 30 /'//line// &
+        & "&contact between = 'block', 'shot' normals = 'smoothed' friction = 0.2 /"//line// &
+        & '&time steps = '//trim(merge('150', '60 ', i == 1))//' /', scene)
+      if (.not. allocated(error)) call ready_alone(scene, set_up, error)
+      if (allocated(error)) return
+      judge = judge_type()
+      call run_explicit(set_up%system, 'forward_backward', set_up%plan%step, set_up%plan%steps, &
+        & judge, fault)
+      if (allocated(fault)) call test_failed(error, fault%message)
+      call expect_true(error, judge%touching > 3, 'they hardly touch')
+      call expect(error, judge%off, 0.0_wp, 0.0_wp, 'forces')
+    end do
+  end subroutine test_fast
 
   !> An impact with friction on one and two threads.
   subroutine test_threads(error)
