@@ -1,6 +1,5 @@
 !> Rigid bodies of a scene: their shape, mass, what moves them, and the contacts that name them.
 module pd_set_up_rigid_bodies
-  use pd_base_eigen, only: eigenvectors
   use pd_base_error, only: error_type, internal_fault
   use pd_base_expression, only: derivative_in_time, expression_type
   use pd_base_field, only: new_field
@@ -9,13 +8,8 @@ module pd_set_up_rigid_bodies
   use pd_base_text, only: counted, to_text
   use pd_base_vectors, only: cross
   use pd_body_body, only: body_type
-  use pd_body_surface_distance, only: new_facets
-  use pd_body_surface_fill, only: read_solid, solid_type
-  use pd_body_surface_moments, only: surface_moments
-  use pd_body_surface_surface, only: surface_fault
   use pd_force_contact, only: contact_rule_type, of_friction, of_normal_force
-  use pd_force_obstacle, only: a_box, a_closed_surface, a_cylinder, a_half_space, a_sphere, &
-    & obstacle_type
+  use pd_force_obstacle, only: a_box, a_cylinder, a_half_space, a_sphere, obstacle_type
   use pd_force_term, only: term_view_type
   use pd_force_terms, only: term_list_type
   use pd_force_touch, only: new_touch, points_within, touch_type
@@ -24,21 +18,12 @@ module pd_set_up_rigid_bodies
     & spin_now, turns_as_given, turns_freely, turns_not
   use pd_motion_system, only: system_type, view_of
   use pd_scene_content_expressions, only: expression_of
-  use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_content_types, only: is_given, is_set, scene_type
-  use pd_scene_format_file, only: resolve_path
+  use pd_scene_content_rules, only: scene_fault
+  use pd_scene_content_types, only: is_given, is_set, rigid_group, scene_type
+  use pd_set_up_rigid_surface, only: facets_of
   implicit none (type, external)
   private
   public :: rigid_bodies_of_scene, add_touches, check_within
-
-  !> A shape with what a density of 1 makes of it.
-  type :: shape_type
-    type(obstacle_type) :: obstacle
-    real(wp) :: centre(3) = 0.0_wp       !! of mass [m]
-    real(wp) :: volume = 0.0_wp          !! [m3]
-    real(wp) :: inertia(3) = 0.0_wp      !! principal moments per mass [m2]
-    real(wp) :: axes(3, 3) = 0.0_wp      !! their axes as columns
-  end type shape_type
 
 contains
 
@@ -48,14 +33,12 @@ contains
     type(scene_type), intent(in) :: scene        !! a checked scene
     type(system_type), intent(inout) :: system   !! gets its rigid bodies and their surfaces
     type(error_type), allocatable, intent(out) :: error
-    type(shape_type) :: shape
     integer :: r
 
     allocate (system%rigid_bodies(size(scene%rigids)), system%obstacles(size(scene%rigids)))
     do r = 1, size(scene%rigids)
-      call shape_of(scene, r, shape, error)
+      call make_body(scene, r, system%rigid_bodies(r), system%obstacles(r), error)
       if (allocated(error)) return
-      call make_body(scene, r, shape, system%rigid_bodies(r), system%obstacles(r))
       call guide_body(0.0_wp, r, system%rigid_bodies(r), system%fault)
       call place_obstacle(system%rigid_bodies(r), system%rigid_bodies(r)%pose%velocity, &
         & spin_now(system%rigid_bodies(r), 0.0_wp), system%obstacles(r))
@@ -63,26 +46,35 @@ contains
   end subroutine rigid_bodies_of_scene
 
   !> One rigid body, as if nothing imposed moved it yet.
-  subroutine make_body(scene, number, shape, rigid, obstacle)
+  subroutine make_body(scene, number, rigid, obstacle, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: number
-    type(shape_type), intent(inout) :: shape       !! its facets move to the obstacle
     type(rigid_body_type), intent(out) :: rigid
     type(obstacle_type), intent(out) :: obstacle
-    real(wp) :: mass, inertia(3), spin(3)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp) :: volume, mass, inertia(3), centre(3), spin(3), axes(3, 3)
     integer :: c
 
     associate (group => scene%rigids(number), d => scene%header%dimension)
-      call move_shape(shape%obstacle, obstacle)
+      if (group%shape == 'surface') then
+        call facets_of(scene, number, obstacle, volume, centre, inertia, axes, error)
+        if (allocated(error)) return
+      else
+        call shape_of(scene, group, obstacle, volume, inertia)
+        centre = 0.0_wp
+        centre(:d) = group%centre(:d)
+        axes = obstacle%frame
+      end if
+      obstacle%dim = d
       mass = 0.0_wp
       if (is_set(group%mass)) mass = group%mass
-      if (is_set(group%density)) mass = group%density*shape%volume
-      inertia = mass*shape%inertia
+      if (is_set(group%density)) mass = group%density*volume
+      inertia = mass*inertia
       if (all(is_set(group%inertia))) then
         inertia = group%inertia
-        shape%axes = obstacle%frame
+        axes = obstacle%frame
       end if
-      call new_shape_pose(d, shape%centre, mass, inertia, shape%axes, rigid%pose)
+      call new_shape_pose(d, centre, mass, inertia, axes, rigid%pose)
       rigid%axes = obstacle%frame
       rigid%free = .false.
       do c = 1, d
@@ -114,31 +106,16 @@ contains
     end associate
   end subroutine make_body
 
-  !> Move a shape, facets and all.
-  subroutine move_shape(from, to)
-    type(obstacle_type), intent(inout) :: from
-    type(obstacle_type), intent(inout) :: to
-
-    to%shape = from%shape
-    to%dim = from%dim
-    to%half = from%half
-    to%frame = from%frame
-    if (allocated(from%facets)) call move_alloc(from%facets, to%facets)
-  end subroutine move_shape
-
-  !> Sizes and axes of a shape, its centre and volume, and its moments of inertia for a mass of 1.
-  subroutine shape_of(scene, number, shape, error)
+  !> Sizes and axes of a shape, its volume, and its moments of inertia for a mass of 1.
+  subroutine shape_of(scene, group, obstacle, volume, inertia)
     type(scene_type), intent(in) :: scene
-    integer, intent(in) :: number
-    type(shape_type), intent(out) :: shape
-    type(error_type), allocatable, intent(out) :: error
+    type(rigid_group), intent(in) :: group
+    type(obstacle_type), intent(inout) :: obstacle
+    real(wp), intent(out) :: volume        !! [m3]
+    real(wp), intent(out) :: inertia(3)    !! per mass [m2]
     real(wp) :: depth
 
-    associate (group => scene%rigids(number), obstacle => shape%obstacle, &
-      & h => shape%obstacle%half, volume => shape%volume, inertia => shape%inertia, &
-      & d => scene%header%dimension)
-      obstacle%dim = d
-      where (is_set(group%centre)) shape%centre = group%centre
+    associate (h => obstacle%half, d => scene%header%dimension)
       depth = 1.0_wp
       if (d == 2) depth = scene%header%thickness
       if (d == 1) depth = scene%header%area
@@ -171,56 +148,11 @@ contains
         volume = 0.0_wp
         inertia = 0.0_wp
         obstacle%frame = axes_along([group%normal(:d), spread(0.0_wp, 1, 3 - d)])
-      case ('surface')
-        call facets_of(scene, number, shape, error)
-        return
       case default
         call internal_fault('a rigid body of no known shape')
       end select
-      shape%axes = obstacle%frame
     end associate
   end subroutine shape_of
-
-  !> A closed surface: its facets about their centre of mass, which stays where it is or goes where
-  !> the group puts it.
-  subroutine facets_of(scene, number, shape, error)
-    type(scene_type), intent(in) :: scene
-    integer, intent(in) :: number
-    type(shape_type), intent(inout) :: shape
-    type(error_type), allocatable, intent(out) :: error
-    type(solid_type) :: solid
-    real(wp) :: centre(3), tensor(3, 3), vectors(3, 3)
-    integer :: v
-
-    associate (group => scene%rigids(number), surface => solid%surface, &
-      & obstacle => shape%obstacle)
-      call read_solid(resolve_path(trim(group%surface), scene%file), group%scale, solid, error)
-      if (.not. allocated(error)) then
-        if (solid%edges%n_open > 0) call surface_fault(surface, 'the surface of a rigid body '// &
-          & 'must be closed: '//counted(solid%edges%n_open, 'edge')//' of one facet only', error, &
-          & 'a body of points may have gaps, distances from a surface need it closed', &
-          & solid%edges%first_open)
-      end if
-      if (.not. allocated(error)) then
-        call surface_moments(surface, shape%volume, centre, tensor)
-        if (.not. any(is_set(group%centre))) shape%centre = centre
-        do v = 1, surface%n_vertices
-          surface%x(:, v) = surface%x(:, v) - centre
-        end do
-        surface%low = surface%low - centre
-        surface%high = surface%high - centre
-        allocate (obstacle%facets)
-        call new_facets(surface, solid%edges%n_many, obstacle%facets, error)
-      end if
-      call place_fault(error, scene, 'rigid', number, 'surface')
-      if (allocated(error)) return
-      obstacle%shape = a_closed_surface
-      obstacle%half = [obstacle%facets%reach, 0.0_wp, 0.0_wp]
-      obstacle%frame = turned_axes(group%angle*pi/180, group%axis)
-      call eigenvectors(tensor/shape%volume, shape%inertia, vectors)
-      shape%axes = matmul(obstacle%frame, vectors)
-    end associate
-  end subroutine facets_of
 
   !> Three axes at right angles as columns, of which the third has a direction.
   pure function axes_along(direction) result(axes)
