@@ -4,7 +4,8 @@
     check_vtk.py NAME.vtkhdf [NAME.pvd] [--partial] [--pyvista]
 
 The HDF5 file is read with h5py and with VTK's own reader, NAME.xdmf beside it with VTK's reader of
-XDMF, the .pvd series with VTK's XML reader; their values must agree with h5py's. --partial: the
+XDMF, the .pvd series with VTK's XML reader; their values must agree with h5py's. So do the surfaces of
+rigid bodies in NAME_rigid.pvd, where there is one, with the history. --partial: the
 file's writer did not live to close it. --pyvista: NAME.xdmf also by the lines of the user guide.
 """
 import re
@@ -18,7 +19,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as pipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
 
 
 def arrays_of(data):
@@ -196,6 +197,66 @@ def check_series(path, partial, hdf=None):
     print(f"{path}: {len(files)} files")
 
 
+def rotation_about(vector):
+    """The matrix of a rotation that is given as axis times angle."""
+    angle = np.linalg.norm(vector)
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def check_surfaces(path, hdf_path):
+    """The surfaces of rigid bodies: each is closed, or a patch, and moves as the history says."""
+    with h5py.File(hdf_path, "r") as file:
+        times = file["VTKHDF/Steps/Values"][:]
+        history = {name: data[:] for name, data in file["history"].items()}
+        scene = file["scene/text"][()]
+    scene = scene.decode() if isinstance(scene, bytes) else scene
+    names = re.findall(r"&rigid\s.*?name\s*=\s*'(\w+)'", scene, re.DOTALL)
+    files = [(float(entry.get("timestep")), path.parent / entry.get("file"))
+             for entry in tree.parse(path).getroot().iter("DataSet")]
+    assert [time for time, _ in files] == list(times), f"{path} has other times"
+    start, followed = None, 0
+    for time, name in files:
+        reader = vtkXMLPolyDataReader()
+        reader.SetFileName(str(name))
+        reader.Update()
+        output = reader.GetOutput()
+        assert output.GetNumberOfPoints() > 0 and output.GetNumberOfPolys() > 0, f"{name} is empty"
+        x = vtk_to_numpy(output.GetPoints().GetData())
+        corners = vtk_to_numpy(output.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+        body = vtk_to_numpy(output.GetCellData().GetArray("rigid_body"))
+        velocity = vtk_to_numpy(output.GetPointData().GetArray("velocity"))
+        assert velocity.shape == x.shape and set(body) == set(range(1, len(names) + 1)), \
+            f"{name}: bodies {set(body)}, not {names}"
+        start = x if start is None else start
+        row = np.flatnonzero(history["time"] == time)
+        for number, label in enumerate(names, 1):
+            own = np.unique(corners[body == number])
+            edges = np.sort(corners[body == number][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+            uses = np.unique(edges, axis=0, return_counts=True)[1]
+            assert np.all(uses == 2) or len(own) == 4, f"{name}: {label} is not closed"
+            if len(row) == 0:
+                continue
+
+            def vector(what, label=label, row=row[0]):
+                return np.array([history.get(f"{label}_{what}_{c}", np.zeros(row + 1))[row] for c in "xyz"])
+            # Differences of places know nothing of the centre
+            turned = (start[own] - start[own][0]) @ rotation_about(vector("rotation")).T
+            size = np.abs(turned).max()
+            assert np.allclose(x[own] - x[own][0], turned, atol=1e-9 * size), f"{name}: {label}"
+            followed += 1
+            if label + "_spin_x" not in history or len(own) == 4:
+                continue
+            spin = np.cross(vector("spin"), x[own] - x[own][0])
+            assert np.allclose(velocity[own] - velocity[own][0], spin,
+                               atol=1e-9 * np.abs(velocity).max()), f"{name}: velocity of {label}"
+    assert followed > len(names), f"{path}: no time is in the history"
+    print(f"{path}: {len(files)} files, {len(names)} rigid bodies")
+
+
 def main(arguments):
     """Check the files named on the command line."""
     partial = "--partial" in arguments
@@ -208,6 +269,9 @@ def main(arguments):
             check_series(path, partial, hdf)
             continue
         hdf = check_hdf(path, partial)
+        surfaces = path.with_name(path.stem + "_rigid.pvd")
+        if surfaces.exists():
+            check_surfaces(surfaces, path)
         beside = path.with_suffix(".xdmf")
         assert partial or beside.exists(), f"there is no {beside}"
         if beside.exists():

@@ -55,6 +55,8 @@ program main
   use test_family_volume, only: collect_family_volume
   use test_force_breaking, only: collect_force_breaking
   use test_force_contact, only: collect_force_contact
+  use test_force_closed, only: collect_force_closed
+  use test_force_normals, only: collect_force_normals
   use test_force_rigid, only: collect_force_rigid
   use test_force_search, only: collect_force_search
   use test_force_contract, only: collect_force_contract
@@ -87,6 +89,7 @@ program main
   use test_output_measures_boundary, only: collect_output_measures_boundary
   use test_output_measures_fragments, only: collect_output_measures_fragments
   use test_output_measures_tip, only: collect_output_measures_tip
+  use test_output_report_rigid_surfaces, only: collect_output_report_rigid_surfaces
   use test_output_report_schedule, only: collect_output_report_schedule
   use test_output_results_cells, only: collect_output_results_cells
   use test_output_results_base64, only: collect_output_results_base64
@@ -188,6 +191,8 @@ program main
   call register('family_volume', collect_family_volume)
   call register('force_breaking', collect_force_breaking)
   call register('force_contact', collect_force_contact)
+  call register('force_closed', collect_force_closed)
+  call register('force_normals', collect_force_normals)
   call register('force_rigid', collect_force_rigid)
   call register('force_search', collect_force_search)
   call register('force_contract', collect_force_contract)
@@ -226,6 +231,7 @@ program main
   call register('output_measures_j_integral', collect_output_measures_j_integral)
   call register('output_measures_section', collect_output_measures_section)
   call register('output_report_contact', collect_output_report_contact)
+  call register('output_report_rigid_surfaces', collect_output_report_rigid_surfaces)
   call register('output_report_schedule', collect_output_report_schedule)
   call register('output_results_files', collect_output_results_files)
   call register('output_results_layout', collect_output_results_layout)

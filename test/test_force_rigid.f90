@@ -39,12 +39,12 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('distances and normals of every shape', test_shapes), &
-      & new_unittest('a sphere pressed into a layer', test_hertz), &
+      & new_unittest('long: a sphere pressed into a layer', test_hertz), &
       & new_unittest('a block bounces from a half-space', test_bounce), &
       & new_unittest('an elastic block keeps its energy', test_rebound), &
       & new_unittest('a block on an incline', test_incline), &
       & new_unittest('momentum and angular momentum', test_momentum), &
-      & new_unittest('light bodies hit with an edge', test_light), &
+      & new_unittest('long: light bodies hit with an edge', test_light), &
       & new_unittest('a spinning box', test_spin), &
       & new_unittest('a body falls', test_fall), &
       & new_unittest('work of imposed motion', test_work), &

@@ -6,18 +6,24 @@ module test_force_search
   use pd_base_kinds, only: wp
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_force_contact, only: contact_type
-  use pd_force_obstacle, only: a_half_space, a_sphere, find_gap, obstacle_type, turned_at_most
+  use pd_body_surface_distance, only: new_facets
+  use pd_body_surface_fill, only: new_solid, solid_type
+  use pd_body_surface_stl, only: read_stl_text
+  use pd_force_obstacle, only: a_closed_surface, a_sphere, find_gap, obstacle_type, turned_at_most
   use pd_force_term, only: term_view_type
   use pd_force_touch, only: touch_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_system, only: system_type, view_of
+  use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: set_up_type
   use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: expect, expect_true, noise, ready_alone, rotation_matrix
-  use test_scene_expect, only: expect_scene, line
+  use meshes, only: write_file
+  use surfaces, only: binary_stl, box_facets
+  use test_scene_expect, only: line
   implicit none (type, external)
   private
   public :: collect_force_search
@@ -31,6 +37,8 @@ module test_force_search
 
   !> Compares at each step.
   type, extends(observer_type) :: judge_type
+    real(wp) :: listed = 1.0_wp   !! part of the skin up to which what was found stays in the lists
+    integer :: searches = -1      !! at the last look at them
     integer :: steps = 0          !! compared
     integer :: touching = 0       !! of these with forces
     real(wp) :: off = 0.0_wp      !! largest deviation of a force over the largest force
@@ -46,6 +54,7 @@ contains
       & new_unittest('points that come fast', test_points), &
       & new_unittest('pieces that come fast', test_pieces), &
       & new_unittest('rigid bodies that come fast', test_rigid), &
+      & new_unittest('lists that end too early are found out', test_short), &
       & new_unittest('the bound of rotation', test_rotation)]
   end subroutine collect_force_search
 
@@ -73,6 +82,7 @@ contains
         continue
       end select
     end do
+    if (observer%listed < 1.0_wp) call shorten(observer, system)
     observer%steps = observer%steps + 1
     if (max_abs(known) > 0.0_wp) observer%touching = observer%touching + 1
     if (.not. max_abs(force - known) <= 1.0e-11_wp*max_abs(known)) then
@@ -82,6 +92,54 @@ contains
     end if
     if (instant%step < 0) allocate (error)
   end subroutine observe
+
+  !> After a search leave in its list only what is within a part of the skin, as a search with a
+  !> skin that is too small would have it; the list is then used as long as before.
+  subroutine shorten(observer, system)
+    type(judge_type), intent(inout) :: observer
+    type(system_type), intent(inout) :: system
+    logical, allocatable :: stays(:)
+    integer, allocatable :: start(:)
+    real(wp) :: gap, normal(3)
+    integer :: t, i, e, k, j
+
+    associate (body => system%body, u => system%state%u)
+      do t = 1, system%terms%number()
+        select type (term => system%terms%items(t)%term)
+        type is (contact_type)
+          if (term%movement%searches == observer%searches) cycle
+          observer%searches = term%movement%searches
+          start = term%pairs%start
+          allocate (stays(start(size(start)) - 1))
+          do i = 1, size(term%pairs%slots)
+            k = term%pairs%slots(i)
+            do e = term%pairs%start(i), term%pairs%start(i + 1) - 1
+              j = term%pairs%other(e)
+              stays(e) = norm2(body%x(j, :) + u(j, :) - body%x(k, :) - u(k, :)) &
+                & < 0.9_wp*h + observer%listed*term%skin
+            end do
+            start(i + 1) = start(i) + count(stays(term%pairs%start(i):term%pairs%start(i + 1) - 1))
+          end do
+          term%pairs%other = pack(term%pairs%other(:size(stays)), stays)
+          term%pairs%start = start
+          deallocate (stays)
+        type is (touch_type)
+          if (term%movement%searches == observer%searches) cycle
+          observer%searches = term%movement%searches
+          allocate (stays(size(term%near)))
+          do i = 1, size(stays)
+            k = term%slots(term%near(i))
+            call find_gap(system%obstacles(term%obstacle), body%x(k, :) + u(k, :), gap, normal)
+            stays(i) = gap < h/2 + observer%listed*term%skin
+          end do
+          term%near = pack(term%near, stays)
+          deallocate (stays)
+        class default
+          continue
+        end select
+      end do
+    end associate
+  end subroutine shorten
 
   !> The force of all pairs that are closer than 0.9 spacings, or than at the start.
   subroutine add_all_pairs(system, contact, force)
@@ -137,11 +195,13 @@ contains
     end associate
   end subroutine add_all_points
 
-  !> Run a scene, compare at each of its steps; the number of searches that it took.
-  subroutine judge(text, searches, error)
+  !> Run a scene, compare at each of its steps; the number of searches that it took. With `listed`
+  !> lists end too early, and forces must be off.
+  subroutine judge(text, searches, error, listed)
     character(*), intent(in) :: text
     integer, intent(out) :: searches
     type(error_type), allocatable, intent(inout) :: error
+    real(wp), intent(in), optional :: listed
     type(scene_type) :: scene
     type(set_up_type) :: set_up
     type(judge_type) :: observer
@@ -149,8 +209,11 @@ contains
     integer :: t
 
     searches = 0
-    call expect_scene(error, text, scene)
     if (allocated(error)) return
+    call read_scene_text(text, 'build/search.nml', scene, fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+    if (allocated(error)) return
+    if (present(listed)) observer%listed = listed
     call ready_alone(scene, set_up, error)
     if (allocated(error)) return
     call run_explicit(set_up%system, trim(scene%time%integrator), set_up%plan%step, &
@@ -158,7 +221,11 @@ contains
     if (allocated(fault)) call test_failed(error, fault%message)
     call expect_true(error, observer%steps > set_up%plan%steps, 'steps are missing')
     call expect_true(error, observer%touching > 3, 'they hardly touch')
-    call expect(error, observer%off, 0.0_wp, 0.0_wp, 'forces')
+    if (present(listed)) then
+      call expect_true(error, observer%off > 1.0e-3_wp, 'what a search misses is not seen')
+    else
+      call expect(error, observer%off, 0.0_wp, 0.0_wp, 'forces')
+    end if
     do t = 1, set_up%system%terms%number()
       select type (term => set_up%system%terms%items(t)%term)
       type is (contact_type)
@@ -210,23 +277,15 @@ contains
     end do
   end subroutine test_pieces
 
-  !> A sphere, a box and a cylinder that turn, and a half-space that moves, come fast.
+  !> A sphere, a box, a cylinder and a closed surface that turn, and a half-space that moves.
   subroutine test_rigid(error)
     type(error_type), allocatable, intent(out) :: error
-    character(*), parameter :: bodies(5) = [character(170) :: &
-      & "shape = 'sphere' centre = 0, 0, 2.1e-3 radius = 2e-3 mass = 1e-4 velocity_z = -60", &
-      & "shape = 'sphere' centre = 0, 0, 2.1e-3 radius = 2e-3 mass = 1e-4 velocity_z = -1500", &
-      & "shape = 'box' centre = 0, 0, 4e-3 edges = 6e-3, 1e-3, 1e-3 mass = 1e-4 "// &
-      & 'velocity_z = -60 spin_y = 9e4 spin_x = 2e4', &
-      & "shape = 'cylinder' centre = 0, 0, 2.5e-3 radius = 1e-3 length = 6e-3 axis = 1, 0, 0 "// &
-      & 'mass = 1e-4 velocity_z = -60 spin_y = 5e4 spin_x = 4e5', &
-      & "shape = 'half_space' centre = 0, 0, -5e-3 normal = 0, 0, 1 displacement_z = '60*t' "// &
-      & "rotation = 'imposed' spin_y = 4e4"]
+    character(170), allocatable :: bodies(:)
     integer :: searches, i
 
+    call rigid_bodies(bodies)
     do i = 1, size(bodies)
-      call judge(block//"&rigid name = 'tool' "//trim(bodies(i))//' /'//line// &
-        & "&contact between = 'block', 'tool' /"//line//'&time duration = 4e-5 /', searches, error)
+      call judge(with_tool(bodies(i)), searches, error)
       if (i /= 2) call expect_true(error, searches > 1 .and. searches < 40, 'searches')
       if (i == 2) call expect_true(error, searches > 20, 'it was searched too seldom')
       if (allocated(error)) then
@@ -236,20 +295,82 @@ contains
     end do
   end subroutine test_rigid
 
+  !> The rigid bodies, which come fast.
+  subroutine rigid_bodies(bodies)
+    character(170), allocatable, intent(out) :: bodies(:)
+
+    call write_file('search.stl', binary_stl(box_facets([-3.0_wp, -0.5_wp, -0.5_wp], [3.0_wp, &
+      & 0.5_wp, 0.5_wp])))
+    bodies = [character(170) :: &
+      & "shape = 'sphere' centre = 0, 0, 2.1e-3 radius = 2e-3 mass = 1e-4 velocity_z = -60", &
+      & "shape = 'sphere' centre = 0, 0, 2.1e-3 radius = 2e-3 mass = 1e-4 velocity_z = -1500", &
+      & "shape = 'box' centre = 0, 0, 4e-3 edges = 6e-3, 1e-3, 1e-3 mass = 1e-4 "// &
+      & 'velocity_z = -60 spin_y = 9e4 spin_x = 2e4', &
+      & "shape = 'cylinder' centre = 0, 0, 2.5e-3 radius = 1e-3 length = 6e-3 axis = 1, 0, 0 "// &
+      & 'mass = 1e-4 velocity_z = -60 spin_y = 5e4 spin_x = 4e5', &
+      & "shape = 'surface' centre = 0, 0, 4e-3 surface = 'search.stl' scale = 1e-3 mass = 1e-4 "// &
+      & 'velocity_z = -60 spin_y = 9e4 spin_x = 2e4', &
+      & "shape = 'half_space' centre = 0, 0, -5e-3 normal = 0, 0, 1 displacement_z = '60*t' "// &
+      & "rotation = 'imposed' spin_y = 4e4"]
+  end subroutine rigid_bodies
+
+  !> The block and a tool that hits it.
+  function with_tool(tool) result(text)
+    character(*), intent(in) :: tool
+    character(:), allocatable :: text
+
+    text = block//"&rigid name = 'tool' "//trim(tool)//' /'//line// &
+      & "&contact between = 'block', 'tool' /"//line//'&time duration = 4e-5 /'
+  end function with_tool
+
+  !> Lists without the skin miss points: the comparison sees it for points and for each rigid body.
+  !> (A sphere at 1500 m/s is searched in nearly every step.)
+  subroutine test_short(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(170), allocatable :: bodies(:)
+    integer :: searches, i
+
+    call judge(block//"&body name = 'shot' lower = -1e-3, -1e-3, 1e-3 upper = 1e-3, 1e-3, 3e-3 "// &
+      & 'points = 2, 2, 2 /'//line//"&region name = 'shot' where = 'z > 0.5e-3' /"//line// &
+      & "&initial region = 'shot' velocity_z = -50 velocity_x = 30 /"//line// &
+      & "&contact between = 'block', 'shot' /"//line//'&time steps = 150 /', searches, error, &
+      & listed=0.0_wp)
+    call rigid_bodies(bodies)
+    do i = 1, size(bodies)
+      if (i == 2) cycle
+      call judge(with_tool(bodies(i)), searches, error, listed=0.0_wp)
+      if (allocated(error)) then
+        error%message = error%message//': '//trim(bodies(i))
+        return
+      end if
+    end do
+  end subroutine test_short
+
   !> At places and rotations at random the distance from the surface changes by no more than the
   !> bound, and now and then by half of it.
   subroutine test_rotation(error)
     type(error_type), allocatable, intent(out) :: error
     type(obstacle_type) :: before, now
     real(wp) :: y(3), axis(3), gap, gap_before, normal(3), change, bound
+    type(solid_type) :: solid
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
     integer :: shape, state, i, c, tight
 
+    text = binary_stl(box_facets([-0.75_wp, -0.75_wp, -1.5_wp], [0.75_wp, 0.75_wp, 1.5_wp]))
+    call read_stl_text(text, 'part.stl', 1.0_wp, solid%surface, fault)
+    if (.not. allocated(fault)) call new_solid(solid, fault)
+    allocate (before%facets)
+    if (.not. allocated(fault)) call new_facets(solid%surface, 0, before%facets, fault)
+    call expect_true(error, .not. allocated(fault), 'the facets of a box')
+    if (allocated(error)) return
     state = 3
-    do shape = a_sphere, a_half_space
+    do shape = a_sphere, a_closed_surface
       tight = 0
       do i = 1, 2000
         before%shape = shape
         before%half = [0.7_wp, 0.7_wp, 1.6_wp]
+        if (shape == a_closed_surface) before%half = [before%facets%reach, 0.0_wp, 0.0_wp]
         axis = [(noise(state), c=1, 3)]
         before%frame = rotation_matrix(axis/norm2(axis), 3*noise(state))
         now = before

@@ -1,4 +1,5 @@
 """Pictures: units, limits, cells, and what the written files show."""
+import base64
 import contextlib
 import io
 import itertools
@@ -14,7 +15,7 @@ from perifort import pictures
 from perifort.pictures import cells, colours, units
 from perifort.pictures.fields import Clip, View, figure_of, names_of, values_of, worth_drawing
 from perifort.pictures.layout import Panel, lay_out
-from perifort.pictures.rigid import RigidBody, hull
+from perifort.pictures.rigid import ClosedSurface, RigidBody, hull, read_triangles
 
 from .synthetic import lattice, run_history, write_results
 
@@ -65,6 +66,50 @@ class TestRigidBodies(unittest.TestCase):
                                                      [1.5, 0.0, 0.0]])), [1.0, 4.0, 0.5])
         for body in (ball, box, rod):
             np.testing.assert_allclose(body.gap(body.rim()), 0.0, atol=1e-14)
+
+    def closed(self):
+        """A box of 2 x 4 x 6 about (1, 0, 0), which has moved by 0.5 along x."""
+        places = np.array([[x, y, z] for z in (-3.0, 3.0) for y in (-2.0, 2.0) for x in (-1.0, 1.0)])
+        corners = np.array([[1, 4, 2], [1, 3, 4], [5, 6, 8], [5, 8, 7], [1, 2, 6], [1, 6, 5],
+                            [3, 8, 4], [3, 7, 8], [1, 5, 7], [1, 7, 3], [2, 4, 8], [2, 8, 6]]) - 1
+        history = {"time": np.array([0.0, 1.0]), "r_displacement_x": np.array([0.0, 0.5]),
+                   "r_displacement_y": np.zeros(2), "r_displacement_z": np.zeros(2)}
+        results = mock.Mock(history=history, times=[0.0, 1.0])
+        found = (places + [1.5, 0.0, 0.0], np.concatenate([corners, corners[:1]]),
+                 np.array([2] * 12 + [1]))
+        with mock.patch("perifort.pictures.rigid.surfaces_of", return_value=found):
+            return ClosedSurface(results, {"name": "r"}, 2, 1, 3.0)
+
+    def test_closed_surfaces(self):
+        box = self.closed()
+        # Displacements are drawn three times as large: the middle is at 1 + 3 * 0.5
+        lines = box.cut(2, 0.5)
+        self.assertEqual(len(lines), 1)
+        np.testing.assert_allclose(lines[0].min(axis=0), [1.5, -2.0, 0.5])
+        np.testing.assert_allclose(lines[0].max(axis=0), [3.5, 2.0, 0.5])
+        x, y = lines[0][:, 0], lines[0][:, 1]
+        area = abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
+        self.assertAlmostEqual(area, 8.0)
+        self.assertEqual(box.cut(2, 4.0), [])
+        triangles, edges = box.shadow(lambda places: places[:, :2])
+        sides = triangles[:, 1:] - triangles[:, :1]
+        self.assertAlmostEqual(float(np.sum(np.linalg.det(sides))) / 2, 8.0)
+        self.assertAlmostEqual(float(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum()), 12.0)
+
+    def test_triangles_of_a_file(self):
+        def array(name, kind, values):
+            data = np.array(values).tobytes()
+            text = base64.b64encode(np.uint64(len(data)).tobytes() + data).decode()
+            return f'<DataArray type="{kind}" Name="{name}" format="binary">{text}</DataArray>'
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "a.vtp"
+            path.write_text("<VTKFile>" + array("Points", "Float64", np.arange(9.0))
+                            + array("connectivity", "Int64", [2, 0, 1])
+                            + array("rigid_body", "Int64", [4]) + "</VTKFile>", encoding="utf-8")
+            places, corners, body = read_triangles(path)
+        np.testing.assert_array_equal(places, np.arange(9.0).reshape(3, 3))
+        np.testing.assert_array_equal(corners, [[2, 0, 1]])
+        np.testing.assert_array_equal(body, [4])
 
     def test_hull(self):
         inside = np.array([[0.1, 0.2], [-0.3, 0.1], [0.0, 1.0], [0.5, 0.0]])

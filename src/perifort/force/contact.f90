@@ -5,6 +5,9 @@
 !> constant of the mean of both materials. What separates pushes less if there is a restitution e,
 !> by e^2; or a dashpot acts along the line. Friction acts across it.
 !>
+!> With smoothed normals the overlap is that along the normal of both surfaces, shared among all
+!> that are beside each other (`pd_force_normals`).
+!>
 !> Pairs are searched in cells whose reach is D and a skin; the pairs are kept until some point has
 !> moved by half the skin, so that none is missed: two points that were farther apart than D and the
 !> skin are then still farther apart than D. What a point sums up is in the order of the others'
@@ -13,11 +16,13 @@
 module pd_force_contact
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
   use pd_family_family, only: allocate_bonds, bonds_type
+  use pd_base_order, only: place_in
   use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
     & remember_places
+  use pd_force_normals, only: meet, normal_of_pair, patch_radius, patch_type, surface_normals
   use pd_force_pairs, only: pairs_type, search_pairs
   use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
   use pd_law_material, only: material_type
@@ -50,6 +55,7 @@ module pd_force_contact
     real(wp) :: friction = 0.0_wp          !! [-]
     real(wp) :: returned = 1.0_wp          !! e^2, part of the energy that comes back [-]
     real(wp) :: damping = 0.0_wp           !! over the critical one [-]
+    logical :: smoothed = .false.          !! they push along normals of their surfaces
   end type contact_rule_type
 
   !> Contact as a term.
@@ -60,6 +66,8 @@ module pd_force_contact
     integer, allocatable :: side(:)          !! of each of these
     real(wp), allocatable :: reach(:)        !! half of D of each, and its half of the skin [m]
     real(wp), allocatable :: begun(:, :)     !! (n_slots, dim) where points were at the start [m]
+    real(wp), allocatable :: normals(:, :)   !! (dim, n_slots) normals of their surfaces then, if
+                                             !! the rule is smoothed
     real(wp) :: skin = 0.0_wp                !! [m]
     real(wp) :: delta = 1.0_wp               !! horizon [m]
     logical :: follows = .false.             !! it stands behind the term of the normal force of
@@ -93,8 +101,9 @@ contains
     contact%name = 'contact'
     if (part == of_friction) contact%name = 'friction'
     ! without losses no account of work is needed, which would look at all points in every step
+    ! normals turn without work: the account tells what that comes to
     contact%conservative = part == of_normal_force .and. rule%returned >= 1.0_wp .and. &
-      & rule%damping <= 0.0_wp
+      & rule%damping <= 0.0_wp .and. .not. rule%smoothed
     contact%tangent = no_tangent
     contact%part = part
     contact%rule = rule
@@ -107,6 +116,9 @@ contains
     contact%reach = [((usual_distance*body%spacing(contact%slots(i)) + contact%skin)/2, i=1, &
       & size(contact%slots))]
     if (rule%distance > 0.0_wp) contact%reach = (rule%distance + contact%skin)/2
+    if (rule%smoothed) contact%reach = sqrt(max((contact%reach - contact%skin/2)**2, &
+      & patch_radius(body%spacing(contact%slots))**2/4) + patch_radius(body%spacing( &
+      & contact%slots))**2/4) + contact%skin/2
     call new_movement(body, contact%slots, contact%movement)
   end subroutine new_contact
 
@@ -115,7 +127,14 @@ contains
     class(contact_type), intent(inout) :: self  !! the contact
     type(term_view_type), intent(in) :: view    !! the start
 
+    real(wp), allocatable :: normals(:, :)
+
     self%begun = view%body%x + view%u
+    if (.not. self%rule%smoothed) return
+    call surface_normals(view, self%slots, normals)
+    if (allocated(self%normals)) deallocate (self%normals)
+    allocate (self%normals(size(view%u, 2), size(view%u, 1)), source=0.0_wp)
+    self%normals(:, self%slots) = normals
   end subroutine begin
 
   !> Search anew if points may have come near: one of them has moved by half the skin.
@@ -208,7 +227,14 @@ contains
     real(wp), intent(inout), contiguous :: energy(:)
     type(pairs_type) :: anew
 
-    if (is_noted(self%movement, view)) then
+    if (self%rule%smoothed) then
+      if (is_noted(self%movement, view)) then
+        call sum_smoothed(self, self%pairs, view, force, energy)
+      else
+        call find_pairs(self, view, anew)
+        call sum_smoothed(self, anew, view, force, energy)
+      end if
+    else if (is_noted(self%movement, view)) then
       call sum_pairs(self, self%pairs, view, force, energy)
     else
       call find_pairs(self, view, anew)
@@ -285,6 +311,98 @@ contains
     end do
     !$omp end parallel
   end subroutine sum_pairs
+
+  !> Sum up near pairs of surfaces, point by point. Along normals that stay the force is the
+  !> gradient of the energy K w (b - g)^2/2, with the overlap b - g along the normal and the weight
+  !> w across it, whose gradient is the part across.
+  subroutine sum_smoothed(self, pairs, view, force, energy)
+    class(contact_type), intent(in) :: self
+    type(pairs_type), intent(in) :: pairs
+    type(term_view_type), intent(in) :: view
+    real(wp), intent(inout), contiguous :: force(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    type(patch_type) :: patch
+    integer(i8), allocatable :: points(:)
+    real(wp), allocatable :: normals(:, :)
+    real(wp), dimension(size(view%u, 2)) :: r, n, v, total
+    real(wp) :: begins, stiffness, stored, push, critical, speed, back
+    integer :: i, e, k, j
+
+    if (.not. allocated(self%normals)) call internal_fault('contact has not begun')
+    call surface_normals(view, pairs%slots, normals)
+    points = int(view%body%point(pairs%slots), i8)
+    !$omp parallel do if (size(pairs%slots) >= worth_threads) default(none) &
+    !$omp schedule(dynamic, at_once) shared(self, pairs, view, force, energy, normals, points) &
+    !$omp private(patch, r, n, v, total, begins, stiffness, stored, push, critical, speed, back, &
+    !$omp i, e, k, j)
+    do i = 1, size(pairs%slots)
+      k = pairs%slots(i)
+      total = 0.0_wp
+      stored = 0.0_wp
+      do e = pairs%start(i), pairs%start(i + 1) - 1
+        j = pairs%other(e)
+        if (view%body%layer(k) > 0 .and. view%body%layer(k) == view%body%layer(j)) cycle
+        r = (view%body%x(j, :) - view%body%x(k, :)) + (view%u(j, :) - view%u(k, :))
+        n = normal_of_pair(normals(:, i), normals(:, place_in(points, int(view%body%point(j), i8))))
+        call meet_pair(self, view, k, j, r, n, begins, patch)
+        if (.not. patch%touches) cycle
+        v = view%v(j, :) - view%v(k, :)
+        speed = dot_product(v, n)
+        stiffness = self%rule%stiffness*(constant_of(view, k) + constant_of(view, j))/2/self%delta &
+          & *view%body%volume(j)
+        critical = 0.0_wp
+        if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
+          & critical = critical_damping(view, k, j, stiffness*patch%weight)
+        push = normal_force(self%rule, stiffness*patch%weight, begins - patch%gap, speed, critical)
+        if (self%part == of_normal_force) then
+          back = 1.0_wp
+          if (speed > 0.0_wp) back = self%rule%returned
+          total = total - push*n + back*stiffness*(begins - patch%gap)**2/2*patch%slope &
+            & *patch%across(:size(r))
+          stored = stored + stiffness*patch%weight*(begins - patch%gap)**2/4
+        else
+          v = v - speed*n
+          speed = norm2(v)
+          if (speed > 0.0_wp) total = total &
+            & + min(self%rule%friction*push, slope*critical*speed)*(v/speed)
+        end if
+      end do
+      if (size(force) > 0) force(k, :) = force(k, :) + total
+      if (size(energy) > 0) energy(k) = energy(k) + stored
+    end do
+    !$omp end parallel do
+  end subroutine sum_smoothed
+
+  !> How two points meet: along the normal of their surfaces, from the gap on that they had at the
+  !> start if they were near then; along the line of centres, which `n` then becomes, without one.
+  pure subroutine meet_pair(self, view, k, j, r, n, begins, patch)
+    class(contact_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    integer, intent(in) :: k, j              !! slots
+    real(wp), intent(in) :: r(:)             !! from k to j [m]
+    real(wp), intent(inout) :: n(:)          !! unit vector; 0: none of both
+    real(wp), intent(out) :: begins          !! [m]
+    type(patch_type), intent(out) :: patch
+    real(wp) :: r0(size(r)), n0(size(r)), spacing
+
+    r0 = self%begun(j, :) - self%begun(k, :)
+    n0 = normal_of_pair(self%normals(:, k), self%normals(:, j))
+    begins = reach_of(self, k, j, view%body)
+    if (any(abs(n) > 0.0_wp) .and. any(abs(n0) > 0.0_wp)) then
+      spacing = (view%body%spacing(k) + view%body%spacing(j))/2
+      if (sum(r0**2) < begins**2 + patch_radius(spacing)**2) begins = min(begins, &
+        & dot_product(r0, n0))
+      call meet(r, n, spacing, begins, patch)
+    else
+      begins = min(begins, norm2(r0))
+      patch%gap = norm2(r)
+      patch%weight = 1.0_wp
+      patch%touches = patch%gap < begins
+      n = r0
+      if (patch%gap > 0.0_wp) n = r
+      n = n/norm2(n)
+    end if
+  end subroutine meet_pair
 
   !> The force density by which two points push: never an attraction [N/m3].
   pure real(wp) function normal_force(rule, stiffness, overlap, speed, critical) result(push)
@@ -387,6 +505,7 @@ contains
     class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
 
     call archive%keep(self%name//' began', self%begun)
+    if (self%rule%smoothed) call archive%keep(self%name//' normals began', self%normals)
   end subroutine keep
 
   !> The scene's own lines describe it.

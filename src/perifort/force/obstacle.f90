@@ -6,13 +6,15 @@ module pd_force_obstacle
   use pd_base_kinds, only: wp
   use pd_base_numbers, only: pi
   use pd_base_vectors, only: cross
+  use pd_body_surface_distance, only: area_around, facet_gap, facets_type
   implicit none (type, external)
   private
-  public :: obstacle_type, a_sphere, a_cylinder, a_box, a_half_space
-  public :: find_gap, velocity_at, shift_at, surface_of, reach_of_shape, turned_at_most
+  public :: obstacle_type, a_sphere, a_cylinder, a_box, a_half_space, a_closed_surface
+  public :: find_gap, velocity_at, shift_at, surface_of, reach_of_shape, turned_at_most, note_pose
 
   !> Shapes.
-  integer, parameter :: a_sphere = 1, a_cylinder = 2, a_box = 3, a_half_space = 4
+  integer, parameter :: a_sphere = 1, a_cylinder = 2, a_box = 3, a_half_space = 4, &
+    & a_closed_surface = 5
 
   !> The surface of a rigid body. Vectors have three components whatever the dimension; those beyond
   !> it are 0.
@@ -20,7 +22,8 @@ module pd_force_obstacle
     integer :: shape = a_sphere
     integer :: dim = 3
     real(wp) :: half(3) = 0.0_wp        !! the radius of a sphere; of a cylinder radius, radius,
-                                        !! half its length; of a box half its edges [m]
+                                        !! half its length; of a box half its edges; of a closed
+                                        !! surface how far it reaches, 0, 0 [m]
     real(wp) :: centre(3) = 0.0_wp      !! of the body; of a half-space a point of its surface [m]
     real(wp) :: frame(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       & 0.0_wp, 1.0_wp], [3, 3])        !! its own axes as columns: a cylinder lies along the third,
@@ -32,6 +35,7 @@ module pd_force_obstacle
     real(wp) :: per_mass = 0.0_wp       !! 1/mass, 0 where no force moves it [1/kg]
     real(wp) :: per_inertia = 0.0_wp    !! 1/least moment of inertia, 0 where none turns it
                                         !! [1/(kg m2)]
+    type(facets_type), allocatable :: facets  !! of a closed surface, about its centre
   end type obstacle_type
 
 contains
@@ -60,6 +64,8 @@ contains
       call beside_cylinder(obstacle%half, own, gap, normal)
     case (a_box)
       call beside_box(obstacle%half, obstacle%dim, own, gap, normal)
+    case (a_closed_surface)
+      call facet_gap(obstacle%facets, own, gap, normal)
     case default
       gap = own(3)
       normal = [0.0_wp, 0.0_wp, 1.0_wp]
@@ -103,6 +109,18 @@ contains
     normal(3) = flat(2)
   end subroutine beside_cylinder
 
+  !> Where a surface is, without its facets: what `turned_at_most` needs of an earlier instant.
+  subroutine note_pose(obstacle, noted)
+    type(obstacle_type), intent(in) :: obstacle  !! the surface
+    type(obstacle_type), intent(out) :: noted    !! its shape and where it is
+
+    noted%shape = obstacle%shape
+    noted%dim = obstacle%dim
+    noted%half = obstacle%half
+    noted%centre = obstacle%centre
+    noted%frame = obstacle%frame
+  end subroutine note_pose
+
   !> How far from its centre the body reaches at most; a half-space without end [m].
   pure real(wp) function reach_of_shape(obstacle) result(reach)
     type(obstacle_type), intent(in) :: obstacle  !! the surface
@@ -112,7 +130,7 @@ contains
       reach = obstacle%half(1)
     case (a_cylinder)
       reach = norm2(obstacle%half(2:))
-    case (a_box)
+    case (a_box, a_closed_surface)
       reach = norm2(obstacle%half)
     case default
       reach = sqrt(huge(reach))
@@ -123,8 +141,8 @@ contains
   !> its surface and a place that is nearer than `margin` to it then [m]. With its centre at rest a
   !> place at y from it is as far from the surface as the place Q^T y was, where Q is the rotation:
   !> these are |Q - 1| |y| apart. A sphere does not change by rotation, a cylinder and a half-space
-  !> by that of their axis alone, |Q - 1| is then the way of the axis' end; of a box the sum of
-  !> squares of all components is a bound.
+  !> by that of their axis alone, |Q - 1| is then the way of the axis' end; of a box and of a closed
+  !> surface the sum of squares of all components is a bound.
   pure real(wp) function turned_at_most(before, now, margin, farthest) result(most)
     type(obstacle_type), intent(in) :: before, now  !! the surface
     real(wp), intent(in) :: margin                  !! [m]
@@ -133,7 +151,7 @@ contains
 
     most = 0.0_wp
     if (now%shape == a_sphere) return
-    if (now%shape == a_box) then
+    if (now%shape == a_box .or. now%shape == a_closed_surface) then
       turned = norm2(now%frame - before%frame)
     else
       turned = norm2(now%frame(:, 3) - before%frame(:, 3))
@@ -181,6 +199,8 @@ contains
     case (a_box)
       if (obstacle%dim == 3) surface = 8*(h(1)*h(2) + h(2)*h(3) + h(3)*h(1))
       if (obstacle%dim == 2) surface = 4*(h(1) + h(2))
+    case (a_closed_surface)
+      surface = area_around(obstacle%facets, margin)
     case (a_half_space)
       surface = sqrt(huge(surface))
     case default

@@ -19,8 +19,8 @@ module pd_force_touch
   use pd_force_contact, only: contact_rule_type, normal_force, of_friction, of_normal_force, slope
   use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
     & remember_places
-  use pd_force_obstacle, only: find_gap, obstacle_type, reach_of_shape, shift_at, surface_of, &
-    & turned_at_most, velocity_at
+  use pd_force_obstacle, only: find_gap, note_pose, obstacle_type, reach_of_shape, shift_at, &
+    & surface_of, turned_at_most, velocity_at
   use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
   use pd_force_terms, only: term_list_type
   implicit none (type, external)
@@ -126,7 +126,7 @@ contains
       end select
     else if (.not. still_holds(self, view)) then
       call find_near(self, view, self%near, self%farthest)
-      self%then = view%obstacles(self%obstacle)
+      call note_pose(view%obstacles(self%obstacle), self%then)
       call remember_places(self%movement, view%u)
     end if
     call note_instant(self%movement, view)
@@ -156,24 +156,22 @@ contains
     type(term_view_type), intent(in) :: view
     integer, allocatable, intent(out) :: near(:)
     real(wp), intent(out) :: farthest             !! [m]
-    type(obstacle_type) :: obstacle
     logical :: is_near(size(self%slots))
     real(wp) :: gap, normal(3), y(size(view%u, 2)), away, within
     integer :: i
 
     farthest = 0.0_wp
-    obstacle = view%obstacles(self%obstacle)
-    within = reach_of_shape(obstacle)
+    within = reach_of_shape(view%obstacles(self%obstacle))
     !$omp parallel do schedule(static) default(none) &
-    !$omp shared(self, view, obstacle, is_near, within) private(i, y, away, gap, normal) &
+    !$omp shared(self, view, is_near, within) private(i, y, away, gap, normal) &
     !$omp reduction(max:farthest)
     do i = 1, size(self%slots)
       y = place_of(view, int(self%slots(i)))
-      away = norm2(y - obstacle%centre(:size(y)))
+      away = norm2(y - view%obstacles(self%obstacle)%centre(:size(y)))
       farthest = max(farthest, away)
       is_near(i) = away < within + self%begins(i) + self%skin
       if (.not. is_near(i)) cycle
-      call find_gap(obstacle, y, gap, normal)
+      call find_gap(view%obstacles(self%obstacle), y, gap, normal)
       is_near(i) = gap < self%begins(i) + self%skin
     end do
     near = pack([(i, i=1, size(self%slots))], is_near)

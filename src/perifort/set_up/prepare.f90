@@ -236,7 +236,8 @@ contains
 
       call timer%start('time step')
       system%break_late = scene%time%breaking == 'after_forces'
-      call rigid_bodies_of_scene(scene, system)
+      call rigid_bodies_of_scene(scene, system, error)
+      if (allocated(error)) return
       call start_system(system)
       if (allocated(system%fault)) then
         call explain_condition(system, status_input, error)

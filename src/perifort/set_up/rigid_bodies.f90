@@ -20,21 +20,25 @@ module pd_set_up_rigid_bodies
   use pd_scene_content_expressions, only: expression_of
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: is_given, is_set, rigid_group, scene_type
+  use pd_set_up_rigid_surface, only: facets_of
   implicit none (type, external)
   private
   public :: rigid_bodies_of_scene, add_touches, check_within
 
 contains
 
-  !> All rigid bodies of a scene at the start, in a system whose points have their initial state.
-  subroutine rigid_bodies_of_scene(scene, system)
+  !> All rigid bodies of a scene at the start, in a system whose points have their initial state. An
+  !> error, with its place, if the surface of one cannot be read, or is not closed.
+  subroutine rigid_bodies_of_scene(scene, system, error)
     type(scene_type), intent(in) :: scene        !! a checked scene
     type(system_type), intent(inout) :: system   !! gets its rigid bodies and their surfaces
+    type(error_type), allocatable, intent(out) :: error
     integer :: r
 
     allocate (system%rigid_bodies(size(scene%rigids)), system%obstacles(size(scene%rigids)))
     do r = 1, size(scene%rigids)
-      call make_body(scene, r, system%rigid_bodies(r), system%obstacles(r))
+      call make_body(scene, r, system%rigid_bodies(r), system%obstacles(r), error)
+      if (allocated(error)) return
       call guide_body(0.0_wp, r, system%rigid_bodies(r), system%fault)
       call place_obstacle(system%rigid_bodies(r), system%rigid_bodies(r)%pose%velocity, &
         & spin_now(system%rigid_bodies(r), 0.0_wp), system%obstacles(r))
@@ -42,25 +46,35 @@ contains
   end subroutine rigid_bodies_of_scene
 
   !> One rigid body, as if nothing imposed moved it yet.
-  subroutine make_body(scene, number, rigid, obstacle)
+  subroutine make_body(scene, number, rigid, obstacle, error)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: number
     type(rigid_body_type), intent(out) :: rigid
     type(obstacle_type), intent(out) :: obstacle
-    real(wp) :: volume, mass, inertia(3), centre(3), spin(3)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp) :: volume, mass, inertia(3), centre(3), spin(3), axes(3, 3)
     integer :: c
 
     associate (group => scene%rigids(number), d => scene%header%dimension)
-      call shape_of(scene, group, obstacle, volume, inertia)
+      if (group%shape == 'surface') then
+        call facets_of(scene, number, obstacle, volume, centre, inertia, axes, error)
+        if (allocated(error)) return
+      else
+        call shape_of(scene, group, obstacle, volume, inertia)
+        centre = 0.0_wp
+        centre(:d) = group%centre(:d)
+        axes = obstacle%frame
+      end if
       obstacle%dim = d
       mass = 0.0_wp
       if (is_set(group%mass)) mass = group%mass
       if (is_set(group%density)) mass = group%density*volume
       inertia = mass*inertia
-      if (all(is_set(group%inertia))) inertia = group%inertia
-      centre = 0.0_wp
-      centre(:d) = group%centre(:d)
-      call new_shape_pose(d, centre, mass, inertia, obstacle%frame, rigid%pose)
+      if (all(is_set(group%inertia))) then
+        inertia = group%inertia
+        axes = obstacle%frame
+      end if
+      call new_shape_pose(d, centre, mass, inertia, axes, rigid%pose)
       rigid%axes = obstacle%frame
       rigid%free = .false.
       do c = 1, d

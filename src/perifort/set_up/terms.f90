@@ -153,6 +153,7 @@ contains
         rule%distance = 0.0_wp
         if (is_set(group%distance)) rule%distance = group%distance
         rule%friction = group%friction
+        rule%smoothed = group%normals == 'smoothed'
         rule%returned = 1.0_wp
         if (is_set(group%restitution)) rule%returned = group%restitution**2
         rule%damping = 0.0_wp

@@ -7,7 +7,7 @@ module pd_body_surface_winding
   use pd_body_surface_surface, only: area_vector, centre_of, corners_of, surface_type
   implicit none (type, external)
   private
-  public :: tree_type, new_tree, winding_number
+  public :: tree_type, new_tree, range_of, winding_number
 
   integer, parameter :: leaf = 8             !! facets of the smallest nodes
   real(wp), parameter :: far = 2.5_wp        !! radii from where a node is a dipole
@@ -78,9 +78,10 @@ contains
 
   !> The range of facets of a node.
   pure subroutine range_of(tree, node, level, first, last)
-    type(tree_type), intent(in) :: tree
-    integer, intent(in) :: node, level
-    integer, intent(out) :: first, last
+    type(tree_type), intent(in) :: tree    !! of a surface
+    integer, intent(in) :: node            !! its number, from 1
+    integer, intent(in) :: level           !! on which it is, from 0
+    integer, intent(out) :: first, last    !! places in the order of the curve; none if first > last
     integer(i8) :: n, place
 
     n = size(tree%facet)

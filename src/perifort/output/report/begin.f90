@@ -91,6 +91,7 @@ contains
         call gather(body, body%volume, volume)
         call cells_of(body%parts, positions, volume, cells)
       end if
+      call recorder%surfaces%begin(system, minval(positions, dim=1), maxval(positions, dim=1))
       command = text_of(options%command)
       call recorder%results%create(directory, stem, positions, &
         & [(recorder%fields(f)%in_file(body%dim), f=1, size(recorder%fields))], &
@@ -98,7 +99,8 @@ contains
         & history_columns(system, recorder%measures, plan%relaxes), planned_rows(schedule), &
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
         & program_version, options%overwrite .or. options%restart, error, kept, &
-        & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))], cells)
+        & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))], cells, &
+        & recorder%surfaces%triangles)
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
       ! the first rank alone has files that can go on

@@ -23,6 +23,7 @@ module pd_output_report_recorder
   use pd_output_measures_measure, only: measure_list_type, row_source_type
   use pd_output_report_columns, only: history_row, history_table_type
   use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
+  use pd_output_report_rigid_surfaces, only: rigid_surfaces_type
   use pd_output_report_run_warnings, only: contact_warning, gradient_warning, &
     & rotation_warning, strain_warning
   use pd_output_report_schedule, only: due_at, iteration_due, schedule_type
@@ -38,6 +39,7 @@ module pd_output_report_recorder
     type(output_field_type), allocatable :: fields(:)  !! of every output
     type(measure_list_type) :: measures      !! of the history
     type(profile_type), allocatable :: profiles(:)     !! of every output
+    type(rigid_surfaces_type) :: surfaces    !! of rigid bodies, in every output
     type(progress_type) :: progress
     type(phase_timer_type) :: timer
     type(team_type) :: team                  !! threads, whose number may change at any instant
@@ -345,6 +347,7 @@ contains
     real(wp), target, contiguous, intent(in) :: v(:, :)
     type(error_type), allocatable, intent(out) :: error
     type(moment_type) :: now
+    real(wp), allocatable :: places(:, :), velocity(:, :)
     integer :: undefined
 
     now%system => system
@@ -354,6 +357,11 @@ contains
     call write_fields(recorder%results, recorder%collector, recorder%fields, now, undefined, error)
     if (.not. allocated(error)) call write_profiles(recorder%results, recorder%profiles, now, error)
     if (allocated(error)) return
+    if (recorder%surfaces%triangles%n_vertices > 0) then
+      call recorder%surfaces%place(system, places, velocity)
+      call recorder%results%put_surfaces(places, velocity, error)
+      if (allocated(error)) return
+    end if
     call warn_if_any(recorder, 'gradient', gradient_warning(undefined, instant%time))
     call recorder%results%end_output(error)
     if (recorder%fragments .and. .not. allocated(error)) &

@@ -32,8 +32,10 @@ module pd_output_results_results
   use pd_output_results_profiles, only: add_profile, head_of_profile
   use pd_output_results_types, only: column_type, field_type, kept_type, label_length, line_type
   use pd_output_results_vtkhdf, only: vtkhdf_file
-  use pd_output_results_vtu, only: remove_series, vtu_series
+  use pd_output_results_surfaces, only: remove_surfaces, surface_series, triangles_type
+  use pd_output_results_vtu, only: vtu_ending, vtu_series
   use pd_output_results_xdmf, only: xdmf_file
+  use pd_output_results_xml, only: remove_series
   implicit none (type, external)
   private
   public :: results_type, column_type, field_type, label_length
@@ -48,6 +50,9 @@ module pd_output_results_results
     type(vtkhdf_file) :: vtkhdf
     type(xdmf_file) :: xdmf              !! lists what is in the HDF5 file
     type(vtu_series) :: vtu
+    type(surface_series) :: surfaces     !! of rigid bodies
+    real(wp), allocatable :: places(:, :), velocity(:, :)  !! of their vertices in the output under
+                                                           !! way
     type(history_type) :: history
     type(csv_type) :: csv
     type(lines_type) :: iterations, fragments
@@ -62,6 +67,7 @@ module pd_output_results_results
     real(wp) :: time = 0.0_wp            !! of the output under way [s]
     logical :: in_output = .false.
     logical :: use_vtkhdf = .false., use_xdmf = .false., use_vtu = .false.
+    logical :: use_surfaces = .false.
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
     logical :: resumed = .false.         !! they are those of a run that continues
@@ -83,6 +89,7 @@ module pd_output_results_results
     !> `values(n, components)`.
     generic :: put_field => put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     procedure :: put_line
+    procedure :: put_surfaces
     procedure :: end_output
     procedure :: add_row
     procedure :: add_iteration
@@ -109,7 +116,7 @@ contains
   !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
     & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, &
-    & lines, cells)
+    & lines, cells, triangles)
     class(results_type), intent(out) :: self       !! open on return, unless an error is set
     character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
                                                    !! the current one
@@ -131,6 +138,8 @@ contains
                                                    !! from; absent: a new run
     type(line_type), intent(in), optional :: lines(:)  !! (any number) with profiles in each output
     type(cells_type), intent(in), optional :: cells    !! of meshes, for the HDF5 file and its list
+    type(triangles_type), intent(in), optional :: triangles
+      !! of rigid bodies, for files of their own; none without
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
@@ -160,6 +169,7 @@ contains
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
     ! room for one output at least; whether there are too many shows with the file
     self%use_xdmf = self%use_vtkhdf .and. has_list(stem, format, fields, 1)
+    if (present(triangles)) self%use_surfaces = self%in_files .and. size(triangles%body) > 0
     call self%history%start(size(columns))
     allocate (self%times(0))
     if (present(kept)) then
@@ -168,6 +178,7 @@ contains
         & call self%history%restore(kept%rows, written=self%resumed)
     end if
     if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
+    if (self%use_surfaces) call self%surfaces%create(self%directory, self%stem, triangles)
     if (self%use_xdmf) call self%xdmf%create(in_directory(directory, self%stem//'.xdmf'), &
       & self%stem//'.vtkhdf', size(positions, 1, kind=i8), fields, planned_outputs, single, &
       & cells)
@@ -247,6 +258,7 @@ contains
     self%outputs = size(kept%times)
     call mark_unfinished(self%directory, self%stem, error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%resume(kept%times, error)
+    if (self%use_surfaces .and. .not. allocated(error)) call self%surfaces%resume(kept%times, error)
     if (size(self%columns) > 0 .and. .not. allocated(error)) call self%csv%replace( &
       & in_directory(self%directory, 'history.csv'), self%columns, kept%rows, error)
     if (.not. allocated(error)) call begin_profiles(self, .true., error)
@@ -364,6 +376,21 @@ contains
     self%waiting(number)%values = values
   end subroutine put_line
 
+  !> Where the vertices of the triangles are in the output under way. An error outside an output.
+  subroutine put_surfaces(self, places, velocity, error)
+    class(results_type), intent(inout) :: self   !! with an output under way
+    real(wp), intent(in) :: places(:, :)         !! (vertices, 3) [m]
+    real(wp), intent(in) :: velocity(:, :)       !! (vertices, 3) [m/s]
+    type(error_type), allocatable, intent(out) :: error
+
+    if (.not. self%in_output) then
+      call fail(error, 'surfaces are given outside an output')
+      return
+    end if
+    self%places = places
+    self%velocity = velocity
+  end subroutine put_surfaces
+
   !> Write what the tables of the lines get from the output under way.
   subroutine write_profiles(self, error)
     class(results_type), intent(inout) :: self
@@ -462,6 +489,10 @@ contains
       call fail(error, 'line '//trim(self%lines(i)%name)//' is missing from an output')
       return
     end do
+    if (self%use_surfaces .and. .not. allocated(self%places)) then
+      call fail(error, 'the surfaces of rigid bodies are missing from an output')
+      return
+    end if
     ! rows first: a file that counts this output holds the history up to it
     call self%history%take(table)
     if (self%use_vtkhdf) then
@@ -469,6 +500,8 @@ contains
       if (.not. allocated(error)) call self%vtkhdf%end_output(self%time, error)
     end if
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%end_output(self%time, error)
+    if (self%use_surfaces .and. .not. allocated(error)) call self%surfaces%add(self%time, &
+      & self%places, self%velocity, error)
     if (.not. allocated(error)) call start_files(self, error)
     if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%end_output(self%time, error)
     if (.not. allocated(error) .and. self%csv%is_open()) call self%csv%append(table, error)
@@ -480,6 +513,7 @@ contains
       self%outputs = self%outputs + 1
       self%times = [self%times, self%time]
       self%in_output = .false.
+      if (allocated(self%places)) deallocate (self%places)
       do i = 1, size(self%lines)
         deallocate (self%waiting(i)%values)
       end do
@@ -525,7 +559,8 @@ contains
       call remove_file(in_directory(self%directory, self%stem//'.vtkhdf'))
     end if
     if (allocated(error)) return
-    call remove_series(self%directory, self%stem, merge(1, 0, self%use_vtu))
+    call remove_series(self%directory, self%stem, vtu_ending, merge(1, 0, self%use_vtu))
+    call remove_surfaces(self%directory, self%stem, merge(1, 0, self%use_surfaces))
     call remove_file(in_directory(self%directory, 'iterations.csv'))
     call remove_file(in_directory(self%directory, 'fragments.csv'))
     if (size(self%columns) > 0) then
@@ -653,6 +688,7 @@ contains
     bytes = 0
     if (self%use_vtkhdf) bytes = self%vtkhdf%output_bytes()
     if (self%use_vtu) bytes = bytes + self%vtu%output_bytes()
+    if (self%use_surfaces) bytes = bytes + self%surfaces%output_bytes()
     call explain_need(self, 'output '//to_text(self%outputs + 1)//' at '// &
       & with_unit(self%time, 's'), bytes, error)
   end subroutine explain_output
@@ -682,6 +718,7 @@ contains
     if (self%use_vtkhdf .and. .not. allocated(error)) call self%vtkhdf%sync(error)
     if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%sync(error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%sync(error)
+    if (self%use_surfaces .and. .not. allocated(error)) call self%surfaces%sync(error)
     if (self%csv%is_open() .and. .not. allocated(error)) call self%csv%sync(error)
     if (.not. allocated(error)) call self%iterations%sync(error)
     if (.not. allocated(error)) call self%fragments%sync(error)

@@ -6,18 +6,19 @@
 module pd_output_results_vtu
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
   use pd_base_error, only: error_type, fail
-  use pd_base_kinds, only: wp, sp, i1, i8
+  use pd_base_kinds, only: wp, i1, i8
   use pd_base_text, only: newline
-  use pd_output_results_base64, only: base64_encoder, base64_length
   use pd_output_results_files, only: file_exists, in_directory, remove_file, rename_file, sync_path
-  use pd_output_results_layout, only: block_rows, to_single
+  use pd_output_results_layout, only: block_rows
   use pd_output_results_sink, only: sink_type
   use pd_output_results_types, only: field_type
-  use pd_output_results_xdmf, only: escaped
+  use pd_output_results_xml, only: array_type, begin_array, end_array, member, put_bytes, &
+    & put_reals, put_vectors, remove_series, write_list
   implicit none (type, external)
   private
-  public :: vtu_series, remove_series
+  public :: vtu_series, vtu_ending
 
+  character(*), parameter :: vtu_ending = '.vtu'   !! of the files, with its dot
   integer(i1), parameter :: vertex_cell = 1_i1
 
   !> A series under way.
@@ -43,12 +44,6 @@ module pd_output_results_vtu
     procedure :: output_bytes
     procedure :: abandon
   end type vtu_series
-
-  !> An array within the XML that is being written.
-  type :: array_type
-    type(base64_encoder) :: encoder
-    character(:), allocatable :: text
-  end type array_type
 
 contains
 
@@ -79,7 +74,7 @@ contains
     integer :: i
 
     do i = 1, size(times)
-      name = in_directory(self%directory, member(self%stem, i - 1))
+      name = in_directory(self%directory, member(self%stem, i - 1, vtu_ending))
       if (file_exists(name)) cycle
       call fail(error, 'there is no '//name//', which the checkpoint counts on')
       return
@@ -87,10 +82,11 @@ contains
     self%outputs = size(times)
     self%synced = self%outputs
     self%times = [times, spread(0.0_wp, 1, size(self%times))]
-    call write_list(self, self%outputs, error)
+    call write_list(self%directory, self%stem, vtu_ending, self%times(:self%outputs), error)
     if (allocated(error)) return
-    call remove_series(self%directory, self%stem, self%outputs)
-    call remove_file(in_directory(self%directory, member(self%stem, self%outputs)//'.part'))
+    call remove_series(self%directory, self%stem, vtu_ending, self%outputs)
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs, &
+      & vtu_ending)//'.part'))
   end subroutine resume
 
   !> Wait until all complete outputs are on the disk.
@@ -100,23 +96,12 @@ contains
     integer :: i
 
     do i = self%synced, self%outputs - 1
-      call sync_path(in_directory(self%directory, member(self%stem, i)), error)
+      call sync_path(in_directory(self%directory, member(self%stem, i, vtu_ending)), error)
       if (allocated(error)) return
     end do
     self%synced = self%outputs
     call sync_path(in_directory(self%directory, self%stem//'.pvd'), error)
   end subroutine sync
-
-  !> `stem_000012.vtu`
-  pure function member(stem, index) result(name)
-    character(*), intent(in) :: stem
-    integer, intent(in) :: index
-    character(:), allocatable :: name
-    character(16) :: number
-
-    write (number, '(i0.6)') index
-    name = stem//'_'//trim(number)//'.vtu'
-  end function member
 
   !> Begin the file of the next output: points and cells.
   subroutine begin_output(self, error)
@@ -125,7 +110,8 @@ contains
     character(24) :: n
 
     write (n, '(i0)') size(self%positions, 1)
-    call self%sink%open(in_directory(self%directory, member(self%stem, self%outputs)//'.part'), &
+    call self%sink%open(in_directory(self%directory, member(self%stem, self%outputs, &
+      & vtu_ending)//'.part'), &
       & error)
     if (allocated(error)) return
     call self%sink%line('<?xml version="1.0"?>'//newline &
@@ -176,118 +162,6 @@ contains
     if (.not. allocated(error)) call end_array(sink, array, error)
   end subroutine put_cells
 
-  !> Begin an array of `bytes` bytes; its encoded bytes start with their number.
-  subroutine begin_array(sink, array, kind_name, name, components, bytes, error, labels)
-    type(sink_type), intent(inout) :: sink
-    type(array_type), intent(inout) :: array
-    character(*), intent(in) :: kind_name, name
-    integer, intent(in) :: components
-    integer(i8), intent(in) :: bytes
-    type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
-    character(:), allocatable :: named
-    character(8) :: number
-
-    named = ''
-    if (present(labels)) named = component_names(labels)
-    write (number, '(i0)') components
-    call sink%put('<DataArray type="'//kind_name//'" Name="'//trim(name) &
-      & //'" NumberOfComponents="'//trim(number)//'"'//named//' format="binary">', error)
-    if (.not. allocated(error)) call put_bytes(sink, array, transfer(bytes, [0_i1]), error)
-  end subroutine begin_array
-
-  !> Names of components as attributes. Readers know x, y and z by themselves.
-  pure function component_names(labels) result(text)
-    character(*), intent(in) :: labels            !! parted by blanks
-    character(:), allocatable :: text, rest
-    character(8) :: number
-    integer :: c, blank
-
-    text = ''
-    rest = trim(labels)
-    c = 0
-    do while (rest /= '' .and. labels /= 'x y z')
-      blank = index(rest//' ', ' ')
-      write (number, '(i0)') c
-      text = text//' ComponentName'//trim(number)//'="'//rest(:blank - 1)//'"'
-      rest = trim(adjustl(rest(blank:)))
-      c = c + 1
-    end do
-  end function component_names
-
-  subroutine put_bytes(sink, array, bytes, error)
-    type(sink_type), intent(inout) :: sink
-    type(array_type), intent(inout) :: array
-    integer(i1), contiguous, intent(in) :: bytes(:)
-    type(error_type), allocatable, intent(out) :: error
-    integer :: length, needed
-
-    needed = base64_length(size(bytes))
-    if (allocated(array%text)) then
-      if (len(array%text) < needed) deallocate (array%text)
-    end if
-    if (.not. allocated(array%text)) allocate (character(needed) :: array%text)
-    call array%encoder%put(bytes, array%text, length)
-    call sink%put(array%text(:length), error)
-  end subroutine put_bytes
-
-  subroutine end_array(sink, array, error)
-    type(sink_type), intent(inout) :: sink
-    type(array_type), intent(inout) :: array
-    type(error_type), allocatable, intent(out) :: error
-    integer :: length
-
-    call array%encoder%finish(array%text, length)
-    call sink%line(array%text(:length)//'</DataArray>', error)
-  end subroutine end_array
-
-  !> Write `values(n, components)` as an array of vectors, block by block.
-  subroutine put_vectors(sink, name, values, single, error, labels)
-    type(sink_type), intent(inout) :: sink
-    character(*), intent(in) :: name
-    real(wp), intent(in) :: values(:, :)
-    logical, intent(in) :: single
-    type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
-    type(array_type) :: array
-    real(wp), allocatable :: turned(:)
-    integer :: n, first, count, width, i
-
-    n = size(values, 1)
-    width = size(values, 2)
-    allocate (turned(width*min(n, block_rows)))
-    call begin_array(sink, array, merge('Float32', 'Float64', single), name, width, &
-      & merge(4_i8, 8_i8, single)*n*width, error, labels)
-    do first = 0, n - 1, block_rows
-      if (allocated(error)) return
-      count = min(block_rows, n - first)
-      do i = 1, count
-        turned(width*(i - 1) + 1:width*i) = values(first + i, :)
-      end do
-      call put_reals(sink, array, turned(:width*count), single, error)
-    end do
-    if (.not. allocated(error)) call end_array(sink, array, error)
-  end subroutine put_vectors
-
-  !> Write reals in the wanted precision.
-  subroutine put_reals(sink, array, values, single, error)
-    type(sink_type), intent(inout) :: sink
-    type(array_type), intent(inout) :: array
-    real(wp), contiguous, target, intent(in) :: values(:)
-    logical, intent(in) :: single
-    type(error_type), allocatable, intent(out) :: error
-    real(sp), allocatable, target :: short(:)
-    integer(i1), pointer, contiguous :: bytes(:)
-
-    if (single) then
-      allocate (short, source=to_single(values))
-      call c_f_pointer(c_loc(short), bytes, [4*size(values)])
-    else
-      call c_f_pointer(c_loc(values), bytes, [8*size(values)])
-    end if
-    call put_bytes(sink, array, bytes, error)
-  end subroutine put_reals
-
   !> Write field `i` of the output under way: `values(n)`.
   subroutine put_scalar(self, i, values, error)
     class(vtu_series), intent(inout) :: self       !! the series
@@ -326,7 +200,7 @@ contains
     character(:), allocatable :: name
     real(wp), allocatable :: longer(:)
 
-    name = in_directory(self%directory, member(self%stem, self%outputs))
+    name = in_directory(self%directory, member(self%stem, self%outputs, vtu_ending))
     call self%sink%line('</PointData>'//newline//'</Piece>'//newline//'</UnstructuredGrid>' &
       & //newline//'</VTKFile>', error)
     if (.not. allocated(error)) call self%sink%close(error)
@@ -338,41 +212,9 @@ contains
       call move_alloc(longer, self%times)
     end if
     self%times(self%outputs + 1) = time
-    call write_list(self, self%outputs + 1, error)
+    call write_list(self%directory, self%stem, vtu_ending, self%times(:self%outputs + 1), error)
     if (.not. allocated(error)) self%outputs = self%outputs + 1
   end subroutine end_output
-
-  !> Write the list of times and files, and put it in the place of the one before.
-  subroutine write_list(self, outputs, error)
-    class(vtu_series), intent(in) :: self
-    integer, intent(in) :: outputs
-    type(error_type), allocatable, intent(out) :: error
-    type(error_type), allocatable :: ignored
-    type(sink_type) :: list
-    character(:), allocatable :: name
-    character(24) :: time
-    integer :: i
-
-    name = in_directory(self%directory, self%stem//'.pvd')
-    call list%open(name//'.part', error)
-    if (allocated(error)) return
-    call list%line('<?xml version="1.0"?>'//newline//'<VTKFile type="Collection" version="0.1"' &
-      & //' byte_order="LittleEndian">'//newline//'<Collection>', error)
-    do i = 1, outputs
-      if (allocated(error)) exit
-      write (time, '(es24.16e3)') self%times(i)
-      call list%line('<DataSet timestep="'//trim(adjustl(time))//'" part="0" file="' &
-        & //escaped(member(self%stem, i - 1))//'"/>', error)
-    end do
-    if (.not. allocated(error)) call list%line('</Collection>'//newline//'</VTKFile>', error)
-    if (.not. allocated(error)) then
-      call list%close(error)
-    else
-      call list%close(ignored)
-    end if
-    if (.not. allocated(error)) call rename_file(name//'.part', name, error)
-    if (allocated(error)) call remove_file(name//'.part')
-  end subroutine write_list
 
   !> Bytes of one file, within some hundreds.
   pure integer(i8) function output_bytes(self)
@@ -390,25 +232,8 @@ contains
 
     if (.not. self%sink%is_open()) return
     call self%sink%close(ignored)
-    call remove_file(in_directory(self%directory, member(self%stem, self%outputs)//'.part'))
+    call remove_file(in_directory(self%directory, member(self%stem, self%outputs, &
+      & vtu_ending)//'.part'))
   end subroutine abandon
-
-  !> Remove the files of an older series from number `first` (0 = the first) on. The last goes
-  !> first, so that an end in the midst leaves no gap that would hide the others.
-  subroutine remove_series(directory, stem, first)
-    character(*), intent(in) :: directory  !! folder of the files; '' for the current one
-    character(*), intent(in) :: stem       !! name of the files without number and ending
-    integer, intent(in) :: first           !! number of the first that is removed
-    integer :: last, i
-
-    if (first == 0) call remove_file(in_directory(directory, stem//'.pvd'))
-    last = first
-    do while (file_exists(in_directory(directory, member(stem, last))))
-      last = last + 1
-    end do
-    do i = last - 1, first, -1
-      call remove_file(in_directory(directory, member(stem, i)))
-    end do
-  end subroutine remove_series
 
 end module pd_output_results_vtu

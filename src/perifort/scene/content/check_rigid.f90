@@ -4,7 +4,8 @@ module pd_scene_content_check_rigid
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
   use pd_scene_content_expressions, only: check_vector_expressions
-  use pd_scene_content_rules, only: check_components, check_unique, check_vector, rule_fault
+  use pd_scene_content_rules, only: check_components, check_file, check_unique, &
+    & check_vector, rule_fault
   use pd_scene_content_types, only: is_given, is_set, name_length, rigid_group, scene_type
   use pd_scene_format_source, only: source_type
   implicit none (type, external)
@@ -48,7 +49,9 @@ contains
         & trim(rigid%name)//"' is used by a &boundary or &probe", &
         & 'columns of the history begin with it')
       if (allocated(error)) return
-      call check_vector(rigid%centre, d, 'centre', 'rigid', number, error, source)
+      ! a surface is where its file has it
+      if (rigid%shape /= 'surface' .or. any(is_set(rigid%centre))) call check_vector(rigid%centre, &
+        & d, 'centre', 'rigid', number, error, source)
       if (allocated(error)) return
       call check_shape()
       if (allocated(error)) return
@@ -96,21 +99,31 @@ contains
           if (allocated(error)) return
           if (.not. norm2(rigid%normal(:d)) > 0.0_wp) call fault('normal', &
             & "'normal' has no length", 'expected a direction')
+        case ('surface')
+          if (d < 3) then
+            call fault('shape', 'a surface in '//to_text(d)//'D', 'facets enclose a volume in 3D')
+          else if (rigid%surface == '') then
+            call fault('', "group &rigid lacks the key 'surface'", 'expected a STL file')
+          else
+            call check_file(rigid%surface, scene%file, 'rigid', number, error, source, 'surface')
+          end if
         case default  ! a scene built in memory
           call fault('shape', "no shape is called '"//trim(rigid%shape)//"'", &
-            & "expected 'sphere', 'cylinder', 'box' or 'half_space'")
+            & "expected 'sphere', 'cylinder', 'box', 'half_space' or 'surface'")
         end select
         if (allocated(error)) return
         call leave('radius', is_set(rigid%radius), ['sphere  ', 'cylinder'])
         call leave('length', is_set(rigid%length), ['cylinder'])
         call leave('edges', any(is_set(rigid%edges)), ['box'])
-        call leave('axis', any(is_set(rigid%axis)), ['cylinder', 'box     '])
-        call leave('angle', abs(rigid%angle) > 0.0_wp, ['box'])
+        call leave('axis', any(is_set(rigid%axis)), ['cylinder', 'box     ', 'surface '])
+        call leave('angle', abs(rigid%angle) > 0.0_wp, ['box    ', 'surface'])
+        call leave('surface', rigid%surface /= '', ['surface'])
+        call leave('scale', abs(rigid%scale - 1) > 0.0_wp, ['surface'])
         call leave('normal', any(is_set(rigid%normal)), ['half_space'])
         if (allocated(error)) return
         if (.not. any(is_set(rigid%axis))) then
-          if (rigid%shape == 'cylinder' .or. (rigid%shape == 'box' .and. d == 3)) &
-            & rigid%axis = [0.0_wp, 0.0_wp, 1.0_wp]
+          if (rigid%shape == 'cylinder' .or. rigid%shape == 'surface' .or. &
+            & (rigid%shape == 'box' .and. d == 3)) rigid%axis = [0.0_wp, 0.0_wp, 1.0_wp]
         else if (d < 3) then
           call fault('axis', "'axis' in a scene of dimension "//to_text(d), &
             & 'in 2D a box turns about z')
