@@ -119,7 +119,7 @@ contains
     rule%side = [1, 2]
     rule%stiffness = 2.0_wp
     associate (system => set_up%system, body => set_up%system%body)
-      call new_contact(body, system%family%rule%delta, rule, of_normal_force, contact)
+      call new_contact(body, system%family%rule%delta, 0.0_wp, rule, of_normal_force, contact)
       call view_of(system, 0.0_wp, view)
       call contact%begin(view)
       allocate (expected(body%n_slots, 3), force(body%n_slots, 3), density(body%n_slots))

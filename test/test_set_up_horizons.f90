@@ -5,6 +5,7 @@ module test_set_up_horizons
   use bodies, only: at_point, expect_true, noise, shake
   use comparisons, only: expect_close, max_abs, text_of
   use force_subjects, only: some_gradient
+  use pd_force_term, only: term_view_type
   use meshes, only: write_file
   use pd_base_kinds, only: wp, i1
   use pd_base_numbers, only: pi
@@ -17,7 +18,7 @@ module test_set_up_horizons
   use pd_force_reference, only: reference_energy, reference_force, state_of_bond
   use pd_law_material, only: never
   use pd_motion_explicit_spectrum, only: largest_frequency, spectrum_type
-  use pd_motion_system, only: system_type
+  use pd_motion_system, only: system_type, view_of
   use pd_set_up_prepare, only: prepare, set_up_type
   use perifort, only: answer_type, fault_type => error_type, read_scene_text, run_options_type, &
     & run_scene, scene_type
@@ -28,6 +29,9 @@ module test_set_up_horizons
   public :: collect_set_up_horizons
 
   character(*), parameter :: local = '&horizon local = .true. '
+  character(*), parameter :: ball = "&rigid name = 'ball' shape = 'sphere' radius = 0.5 "// &
+    & 'centre = 0, -0.5 mass = 1 /'//line//"&contact between = 'a', 'ball' distance = 0.12 /"// &
+    & line//"&contact between = 'b', 'ball' distance = 0.12 /"//line//'&time steps = 1 /'//line
   character(*), parameter :: relaxes = "&time method = 'relaxation' /"//line
 
 contains
@@ -50,6 +54,7 @@ contains
       & new_unittest('the time step', test_step), &
       & new_unittest('layers have the horizon of their side', test_layers), &
       & new_unittest('facets of meshes move points within their own horizon', test_facets), &
+      & new_unittest('contact has the larger horizon of a pair', test_contact), &
       & new_unittest('what is refused', test_refusals)]
   end subroutine collect_set_up_horizons
 
@@ -772,6 +777,63 @@ contains
       & 'one horizon moves all')
   end subroutine test_facets
 
+  !> Bodies of two spacings push each other as with one horizon, that of the coarser points, and
+  !> with equal and opposite forces; a rigid body pushes each by the horizon that it has.
+  subroutine test_contact(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: meet = line//'&time steps = 1 /'//line// &
+      & "&contact between = 'a', 'b' distance = 0.12 /"//line
+    real(wp), allocatable :: own(:, :), single(:, :), coarse(:, :), fine(:, :)
+
+    call forces_of(own_grids('&horizon ratio = 3.015 /'//meet), own)
+    call forces_of(own_grids('&horizon length = 0.376875 /'//meet), single)
+    if (allocated(error)) return
+    call expect_true(error, max_abs(single) > 0.0_wp, 'nothing touches')
+    call expect_close(error, own, single, 1.0e-12_wp*max_abs(single), 'forces of contact')
+    call expect_close(error, sum(own, 1), [0.0_wp, 0.0_wp], 1.0e-12_wp*max_abs(single), 'sum')
+    call forces_of(own_grids('&horizon ratio = 3.015 /'//line//ball), own)
+    call forces_of(own_grids('&horizon length = 0.376875 /'//line//ball), coarse)
+    call forces_of(own_grids('&horizon length = 0.1884375 /'//line//ball), fine)
+    if (allocated(error)) return
+    ! points of body 'a' come first
+    call expect_close(error, own(:64, :), coarse(:64, :), 1.0e-12_wp*max_abs(coarse), 'coarse')
+    call expect_close(error, own(65:, :), fine(65:, :), 1.0e-12_wp*max_abs(fine), 'fine')
+    call expect_true(error, max_abs(own(:64, :)) > 0.0_wp .and. max_abs(own(65:, :)) > 0.0_wp, &
+      & 'the ball touches one body alone')
+
+  contains
+
+    !> Forces of contact on all points [N], the second body moved by 0.05 m towards the first, or
+    !> both moved towards a ball.
+    subroutine forces_of(text, force)
+      character(*), intent(in) :: text
+      real(wp), allocatable, intent(out) :: force(:, :)
+      type(set_up_type), target :: set_up
+      type(term_view_type) :: view
+      real(wp), allocatable :: density(:, :)
+      integer :: k
+
+      call ready_text(text, set_up, error)
+      if (allocated(error)) return
+      associate (system => set_up%system)
+        if (index(text, ball) > 0) then
+          system%state%u(:, 2) = -0.05_wp
+        else
+          where (system%body%body == 2) system%state%u(:, 1) = -0.05_wp
+        end if
+        allocate (density(system%body%n_slots, 2), source=0.0_wp)
+        call view_of(system, 0.0_wp, view)
+        call system%terms%search(view)
+        call system%terms%add_force(view, density)
+        allocate (force(system%body%n_points, 2))
+        do k = 1, system%body%n_points
+          force(k, :) = density(system%body%slot(k), :)*system%body%volume(system%body%slot(k))
+        end do
+      end associate
+    end subroutine forces_of
+
+  end subroutine test_contact
+
   !> The forces of `local`, bit for bit, without it; one horizon, where that is given.
   subroutine test_two_spacings(error)
     type(error_type), allocatable, intent(out) :: error
@@ -809,13 +871,11 @@ contains
     call refuse(grids(8, solid, '', relaxes// &
       & "&relaxation solver = 'dynamic_relaxation' density_matrix = 'chapter' /"), &
       & "&horizon local does not serve density_matrix = 'chapter'")
-    call refuse(grids(8, solid, '', '&time steps = 1 /'//line//"&contact between = 'a', 'b' /"), &
-      & '&horizon local does not serve contact')
     call refuse(grids(8, solid, "family = 'lattice'", relaxes), &
       & 'bonds join bodies on different grids')
-    call refuse(own_grids("&horizon surface_correction = 'none' /"//line//'&time steps = 1 /'// &
-      & line//"&contact between = 'a', 'b' /"), 'lattices of different spacings have horizons '// &
-      & 'of their own, which do not serve contact', '&horizon length gives all points one horizon')
+    call refuse(own_grids("&horizon surface_correction = 'consistent' /"//line//relaxes), &
+      & 'lattices of different spacings have horizons of their own, which do not serve '// &
+      & "surface_correction = 'consistent'", '&horizon length gives all points one horizon')
 
   contains
 

@@ -21,7 +21,7 @@ module pd_base_order
     integer(i8) :: messages = 0_i8            !! in so many messages
     integer(i8) :: sums = 0_i8                !! reductions over all ranks
     real(wp) :: sharing = 0.0_wp              !! time spent with the messages [s]
-    real(wp) :: summing = 0.0_wp              !! with reductions, waiting for other ranks included [s]
+    real(wp) :: summing = 0.0_wp              !! with reductions and waiting for other ranks [s]
   contains
     procedure(all_values), deferred :: add_all       !! each value summed over the ranks
     procedure(all_values), deferred :: take_largest  !! the largest of each value

@@ -69,7 +69,8 @@ module pd_force_contact
     real(wp), allocatable :: normals(:, :)   !! (dim, n_slots) normals of their surfaces then, if
                                              !! the rule is smoothed
     real(wp) :: skin = 0.0_wp                !! [m]
-    real(wp) :: delta = 1.0_wp               !! horizon [m]
+    real(wp) :: delta = 1.0_wp               !! horizon, the largest one of all points [m]
+    real(wp) :: ratio = 0.0_wp               !! horizon over spacing of each point; 0: one horizon
     logical :: follows = .false.             !! it stands behind the term of the normal force of
                                              !! the same rule, and takes what that has found
     type(movement_type) :: movement          !! since the last search
@@ -89,9 +90,11 @@ module pd_force_contact
 contains
 
   !> Contact by a rule: of the bodies' points in their slots.
-  subroutine new_contact(body, delta, rule, part, contact)
+  subroutine new_contact(body, delta, ratio, rule, part, contact)
     type(body_type), intent(in) :: body             !! arranged in slots
-    real(wp), intent(in) :: delta                   !! horizon [m]
+    real(wp), intent(in) :: delta                   !! horizon, the largest one of all points [m]
+    real(wp), intent(in) :: ratio
+      !! horizon over spacing, if points have their own, else 0 [-]
     type(contact_rule_type), intent(in) :: rule     !! who meets whom, and how
     integer, intent(in) :: part                     !! `of_normal_force` or `of_friction`
     type(contact_type), intent(out) :: contact      !! ready to begin
@@ -108,6 +111,7 @@ contains
     contact%part = part
     contact%rule = rule
     contact%delta = delta
+    contact%ratio = ratio
     contact%acts_on_few = .true.
     contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
     contact%side = rule%side(body%body(contact%slots))
@@ -290,8 +294,7 @@ contains
         n = n/norm2(n)
         v = view%v(j, :) - view%v(k, :)
         speed = dot_product(v, n)
-        stiffness = self%rule%stiffness*(constant_of(view, k) + constant_of(view, j))/2/self%delta &
-          & *view%body%volume(j)
+        stiffness = stiffness_of(self, view, k, j)
         critical = 0.0_wp
         if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
           & critical = critical_damping(view, k, j, stiffness)
@@ -348,8 +351,7 @@ contains
         if (.not. patch%touches) cycle
         v = view%v(j, :) - view%v(k, :)
         speed = dot_product(v, n)
-        stiffness = self%rule%stiffness*(constant_of(view, k) + constant_of(view, j))/2/self%delta &
-          & *view%body%volume(j)
+        stiffness = stiffness_of(self, view, k, j)
         critical = 0.0_wp
         if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
           & critical = critical_damping(view, k, j, stiffness*patch%weight)
@@ -441,6 +443,19 @@ contains
       & reach_of = usual_distance*min(body%spacing(k), body%spacing(j))
   end function reach_of
 
+  !> The stiffness of a pair, per volume: s c V_j/delta with the larger horizon of both [N/m4].
+  pure real(wp) function stiffness_of(self, view, k, j) result(stiffness)
+    class(contact_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    integer, intent(in) :: k, j   !! slots
+
+    stiffness = self%rule%stiffness*(constant_of(view, k) + constant_of(view, j))/2/self%delta &
+      & *view%body%volume(j)
+    ! c/delta goes with the horizon to the power of -(dim + 2)
+    if (self%ratio > 0.0_wp) stiffness = stiffness*(self%delta/(self%ratio &
+      & *max(view%body%spacing(k), view%body%spacing(j))))**(view%body%dim + 2)
+  end function stiffness_of
+
   !> The constant of bonds of a point's material: 18 K/(pi delta^4) in 3D [N/m6].
   pure real(wp) function constant_of(view, k) result(c)
     type(term_view_type), intent(in) :: view
@@ -466,18 +481,42 @@ contains
     largest = largest_stiffness(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
-      bound(k) = bound(k) + 2*most_contacts(view%body%dim)*largest
+      bound(k) = bound(k) + 2*most_contacts(view%body%dim)*largest*part_of_largest(self, view, k)
     end do
   end subroutine add_stiffness_bound
 
-  !> The stiffness of a pair of the stiffest material and the largest volume, per volume [N/m4].
+  !> How stiff a point's pairs are at most, over the largest stiffness of all [-]: 1 for one
+  !> horizon. With V_j proportional to h_j^n, h_j^n/max(h_k, h_j)^(n + 2) is largest where both spacings are
+  !> those of the point: it goes with 1/h_k^2.
+  pure real(wp) function part_of_largest(self, view, k) result(part)
+    class(contact_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    integer, intent(in) :: k
+
+    part = 1.0_wp
+    if (self%ratio > 0.0_wp) part = (minval(view%body%spacing(self%slots)) &
+      & /view%body%spacing(k))**2
+  end function part_of_largest
+
+  !> The stiffness of a pair of the stiffest material and the largest volume, per volume [N/m4];
+  !> where points have their own horizons, of two points of the least spacing.
   pure real(wp) function largest_stiffness(self, view) result(stiffness)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
+    real(wp) :: least
     integer :: i
 
     stiffness = self%rule%stiffness*maxval([(constant_of(view, int(self%slots(i))), i=1, &
-      & size(self%slots))])/self%delta*maxval(view%body%volume(self%slots))
+      & size(self%slots))])/self%delta
+    if (self%ratio > 0.0_wp) then
+      associate (dim => view%body%dim, h => view%body%spacing(self%slots))
+        least = minval(h)
+        stiffness = stiffness*maxval(view%body%volume(self%slots)/h**dim)*least**dim &
+          & *(self%delta/(self%ratio*least))**(dim + 2)
+      end associate
+    else
+      stiffness = stiffness*maxval(view%body%volume(self%slots))
+    end if
   end function largest_stiffness
 
   !> The dashpots of damping, or of friction.
@@ -495,7 +534,8 @@ contains
     largest = largest_stiffness(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
-      bound(k) = bound(k) + 2*most_contacts(view%body%dim)*2*part*sqrt(largest*density_of(view, k))
+      bound(k) = bound(k) + 2*most_contacts(view%body%dim)*2*part &
+        & *sqrt(largest*part_of_largest(self, view, k)*density_of(view, k))
     end do
   end subroutine add_damping_bound
 

@@ -43,7 +43,8 @@ module pd_force_touch
     type(contact_rule_type) :: rule
     integer(i4), allocatable :: slots(:)     !! points that may touch, in order
     real(wp), allocatable :: begins(:)       !! gap at which each is pushed [m]
-    real(wp) :: delta = 1.0_wp               !! horizon [m]
+    real(wp) :: delta = 1.0_wp               !! horizon, if points do not have their own [m]
+    real(wp) :: ratio = 0.0_wp               !! horizon over spacing of each point; 0: one horizon
     real(wp) :: skin = 0.0_wp                !! [m]
     logical :: follows = .false.             !! it stands behind the term of the normal force of
                                              !! the same rule, and takes what that has found
@@ -67,9 +68,11 @@ module pd_force_touch
 contains
 
   !> Contact of the points of some bodies with a rigid body.
-  subroutine new_touch(body, delta, rule, touches, obstacle, part, touch)
+  subroutine new_touch(body, delta, ratio, rule, touches, obstacle, part, touch)
     type(body_type), intent(in) :: body             !! arranged in slots
-    real(wp), intent(in) :: delta                   !! horizon [m]
+    real(wp), intent(in) :: delta                   !! horizon, if points do not have their own [m]
+    real(wp), intent(in) :: ratio
+      !! horizon over spacing, if points have their own, else 0 [-]
     type(contact_rule_type), intent(in) :: rule     !! how they meet; its sides do not count
     logical, intent(in) :: touches(:)               !! (bodies) whose points may touch
     integer, intent(in) :: obstacle                 !! number of the rigid body
@@ -86,6 +89,7 @@ contains
     touch%obstacle = obstacle
     touch%rule = rule
     touch%delta = delta
+    touch%ratio = ratio
     touch%slots = pack(body%slot, touches(body%body(body%slot)))
     touch%begins = usual_distance*body%spacing(touch%slots)
     if (rule%distance > 0.0_wp) touch%begins = rule%distance
@@ -299,10 +303,13 @@ contains
     class(touch_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
     integer, intent(in) :: k   !! slot
+    real(wp) :: delta
 
+    delta = self%delta
+    if (self%ratio > 0.0_wp) delta = self%ratio*view%body%spacing(k)
     associate (dim => view%body%dim)
       stiffness = self%rule%stiffness*dim*(dim + 1) &
-        & *view%materials(view%body%material(k))%bulk_modulus/self%delta**2
+        & *view%materials(view%body%material(k))%bulk_modulus/delta**2
     end associate
   end function stiffness_of
 

@@ -49,9 +49,7 @@ contains
         & 'influence function in all materials, are known for the horizon of a bond')
       return
     end do
-    if (size(scene%contacts) > 0) then
-      call refuse('contact', 1, '', 'contact', 'its stiffness is that of one horizon')
-    else if (scene%horizon%surface_correction == 'consistent') then
+    if (scene%horizon%surface_correction == 'consistent') then
       call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'", &
         & "the weights of bonds between different horizons are not solved for; give 'energy' "// &
         & "or 'none'")

@@ -8,6 +8,7 @@ module pd_set_up_rigid_bodies
   use pd_base_text, only: counted, to_text
   use pd_base_vectors, only: cross
   use pd_body_body, only: body_type
+  use pd_family_volume, only: volume_rule_type
   use pd_force_contact, only: contact_rule_type, of_friction, of_normal_force
   use pd_force_obstacle, only: a_box, a_cylinder, a_half_space, a_sphere, obstacle_type
   use pd_force_term, only: term_view_type
@@ -204,11 +205,11 @@ contains
 
   !> Contact of the bodies that a `&contact` names with the rigid body that it names, if there is
   !> one: a term for the normal force and, with friction, one for that.
-  subroutine add_touches(scene, number, body, delta, rule, terms)
+  subroutine add_touches(scene, number, body, rule_of_bonds, rule, terms)
     type(scene_type), intent(in) :: scene           !! a checked scene
     integer, intent(in) :: number                   !! of the `&contact`
     type(body_type), intent(in) :: body             !! its points, arranged in slots
-    real(wp), intent(in) :: delta                   !! horizon [m]
+    type(volume_rule_type), intent(in) :: rule_of_bonds  !! with the horizons of the points
     type(contact_rule_type), intent(in) :: rule     !! of the `&contact`
     type(term_list_type), intent(inout) :: terms    !! with the contacts on return
     type(touch_type) :: touch
@@ -221,10 +222,12 @@ contains
       end do
       do r = 1, size(scene%rigids)
         if (all(names /= scene%rigids(r)%name)) cycle
-        call new_touch(body, delta, rule, touches, r, of_normal_force, touch)
+        call new_touch(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, touches, r, &
+          & of_normal_force, touch)
         call terms%add(touch)
         if (.not. rule%friction > 0.0_wp) cycle
-        call new_touch(body, delta, rule, touches, r, of_friction, touch)
+        call new_touch(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, touches, r, &
+          & of_friction, touch)
         touch%follows = .true.
         call terms%add(touch)
       end do

@@ -3,6 +3,7 @@ module pd_set_up_terms
   use pd_base_kinds, only: wp
   use pd_body_body, only: body_type
   use pd_body_waves, only: longitudinal_speed, shear_speed
+  use pd_family_volume, only: volume_rule_type
   use pd_force_contact, only: contact_rule_type, contact_type, new_contact, of_friction, &
     & of_normal_force
   use pd_force_dashpots, only: new_dashpots
@@ -136,10 +137,10 @@ contains
 
   !> Every `&contact`: a term for the force along the line between points and, with friction, one
   !> for that across it, so that each has its account.
-  subroutine add_contacts_of_scene(scene, body, delta, terms)
+  subroutine add_contacts_of_scene(scene, body, rule_of_bonds, terms)
     type(scene_type), intent(in) :: scene         !! a checked scene
     type(body_type), intent(in) :: body           !! its points, arranged in slots
-    real(wp), intent(in) :: delta                 !! horizon [m]
+    type(volume_rule_type), intent(in) :: rule_of_bonds  !! with the horizons of the points
     type(term_list_type), intent(inout) :: terms  !! with the contacts on return
     type(contact_rule_type) :: rule
     type(contact_type) :: contact
@@ -158,12 +159,15 @@ contains
         if (is_set(group%restitution)) rule%returned = group%restitution**2
         rule%damping = 0.0_wp
         if (is_set(group%damping)) rule%damping = group%damping
-        if (size(scene%rigids) > 0) call add_touches(scene, i, body, delta, rule, terms)
+        if (size(scene%rigids) > 0) call add_touches(scene, i, body, &
+          & rule_of_bonds, rule, terms)
         if (all(rule%side == 0)) cycle
-        call new_contact(body, delta, rule, of_normal_force, contact)
+        call new_contact(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, of_normal_force, &
+          & contact)
         call terms%add(contact)
         if (.not. rule%friction > 0.0_wp) cycle
-        call new_contact(body, delta, rule, of_friction, contact)
+        call new_contact(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, of_friction, &
+          & contact)
         contact%follows = .true.
         call terms%add(contact)
       end associate

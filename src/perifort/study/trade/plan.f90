@@ -17,7 +17,8 @@ module pd_study_trade_plan
   use pd_scene_content_read, only: read_scene_source
   use pd_scene_content_rules, only: find_entry, find_section, rule_fault
   use pd_scene_format_source, only: scan_source, source_fault, source_type, token_type
-  use pd_scene_content_types, only: has_own_horizons, has_refinement, is_lattice, is_set, name_length, path_length, scene_type
+  use pd_scene_content_types, only: has_own_horizons, has_refinement, is_lattice, is_set, &
+    & name_length, path_length, scene_type
   use pd_scene_format_values, only: parse_integer, parse_real
   implicit none (type, external)
   private
