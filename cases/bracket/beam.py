@@ -74,7 +74,7 @@ def three(case, size):
 def judge_beam(case):
     """Ten and twenty points across: within 3 % of the beam, which is what the surfaces of bent
     strips of as many points leave with `surface_correction = 'energy'` (2.1 % in the case patch);
-    the lattices beside each other within 0.1 %, since only how the load is spread differs.
+    the lattices beside each other within 0.1 %, since only how the load is spread differs (README).
     """
     errors = {}
     for size in (2.0, 1.0, 0.5):
