@@ -3,12 +3,15 @@ module test_body_surfaces
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_generate, only: generate_body
   use pd_body_regions, only: in_region
+  use pd_body_surface_crossing, only: crossings_type, find_crossings
   use pd_body_surface_fill, only: fill_cells, gaps_text, new_solid, points_inside, solid_type
   use pd_body_surface_shares, only: share_facets
   use pd_body_surface_stl, only: read_stl_text
+  use pd_body_surface_surface, only: surface_type
   use pd_body_surface_winding, only: new_tree, tree_type, winding_number
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_motion_loads, only: load_of, load_type
@@ -44,6 +47,8 @@ contains
       & new_unittest('winding numbers near a gap', test_winding), &
       & new_unittest('a small gap changes no cell, a large one is refused', test_gap), &
       & new_unittest('corners that differ by rounding are one', test_rounding), &
+      & new_unittest('facets that pass through each other are counted', test_crossings), &
+      & new_unittest('surfaces without crossings have none', test_no_crossings), &
       & new_unittest('the same cells on any number of threads', test_threads), &
       & new_unittest('areas shared among points close the body', test_shares), &
       & new_unittest('pressure and force on sides', test_loads), &
@@ -89,6 +94,123 @@ contains
       call test_failed(error, found%message)
     end if
   end subroutine points_of
+
+  !> The crossings of facets, on one thread and on many.
+  subroutine crossings_of(x, found, error)
+    real(wp), intent(in) :: x(:, :, :)
+    type(crossings_type), intent(out) :: found
+    type(error_type), allocatable, intent(inout) :: error
+    type(crossings_type) :: again
+    type(surface_type) :: surface
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+    integer :: threads
+
+    text = binary_stl(x)
+    call read_stl_text(text, 'made.stl', 1.0_wp, surface, fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+    if (allocated(error)) return
+    threads = omp_get_max_threads()
+    call omp_set_num_threads(1)
+    call find_crossings(surface, found)
+    call omp_set_num_threads(4)
+    call find_crossings(surface, again)
+    call omp_set_num_threads(threads)
+    call expect_true(error, again%n == found%n .and. all(again%first == found%first) .and. &
+      & all(abs(again%place - found%place) <= 0.0_wp), 'the same on any number of threads')
+  end subroutine crossings_of
+
+  !> A facet that leans through another one along a line that is known, a common corner, and boxes.
+  subroutine test_crossings(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(crossings_type) :: found
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    real(wp) :: x(3, 3, 2), v(4), low, high, lean
+    integer :: k, crossed
+
+    crossed = 0
+    do k = 1, 400
+      call random_number(v)
+      x(:, :, 1) = reshape([0, 0, 0, 1, 0, 0, 0, 1, 0], [3, 3])
+      ! at half its height, z = 0, it goes from x = low to high at y = v(3)
+      low = 2.4_wp*v(1) - 0.7_wp
+      high = low + 0.2_wp + v(2)
+      lean = v(4) - 0.5_wp
+      x(:, 1, 2) = [low, v(3) - lean, -1.0_wp] - [high - low, 0.0_wp, 0.0_wp]/2
+      x(:, 2, 2) = [high, v(3) - lean, -1.0_wp] + [high - low, 0.0_wp, 0.0_wp]/2
+      x(:, 3, 2) = [(low + high)/2, v(3) + lean, 1.0_wp]
+      call crossings_of(x, found, error)
+      if (allocated(error)) return
+      ! at y the first facet reaches from 0 to 1 - y
+      if (abs(high) < 1.0e-3_wp .or. abs(low - 1 + v(3)) < 1.0e-3_wp) cycle
+      call expect_true(error, (found%n == 1_i8) .eqv. (high > 0.0_wp .and. low < 1.0_wp - v(3)), &
+        & 'a leaning facet')
+      if (found%n == 0_i8) cycle
+      crossed = crossed + 1
+      call expect_close(error, found%place(2:3), [v(3), 0.0_wp], 2.0e-6_wp, 'where it crosses')
+      call expect_true(error, all(found%first == [1, 2]), 'which facets')
+    end do
+    call expect_true(error, crossed > 50 .and. crossed < 350, 'some cross, some do not')
+    x(:, :, 2) = reshape([0.0_wp, 0.0_wp, 0.0_wp, 0.3_wp, 0.2_wp, 1.0_wp, 0.2_wp, 0.3_wp, &
+      & -1.0_wp], [3, 3])
+    call crossings_of(x, found, error)
+    if (allocated(error)) return
+    call expect_true(error, found%n == 1_i8, 'with a common corner')
+    call crossings_of(joined(box_facets([0.0_wp, 0.0_wp, 0.0_wp], [2.0_wp, 2.0_wp, 2.0_wp]), &
+      & box_facets([0.5_wp, 0.5_wp, 1.0_wp], [1.5_wp, 1.5_wp, 3.0_wp])), found, error)
+    if (allocated(error)) return
+    ! the sides of the upper box, some of its edges through the diagonal of the face
+    call expect_true(error, found%n >= 8_i8 .and. found%n <= 16_i8, 'a box in a face')
+    call expect_close(error, found%place(3), 2.0_wp, 1.0e-6_wp, 'at that face')
+    call write_file('part.stl', ascii_stl(joined(box_facets([0.0_wp, 0.0_wp, 0.0_wp], [2.0_wp, &
+      & 2.0_wp, 2.0_wp]), box_facets([0.5_wp, 0.5_wp, 1.0_wp], [1.5_wp, 1.5_wp, 3.0_wp])), 'box'))
+    call read_scene_text(scene_with('spacing = 0.25'), 'build/surfaces.nml', scene, fault)
+    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    call expect_true(error, index(set_up%warnings%text(), "the body 'part': "// &
+      & to_text(found%n)//' pairs of facets pass through each other, the first at build/part.stl:' &
+      & ) > 0, 'is warned of with its lines')
+  end subroutine test_crossings
+
+  !> Round, turned and several bodies, boxes that touch in a face or have facets in common.
+  subroutine test_no_crossings(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(crossings_type) :: found
+    real(wp), parameter :: a(3) = 0.0_wp, b(3) = 1.0_wp, c(3) = [1.0_wp, 0.25_wp, 0.25_wp], &
+      & d(3) = [2.0_wp, 0.75_wp, 0.75_wp]
+    integer :: k
+
+    do k = 1, 6
+      select case (k)
+      case (1)
+        call crossings_of(torus_facets(1.0_wp, 0.3_wp, 60, 30), found, error)
+      case (2)
+        call crossings_of(turned(joined(torus_facets(1.0_wp, 0.3_wp, 40, 20), ball_facets(&
+          & 0.6_wp, 16))), found, error)
+      case (3)
+        call crossings_of(joined(box_facets(a, b), box_facets(c, d)), found, error)
+      case (4)
+        call crossings_of(turned(joined(box_facets(a, b), box_facets(c, d))), found, error)
+      case (5)
+        call crossings_of(joined(box_facets(a, b), box_facets(a, b)), found, error)
+      case default
+        call crossings_of(turned(joined(box_facets(a, b), reversed(box_facets(b/4, b/2)))), &
+          & found, error)
+      end select
+      if (allocated(error)) return
+      call expect_true(error, found%n == 0_i8, 'no crossing')
+    end do
+    ! the torus through the ball
+    call crossings_of(joined(torus_facets(1.0_wp, 0.3_wp, 40, 20), ball_facets(0.9_wp, 16)), &
+      & found, error)
+    if (allocated(error)) return
+    call expect_true(error, found%n > 40_i8, 'a ball through a torus')
+  end subroutine test_no_crossings
 
   !> Volume, centre, and the second moments about the centre, of points.
   subroutine measure(body, volume, centre, second)
@@ -239,6 +361,7 @@ contains
     end if
     call expect_true(error, set_up%system%body%n_points == 1000, 'a full box')
     call expect_true(error, set_up%warnings%has('shells of surface 1'), 'is warned of')
+    call expect_true(error, .not. set_up%warnings%has('crossings of surface 1'), 'apart')
     call expect_true(error, index(set_up%warnings%text(), 'the first near (3.5, 3.5, 3.5) m') > 0, &
       & 'with its place')
     call expect_true(error, .not. set_up%warnings%has('volume of surface 1'), 'the volume fits')

@@ -1,22 +1,31 @@
-"""bracket.stl: an L of two legs, 10 mm thick and 20 mm wide, with a fillet of 10 mm between them.
+"""bracket.stl: an L of two legs, 10 mm thick and 20 mm wide, with a fillet of 10 mm between them, and
+beam.stl: a straight beam, 40 mm long, 10 mm thick and 10 mm wide.
 
-    python3 make_surface.py [FILE [SEGMENTS]]      SEGMENTS: of the fillet, 24 if not given
+    python3 make_surface.py [FILE [SEGMENTS]]      SEGMENTS: of the fillet, 24 if not given, 0 for
+                                                   the beam
 
-In millimetres. The solids are `wall` (the back, x = 0), `tip` (the end of the horizontal leg, x = 80)
-and `rest`.
+In millimetres. The solids are `wall` (the back, x = 0), `tip` (the end, x = 80 or 40) and `rest`.
 """
 import math
 import sys
 
 WIDTH, THICK, LONG, HIGH, FILLET = 20.0, 10.0, 80.0, 60.0, 10.0
+BEAM_WIDTH, BEAM_LONG = 10.0, 40.0
 
 
 def profile(segments):
-    """The corners of the side in x and z, turning to the left, from (0, 0)."""
+    """The corners of the side in x and z, turning to the left, from (0, 0); of the beam with 0."""
+    if segments == 0:
+        return [(0.0, 0.0), (BEAM_LONG, 0.0), (BEAM_LONG, THICK), (0.0, THICK)]
     centre = THICK + FILLET
     arc = [(centre + FILLET * math.cos(angle), centre + FILLET * math.sin(angle)) for angle in
            (math.pi * (1.5 - 0.5 * k / segments) for k in range(segments + 1))]
     return [(0.0, 0.0), (LONG, 0.0), (LONG, THICK), *arc, (THICK, HIGH), (0.0, HIGH)]
+
+
+def width_of(segments):
+    """The width of the part with that many segments."""
+    return WIDTH if segments else BEAM_WIDTH
 
 
 def area(corners):
@@ -47,15 +56,16 @@ def triangles(corners):
 def solids(segments):
     """Name and triangles, as places in space, of each solid."""
     corners, ring = profile(segments), []
+    width, end = width_of(segments), max(x for x, _ in corners)
     for a, b in zip(corners, corners[1:] + corners[:1]):
         low = [(a[0], 0.0, a[1]), (b[0], 0.0, b[1])]
-        high = [(b[0], WIDTH, b[1]), (a[0], WIDTH, a[1])]
-        name = "wall" if a[0] == b[0] == 0.0 else "tip" if a[0] == b[0] == LONG else "rest"
+        high = [(b[0], width, b[1]), (a[0], width, a[1])]
+        name = "wall" if a[0] == b[0] == 0.0 else "tip" if a[0] == b[0] == end else "rest"
         ring += [(name, (low[0], high[0], low[1])), (name, (low[0], high[1], high[0]))]
     # A turn to the left in x and z faces -y
     for a, b, c in triangles(corners):
         ring.append(("rest", tuple((p[0], 0.0, p[1]) for p in (a, b, c))))
-        ring.append(("rest", tuple((p[0], WIDTH, p[1]) for p in (a, c, b))))
+        ring.append(("rest", tuple((p[0], width, p[1]) for p in (a, c, b))))
     return {name: [facet for its, facet in ring if its == name] for name in ("wall", "tip", "rest")}
 
 

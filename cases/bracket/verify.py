@@ -1,11 +1,12 @@
 """A bracket from a STL file, as a mesh and from shapes: volume, force at the wall, and the bending of
-its arm beside that of a beam.
+its arm beside that of a beam; a cantilever in the same three ways.
 """
 import os
 import subprocess
 import sys
 
 import numpy as np
+from beam import judge_beam
 from common import Case, change
 from make_surface import THICK, WIDTH, LONG, area, profile
 
@@ -26,6 +27,8 @@ def curvature(results):
 
 def main():
     case = Case(__file__, __doc__)
+    if "CASE_PYTHON" not in os.environ:
+        sys.exit("error: start this as ./pf verify bracket: CASE_PYTHON names no python with gmsh")
     volume = area(profile(24)) * WIDTH * 1e-9
     stiffness = MODULUS * WIDTH * 1e-3 * (THICK * 1e-3)**3 / 12
     beam = -FORCE * (LONG * 1e-3 - (BEGIN + END) / 2) / stiffness
@@ -56,6 +59,7 @@ def main():
     case.below("fill = 'centre', 1 mm over 2 mm: error of the curvature [-]",
                (bent["centre", 1.0] - 1) / (bent["centre", 2.0] - 1), 0.5)
     three_ways(case, shown, bent["centre", 1.0], volume, beam)
+    judge_beam(case)
     if case.options.pictures:
         picture(case, shown)
     case.finish()
@@ -75,8 +79,6 @@ def three_ways(case, surface, bent, volume, beam):
     # of the force is 0.5 mm of 70 mm shorter, and the end of a beam 3/2 of that less deflected
     case.below("from shapes: difference of displacements over the largest [-]",
                np.abs(u - v).max() / np.abs(v).max(), 1.1 * 1.5 * 0.5 / (LONG - THICK))
-    if "CASE_PYTHON" not in os.environ:
-        sys.exit("error: start this as ./pf verify bracket: CASE_PYTHON names no python with gmsh")
     subprocess.run([os.environ["CASE_PYTHON"], str(case.folder / "make_mesh.py"),
                     str(case.out / "bracket.msh"), "2"], check=True)
     text = case.scene("bracket.nml").replace("  surface = 'bracket.stl'\n", "").replace(

@@ -2,6 +2,8 @@
 
     python make_meshes.py                    plate.msh and hole.msh, which ship with the case
     python make_meshes.py FILE SIZE          the strip with elements of another size [mm]
+    python make_meshes.py FILE SIZE KIND     the plate of the case plate_tension: KIND triangles, or
+                                             squares
 
 A square plate of triangles, and a strip with a circular hole, at which elements have half the size.
 """
@@ -60,8 +62,33 @@ def write(path, length, width, size, near=None):
     gmsh.finalize()
 
 
+def write_book(path, size, squares):
+    """The book's plate, 1 m x 0.5 m around the origin, of triangles or of squares in rows [mm]."""
+    length, width = 1000.0, 500.0
+    gmsh.initialize()
+    gmsh.option.setNumber("General.Terminal", 0)
+    plate = gmsh.model.occ.addRectangle(0, 0, 0, length, width)
+    gmsh.model.occ.synchronize()
+    for name, curves in name_sides(length, width).items():
+        for curve in curves:
+            along = length if name in ("BOTTOM", "TOP") else width
+            gmsh.model.mesh.setTransfiniteCurve(curve, round(along / size) + 1)
+    if squares:
+        gmsh.model.mesh.setTransfiniteSurface(plate)
+        gmsh.model.mesh.setRecombine(2, plate)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.affineTransform([1, 0, 0, -length / 2, 0, 1, 0, -width / 2, 0, 0, 1, 0])
+    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    gmsh.write(str(path))
+    gmsh.finalize()
+
+
 if __name__ == "__main__":
-    if len(sys.argv) > 2:
+    if len(sys.argv) > 3:
+        write_book(sys.argv[1], float(sys.argv[2]), {"squares": True, "triangles": False}[sys.argv[3]])
+    elif len(sys.argv) > 2:
         write(sys.argv[1], LENGTH, WIDTH, float(sys.argv[2]), float(sys.argv[2]) / 2)
     else:
         folder = Path(__file__).parent

@@ -1,11 +1,8 @@
 """A meshed plate under tension, and a strip with a hole: its stress concentration on meshes of
-several sizes.
+several sizes; the book's plate, meshed.
 """
-import os
-import subprocess
-import sys
-
 import numpy as np
+from book import book_plates, make_mesh
 from common import Case, change
 
 MODULUS, NU, PULL, RADIUS = 200e9, 0.3, 1e6, 5e-3
@@ -48,14 +45,9 @@ def main():
     own = {2.0: concentration(case.run("local_2.0.nml", change(
         case.scene("hole.nml"), "horizon", local=".true.").replace(
             "'hole.msh'", f"'{case.folder}/hole.msh'")), True)}
-    if "CASE_PYTHON" not in os.environ:
-        sys.exit("error: start this as ./pf verify mesh_plate: CASE_PYTHON names no python with "
-                 "gmsh")
     for size in (1.0,) if case.options.quick else (1.0, 0.7, 0.5):
         name = f"hole_{size}"
-        case.out.mkdir(parents=True, exist_ok=True)
-        subprocess.run([os.environ["CASE_PYTHON"], str(case.folder / "make_meshes.py"),
-                        str(case.out / f"{name}.msh"), str(size)], check=True)
+        make_mesh(case, f"{name}.msh", size)
         values[size] = concentration(case.run(f"{name}.nml", change(
             case.scene("hole.nml"), "body", mesh=f"'{name}.msh'")))
         own[size] = concentration(case.run(f"local_{size}.nml", change(change(
@@ -73,6 +65,7 @@ def main():
                errors[0] / errors[-1], 2.0)
     if not case.options.quick:
         case.near("hole: K_t on the finest mesh [-]", values[0.5][0], HOWLAND, relative=0.03)
+    book_plates(case)
     case.finish()
 
 

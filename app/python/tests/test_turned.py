@@ -7,7 +7,7 @@ from unittest import mock
 
 import numpy as np
 import perifort
-from perifort.pictures import cells, elements
+from perifort.pictures import cells, elements, levels
 from perifort.pictures.fields import Clip, View, camera_for, figure_of, surface_of
 
 from .synthetic import lattice, write_results
@@ -59,14 +59,14 @@ class TestTurned(unittest.TestCase):
             points = lattice((7, 5), 2e-3) @ axes + [0.3, -0.2, 0.0]
             part, = cells.parts_of(self.results(points, group(axes[0, :2])))
             self.assertAlmostEqual(part.lattice.spacing, 2e-3)
-            shown = cells.quads(part, points)
+            shown = levels.quads(part, points)
             np.testing.assert_allclose(area_of(shown), 4e-6, rtol=1e-9)
             around = 1e-3 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ axes[:2, :2]
             np.testing.assert_allclose(shown, points[:, None, :2] + around, atol=1e-12)
             # Deformed ones too
             gradient = np.array([[1.02, 0.1], [-0.03, 0.95]])
             moved = points[:, :2] @ gradient.T
-            np.testing.assert_allclose(cells.quads(part, moved), shown @ gradient.T, atol=1e-12)
+            np.testing.assert_allclose(levels.quads(part, moved), shown @ gradient.T, atol=1e-12)
 
     def test_many_cells_are_an_image_without_gaps(self):
         for angle in (3.0, 10.0, 17.0, 22.5, 30.0, 36.0, 40.0, 45.0, 60.0):

@@ -10,6 +10,7 @@ module pd_body_surfaces
   use pd_base_text, only: join, lower_case, nearest_name, to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_body_body, only: body_type, grid_type, lattice_type, skin_type, allocate_points
+  use pd_body_surface_crossing, only: crossings_text
   use pd_body_surface_cut, only: cut_cells, parts_type
   use pd_body_surface_fill, only: fill_cells, gaps_text, points_inside, read_solid, solid_type
   use pd_body_surface_near, only: points_near_facets
@@ -70,6 +71,9 @@ contains
       call move_surface(solid%surface, skin%surface)
       if (.not. present(warnings)) return
       if (len(text) > 0) call warnings%add('gaps of surface '//to_text(number), &
+        & name_of(scene, number)//': '//text, tell=.false.)
+      text = crossings_text(skin%surface)
+      if (len(text) > 0) call warnings%add('crossings of surface '//to_text(number), &
         & name_of(scene, number)//': '//text, tell=.false.)
       if (abs(sum(body%volume) - skin%surface%volume) > much*skin%surface%volume .and. &
         & all(windings <= 1_i1)) call warnings%add('volume of surface '//to_text(number), &

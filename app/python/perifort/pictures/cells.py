@@ -2,7 +2,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,21 @@ from ..scene import Scene
 from .rigid import vector
 
 Array = npt.NDArray[Any]
+# From an axis, a step along it (1 or -1) and numbers of cells: vectors from their points to where
+# next ones would be, infinite where that is not known
+Beside = Callable[[int, int, Array], Array]
 
 
 class Lattice:
     """Points on a grid of one spacing in 1, 2 or 3 dimensions. `place` (n, dimension): whole
     numbers, the cell of each point; `axes` (dimension, dimension): the directions of its rows, those
-    of x, y and z if not given.
+    of x, y and z if not given; `origin` (dimension): where place 0 is along the rows [m].
     """
 
-    def __init__(self, place: Array, spacing: float, axes: Array | None = None) -> None:
+    def __init__(self, place: Array, spacing: float, axes: Array | None = None,
+                 origin: Array | None = None) -> None:
         self.place = place - place.min(axis=0) + 1
+        self.origin = spacing * (place.min(axis=0) - 1) + (0.0 if origin is None else origin)
         self.spacing = spacing
         self.dimension = place.shape[1]
         self.turned = axes is not None
@@ -43,10 +49,26 @@ class Lattice:
         place[:, axis] += step
         return np.asarray(self.number[self._line(place)])
 
-    def edges(self, positions: Array) -> Array:
+    @property
+    def middles(self) -> Array:
+        """The middles of the cells along the rows (n, dimension) at rest [m]."""
+        return np.asarray(self.origin + self.spacing * self.place)
+
+    def cells_at(self, where: Array) -> Array:
+        """The numbers of the cells at positions along the rows (.., dimension) at rest, -1 where
+        there is none.
+        """
+        place = np.rint((where - self.origin) / self.spacing).astype(np.int64)
+        outside = np.any((place < 0) | (place >= self.extents), axis=-1)
+        place[outside] = 0
+        return np.asarray(self.number[np.ravel_multi_index(
+            tuple(np.moveaxis(place, -1, 0)), self.extents)])
+
+    def edges(self, positions: Array, beside: Beside | None = None) -> Array:
         """The edges of the deformed cells (n, direction, component): the distance to the next point
         on that side where the deformation is the smaller one. Across a crack this is the distance
-        on the side of the body; a point that moves alone keeps its square.
+        on the side of the body; a point that moves alone keeps its square. `beside` tells the
+        distance for cells that have no neighbours of their own along an axis.
         """
         n, d = positions.shape
         found = np.empty((n, d, d))
@@ -54,24 +76,29 @@ class Lattice:
             rest = self.spacing * self.axes[axis]
             best = np.tile(rest, (n, 1))
             least = np.full(n, 1.5 * self.spacing)
-            for step in (1, -1):
-                other = self.neighbour(axis, step)
+            others = {step: self.neighbour(axis, step) for step in (1, -1)}
+            alone = np.flatnonzero((others[1] < 0) & (others[-1] < 0))
+            for step, other in others.items():
                 there = other >= 0
                 apart = np.full((n, d), np.inf)
                 apart[there] = step * (positions[other[there]] - positions[there])
+                if beside is not None and len(alone):
+                    apart[alone] = step * beside(axis, step, alone)
                 stretch = np.linalg.norm(apart - rest, axis=1)
                 nearer = stretch < least
                 best[nearer], least[nearer] = apart[nearer], stretch[nearer]
             found[:, axis] = best
         return found
 
-    def corners(self, positions: Array, of: Array | None = None) -> Array:
+    def corners(self, positions: Array, of: Array | None = None,
+                beside: Beside | None = None) -> Array:
         """The corners of the deformed cells (n, 2^dimension, component), in the order of `signs`,
         of all points or those with the numbers `of`. Cells that hang together share their corners,
-        so that no gaps are left; across a crack they do not.
+        so that no gaps are left; across a crack they do not. `beside` as of `edges`.
         """
         of = np.arange(len(positions)) if of is None else of
-        own = positions[:, None] + 0.5 * np.einsum("sa,nac->nsc", self.signs, self.edges(positions))
+        own = positions[:, None] + 0.5 * np.einsum("sa,nac->nsc", self.signs,
+                                                   self.edges(positions, beside))
         # The cells at each corner: at most one in each of the directions
         base = self.place[of][:, None] + (self.signs + 1) // 2
         found = np.zeros((len(of), *own.shape[1:]))
@@ -120,16 +147,19 @@ class Lattice:
         return found
 
 
-@dataclass
+@dataclass(eq=False)
 class Part:
     """Points that are drawn alike: their numbers in the results, their size, and the lattice they
-    are on, None for a cloud; or, of meshes whose elements are known, with these elements.
+    are on, None for a cloud; or, of meshes whose elements are known, with these elements. `coarser`
+    and `finer` are the next levels of a refined lattice.
     """
 
     points: Array
     sizes: Array
     lattice: Lattice | None
     mesh: Cells | None = None
+    coarser: Part | None = field(default=None, repr=False)
+    finer: Part | None = field(default=None, repr=False)
 
 
 def spacing_of(points: Array, dimension: int) -> float:
@@ -149,12 +179,16 @@ def spacing_of(points: Array, dimension: int) -> float:
     return best if best > 0.2 * mean else mean
 
 
-def lattice_of(points: Array, dimension: int, axes: Array | None = None) -> Lattice | None:
+def lattice_of(points: Array, dimension: int, axes: Array | None = None,
+               spacing: float = np.nan) -> Lattice | None:
     """The lattice with rows along `axes`, or along x, y and z, that the points are on, None if they
-    are on none.
+    are on none; of the given spacing [m], or, if it is not a number, of the one they seem to have.
     """
     used = points[:, :dimension] if axes is None else points[:, :dimension] @ axes.T
-    spacing = spacing_of(used, dimension)
+    if np.isnan(spacing):
+        if len(points) < 2:
+            return None
+        spacing = spacing_of(used, dimension)
     at = (used - used.min(axis=0)) / spacing
     place = np.round(at).astype(np.int64)
     # Positions in single precision keep 1e-4 of a spacing
@@ -162,7 +196,7 @@ def lattice_of(points: Array, dimension: int, axes: Array | None = None) -> Latt
         return None
     if len(np.unique(place, axis=0)) < len(place):
         return None
-    return Lattice(place, spacing, axes)
+    return Lattice(place, spacing, axes, used.min(axis=0))
 
 
 def axes_of(results: Results) -> dict[int, Array]:
@@ -185,11 +219,10 @@ def axes_of(results: Results) -> dict[int, Array]:
     return found
 
 
-
 def parts_of(results: Results) -> list[Part]:
-    """The body's points, without layers: on one lattice if they all are, else body by body (and
-    level by level of a refined one), each on its own, which may be turned, or as a cloud. Meshes
-    whose elements are known are one part.
+    """The body's points, without layers: on one lattice if they all are and have cells of one size,
+    else body by body (and level by level of a refined one), each on its own, which may be turned,
+    or as a cloud. Meshes whose elements are known are one part.
     """
     dimension = results.dimension
     inside = np.flatnonzero(results.body)
@@ -200,43 +233,59 @@ def parts_of(results: Results) -> list[Part]:
             results.volume[points] / np.median(results.volume[points])) ** (1 / dimension)
         found.append(Part(points, sizes, None, results.cells))
         inside = inside[~results.cells.of_mesh[inside]]
-        if not len(inside):
-            return found
+    if not len(inside):
+        return found
     turned = axes_of(results)
-    bodies = results.marks.get("body", np.ones(len(results.points), dtype=int))
-    # Of all bodies, if their rows have the same directions
-    axes = [turned.get(int(body)) for body in np.unique(bodies[inside])]
+    marks = np.stack([results.marks.get(name, np.ones(len(results.points)))[inside]
+                      for name in ("body", "level")], axis=1).astype(int)
+    kinds, kind = np.unique(marks, axis=0, return_inverse=True)
+    groups = [inside[kind.ravel() == number] for number in range(len(kinds))]
+    axes = [turned.get(int(body)) for body, _ in kinds]
+    # Of all bodies, if their rows have the same directions and their cells the same size
     alike = all(one is axes[0] or (one is not None and axes[0] is not None
                                    and np.allclose(one, axes[0], rtol=0, atol=1e-12))
                 for one in axes)
-    whole = (lattice_of(results.points[inside], dimension, axes[0])
-             if len(inside) > 1 and alike else None)
+    spacings, typical = spacings_of(results, groups, axes)
+    whole = None
+    if alike and not np.ptp(spacings) > 0.05 * spacings.min():
+        whole = lattice_of(results.points[inside], dimension, axes[0], typical)
     if whole is not None:
         return [*found, Part(inside, np.full(len(inside), whole.spacing), whole)]
-    marks = np.stack([results.marks.get(name, np.zeros(len(results.points)))[inside]
-                      for name in ("body", "level")], axis=1)
-    kinds, kind = np.unique(marks, axis=0, return_inverse=True)
-    for number in range(len(kinds)):
-        points = inside[kind.ravel() == number]
-        lattice = (lattice_of(results.points[points], dimension, turned.get(int(kinds[number][0])))
-                   if len(points) > 1 else None)
+    levels: dict[tuple[int, int], Part] = {}
+    for (body, level), points, rows, spacing in zip(kinds, groups, axes, spacings):
+        lattice = lattice_of(results.points[points], dimension, rows, spacing)
+        if lattice is None and np.isfinite(spacing):
+            # Another body, all of whose cells are cut
+            lattice = lattice_of(results.points[points], dimension, rows)
         if lattice is not None:
             sizes = np.full(len(points), lattice.spacing)
         else:
             volume = results.volume[points]
-            typical = spacing_of(results.points[points] if len(points) > 1
-                                 else results.points[inside], dimension)
-            sizes = typical * (volume / np.median(volume)) ** (1 / dimension)
-        found.append(Part(points, sizes, lattice))
+            apart = spacing_of(results.points[points] if len(points) > 1
+                               else results.points[inside], dimension)
+            sizes = apart * (volume / np.median(volume)) ** (1 / dimension)
+        part = levels[int(body), int(level)] = Part(points, sizes, lattice)
+        found.append(part)
+        coarser = levels.get((int(body), int(level) - 1))
+        if lattice is not None and coarser is not None and coarser.lattice is not None:
+            part.coarser, coarser.finer = coarser, part
     return found
 
 
-def quads(part: Part, positions: Array) -> Array:
-    """The deformed cells (n, 4, 2) of a plane part, corner after corner."""
-    if part.lattice is not None:
-        return part.lattice.corners(positions[:, :2])[:, [0, 2, 3, 1]]
-    corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    return np.asarray(positions[:, None, :2] + corners * part.sizes[:, None, None])
+def spacings_of(results: Results, groups: list[Array],
+                axes: list[Array | None]) -> tuple[Array, float]:
+    """The spacing of each group of points if these are on lattices, and that of the largest group,
+    which follows from the distances of its points. The others are that times the root of the ratio
+    of the volumes: few cells that are left between finer ones may have no neighbours that would
+    tell it. The volume is that of the largest cell, since those at a surface may be cut. Not a
+    number if the largest group is no lattice.
+    """
+    dimension = results.dimension
+    largest = int(np.argmax([len(points) for points in groups]))
+    lattice = lattice_of(results.points[groups[largest]], dimension, axes[largest])
+    own = np.nan if lattice is None else lattice.spacing
+    volumes = np.array([results.volume[points].max() for points in groups])
+    return own * (volumes / volumes[largest]) ** (1 / dimension), own
 
 
 def best_cut(results: Results, values: Array, points: Array) -> int:

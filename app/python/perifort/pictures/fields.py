@@ -18,10 +18,11 @@ from matplotlib.ticker import MaxNLocator
 
 from ..reference import nearest
 from ..results import Results
-from .cells import Lattice, Part, best_cut, lattice_of, parts_of, quads, spacing_of
+from .cells import Lattice, Part, best_cut, parts_of
 from .colours import Colours, colours_of, judged, limits_of, nice_scale, sampled
 from .elements import cut_of, cut_of_lattice, outer_faces, polygons
 from .layout import FONT, Panel, Place, lay_out, write_caption
+from .levels import corners_of, open_faces, quads
 from .rigid import draw_outlines, draw_silhouettes, rigid_bodies
 from .units import Scale, number, scale_of, state_text, words
 
@@ -271,8 +272,8 @@ def draw_panel(axes: Axes, view: View, name: str, output: int, *, bar: bool | Ax
                 corners, cells = polygons(part.mesh, view.nodes(output)[:, :2])
                 _draw_polygons(axes, corners, values_of(results, name, output, "cells")[cells],
                                colours, scale.factor)
-        _draw_cells(axes, [(part, positions[part.points], values[part.points])
-                           for part in view.parts if part.mesh is None], colours, scale.factor)
+        _draw_cells(axes, [(part, values[part.points]) for part in view.parts if part.mesh is None],
+                    positions, colours, scale.factor)
         _label(axes, "xy", frame_of(view, output))
         draw_outlines(axes, rigid_bodies(results, output, view.scale), (0, 1))
         if bar:
@@ -304,16 +305,16 @@ def _draw_line(axes: Axes, view: View, name: str, values: Array) -> None:
     tidy(axes)
 
 
-def _draw_cells(axes: Axes, parts: Sequence[tuple[Part, Array, Array]], colours: Colours,
-                factor: float) -> None:
+def _draw_cells(axes: Axes, parts: Sequence[tuple[Part, Array]], positions: Array,
+                colours: Colours, factor: float) -> None:
     """Cells as polygons without edges that overlap by a hair, so that no lines stay between them;
-    many cells as an image.
+    many cells as an image. `positions` are those of all points.
     """
     norm = Normalize(factor * colours.low, factor * colours.high)
     cmap = _map(colours)
-    for part, positions, values in parts:
+    for part, values in parts:
         if len(values) > MOST_CELLS:
-            _draw_image(axes, part, positions, factor * values, norm, cmap,
+            _draw_image(axes, part, positions[part.points], factor * values, norm, cmap,
                         colours.map == "magma_r")
             continue
         _draw_polygons(axes, quads(part, positions), values, colours, factor)
@@ -469,6 +470,10 @@ def surface_of(view: View, name: str, output: int, camera: Camera,
     results = view.results
     values = values_of(results, name, output)
     positions = view.positions(output)
+    kept = np.ones(len(results.points), dtype=bool)
+    if clip is not None:
+        before = results.points[:, clip.axis] - position_of(view, clip)
+        kept = before * np.sign(camera.eye[clip.axis]) <= 0.01 * view.spacing
     found, shades = [], []
     for part in view.parts:
         if part.mesh is not None:
@@ -482,23 +487,19 @@ def surface_of(view: View, name: str, output: int, camera: Camera,
             found.append(faces_found)
             shades.append(values_of(results, name, output, "cells")[owners])
             continue
-        kept = np.ones(len(part.points), dtype=bool)
-        if clip is not None:
-            plane = position_of(view, clip)
-            before = results.points[part.points, clip.axis] - plane
-            kept = before * np.sign(camera.eye[clip.axis]) <= 0.01 * view.spacing
         if part.lattice is None:
-            half = 0.5 * part.sizes[kept, None, None] * np.array(
+            own = kept[part.points]
+            half = 0.5 * part.sizes[own, None, None] * np.array(
                 [-camera.right - camera.up, camera.right - camera.up, camera.right + camera.up,
                  camera.up - camera.right])
-            found.append(positions[part.points[kept]][:, None] + half)
-            shades.append(values[part.points[kept]])
+            found.append(positions[part.points[own]][:, None] + half)
+            shades.append(values[part.points[own]])
             continue
-        faces = part.lattice.faces(kept)
+        faces = open_faces(part, kept, results.points, positions)
         used = np.unique(np.concatenate([cells for cells, _ in faces]))
         row = np.full(len(part.points), -1)
         row[used] = np.arange(len(used))
-        corners = part.lattice.corners(positions[part.points], used)
+        corners = corners_of(part, positions, used)
         for cells, around in faces:
             found.append(corners[row[cells]][:, around])
             shades.append(values[part.points[cells]])
@@ -508,9 +509,12 @@ def surface_of(view: View, name: str, output: int, camera: Camera,
 def position_of(view: View, clip: Clip) -> float:
     """Where the plane of a cut is: as given, or in the middle of the body."""
     along = view.results.points[view.results.body, clip.axis]
-    middle = 0.5 * float(along.min() + along.max())
     if clip.at is None:
-        return middle
+        # Of the cells, which may be larger on one side than on the other
+        ends = [view.results.points[part.points, clip.axis] + side * (
+            0.5 * part.sizes if part.lattice is None else part.lattice.reach[clip.axis])
+            for part in view.parts for side in (-1, 1)]
+        return 0.5 * float(min(e.min() for e in ends) + max(e.max() for e in ends))
     if not along.min() - view.reach <= clip.at <= along.max() + view.reach:
         raise ValueError(f"the cut at {'xyz'[clip.axis]} = {clip.at:g} m misses the body, which "
                          f"lies between {along.min():.6g} and {along.max():.6g} m")
@@ -578,6 +582,7 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
     # x to the right where it lies in the plane, z upwards
     shown = [c for c in range(3) if c != clip.axis]
     parts = []
+    cuts: dict[int, Part] = {}
     colours = view.colours(name)
     scale = scale_of(unit_of(results, name), [colours.low, colours.high])
     for part in view.parts:
@@ -600,12 +605,18 @@ def draw_cut(axes: Axes, view: View, name: str, output: int, clip: Clip,
             # A plane between two layers takes one of them
             layer = part.lattice.place[near, clip.axis]
             near = near[layer == layer.min()]
-            flat = Lattice(part.lattice.place[near][:, shown], part.lattice.spacing)
+            flat = Lattice(part.lattice.place[near][:, shown], part.lattice.spacing,
+                           origin=part.lattice.origin[shown])
         else:
             flat = None
         cut = Part(part.points[near], part.sizes[near], flat)
-        parts.append((cut, positions[cut.points][:, shown], values[cut.points]))
-    _draw_cells(axes, parts, colours, scale.factor)
+        # Levels stand in their order
+        cut.coarser = cuts.get(id(part.coarser))
+        if cut.coarser is not None:
+            cut.coarser.finer = cut
+        cuts[id(part)] = cut
+        parts.append((cut, values[cut.points]))
+    _draw_cells(axes, parts, positions[:, shown], colours, scale.factor)
     limits = cut_frame(view, output, clip)
     unit = _label(axes, "".join("xyz"[c] for c in shown), limits)
     draw_outlines(axes, rigid_bodies(results, output, view.scale), shown, plane)

@@ -149,7 +149,7 @@ contains
           facets%low(:, node) = min(facets%low(:, 2*node), facets%low(:, 2*node + 1))
           facets%high(:, node) = max(facets%high(:, 2*node), facets%high(:, 2*node + 1))
         else
-          call range_of(facets%tree, node, level, first, last)
+          call range_of(size(facets%tree%facet), node, level, first, last)
           do c = 1, 3
             facets%low(c, node) = minval(facets%x(c, :, first:last))
             facets%high(c, node) = maxval(facets%x(c, :, first:last))
@@ -256,7 +256,7 @@ contains
       top = top - 1
       if (bounds(top + 1) >= best) cycle
       if (level == facets%tree%levels) then
-        call range_of(facets%tree, node, level, first, last)
+        call range_of(size(facets%tree%facet), node, level, first, last)
         do i = first, last
           call nearest_of_facet(facets%x(:, :, i), facets%normal(:, i), place, found, at)
           square = sum((place - found)**2)

@@ -7,7 +7,7 @@ module pd_body_surface_winding
   use pd_body_surface_surface, only: area_vector, centre_of, corners_of, surface_type
   implicit none (type, external)
   private
-  public :: tree_type, new_tree, range_of, winding_number
+  public :: tree_type, new_tree, winding_number, sort_along_curve, levels_of, range_of
 
   integer, parameter :: leaf = 8             !! facets of the smallest nodes
   real(wp), parameter :: far = 2.5_wp        !! radii from where a node is a dipole
@@ -30,21 +30,11 @@ contains
   subroutine new_tree(surface, tree)
     type(surface_type), intent(in) :: surface  !! finished, with a facet or more
     type(tree_type), intent(out) :: tree       !! ready for `winding_number`
-    integer(i8), allocatable :: key(:)
-    real(wp) :: weight, total, vector(3), x(3, 3), size_of_box
+    real(wp) :: weight, total, vector(3), x(3, 3)
     integer :: f, k, level, first, last, i, nodes
 
-    allocate (key(surface%n_facets), tree%facet(surface%n_facets))
-    size_of_box = max(maxval(surface%high - surface%low), tiny(1.0_wp))
-    do f = 1, surface%n_facets
-      key(f) = place_on_curve((centre_of(surface, f) - surface%low)/size_of_box)
-      tree%facet(f) = int(f, i4)
-    end do
-    call sort_by_key(key, tree%facet)
-    tree%levels = 0
-    do while (ishft(surface%n_facets, -tree%levels) > leaf)
-      tree%levels = tree%levels + 1
-    end do
+    call sort_along_curve(surface, tree%facet)
+    tree%levels = levels_of(surface%n_facets)
     nodes = 2**(tree%levels + 1) - 1
     allocate (tree%vector(3, nodes), tree%centre(3, nodes), source=0.0_wp)
     allocate (tree%radius(nodes), source=0.0_wp)
@@ -52,7 +42,7 @@ contains
       !$omp parallel do default(none) schedule(static) shared(surface, tree, level) &
       !$omp private(k, first, last, total, weight, vector, x, i, f)
       do k = 2**level, 2**(level + 1) - 1
-        call range_of(tree, k, level, first, last)
+        call range_of(surface%n_facets, k, level, first, last)
         total = 0.0_wp
         do i = first, last
           f = tree%facet(i)
@@ -76,15 +66,42 @@ contains
     end do
   end subroutine new_tree
 
-  !> The range of facets of a node.
-  pure subroutine range_of(tree, node, level, first, last)
-    type(tree_type), intent(in) :: tree    !! of a surface
-    integer, intent(in) :: node            !! its number, from 1
-    integer, intent(in) :: level           !! on which it is, from 0
-    integer, intent(out) :: first, last    !! places in the order of the curve; none if first > last
-    integer(i8) :: n, place
+  !> The facets in the order in which a curve that fills space passes their centres.
+  subroutine sort_along_curve(surface, facet)
+    type(surface_type), intent(in) :: surface            !! finished, with a facet or more
+    integer(i4), allocatable, intent(out) :: facet(:)    !! (facets) their numbers
+    integer(i8), allocatable :: key(:)
+    real(wp) :: size_of_box
+    integer :: f
 
-    n = size(tree%facet)
+    allocate (key(surface%n_facets), facet(surface%n_facets))
+    size_of_box = max(maxval(surface%high - surface%low), tiny(1.0_wp))
+    do f = 1, surface%n_facets
+      key(f) = place_on_curve((centre_of(surface, f) - surface%low)/size_of_box)
+      facet(f) = int(f, i4)
+    end do
+    call sort_by_key(key, facet)
+  end subroutine sort_along_curve
+
+  !> The last level of a tree, whose nodes have few facets.
+  pure integer function levels_of(n) result(levels)
+    integer, intent(in) :: n  !! facets
+
+    levels = 0
+    do while (ishft(n, -levels) > leaf)
+      levels = levels + 1
+    end do
+  end function levels_of
+
+  !> The range of sorted facets of a node.
+  pure subroutine range_of(n, node, level, first, last)
+    integer, intent(in) :: n            !! facets
+    integer, intent(in) :: node         !! of the tree, 1 at the top
+    integer, intent(in) :: level        !! of the node, 0 at the top
+    integer, intent(out) :: first       !! sorted facet, from 1
+    integer, intent(out) :: last        !! sorted facet
+    integer(i8) :: place
+
     place = node - 2_i8**level
     first = int(n*place/2_i8**level) + 1
     last = int(n*(place + 1)/2_i8**level)
@@ -157,7 +174,7 @@ contains
         if (distance > 0.0_wp) winding = winding + dot_product(tree%vector(:, node), r) &
           & /(4*pi*distance**3)
       else if (level == tree%levels) then
-        call range_of(tree, node, level, first, last)
+        call range_of(size(tree%facet), node, level, first, last)
         do i = first, last
           winding = winding + solid_angle(corners_of(surface, int(tree%facet(i))), place)/(4*pi)
         end do
