@@ -486,8 +486,8 @@ contains
   end subroutine add_stiffness_bound
 
   !> How stiff a point's pairs are at most, over the largest stiffness of all [-]: 1 for one
-  !> horizon. With V_j proportional to h_j^n, h_j^n/max(h_k, h_j)^(n + 2) is largest where both spacings are
-  !> those of the point: it goes with 1/h_k^2.
+  !> horizon. With V_j proportional to h_j^n, h_j^n/max(h_k, h_j)^(n + 2) is largest where both
+  !> spacings are those of the point: it goes with 1/h_k^2.
   pure real(wp) function part_of_largest(self, view, k) result(part)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
