@@ -152,11 +152,12 @@ def show(folder, options):
             off = max(off, abs(sent / formula - 1))
         print(f"| {'strong' if path == strong else 'weak'} | {ranks} | {threads} | {seconds*1e3:.2f} | "
               f"{ideal/seconds:.2f} | {sent:.0f} | {formula:.0f} | {messages:.1f} |", flush=True)
-    # what a copy costs beside its bytes: by the runs on ranks that have a core each
-    costs = [max(0.0, (found[path, p, 1][0] - alone * (1 if path == strong else p) / p)
-             / (halo_of(path, p) / p)) for path, p, _ in rows if 1 < p <= (os.cpu_count() or 1)]
-    of_copy = statistics.median(costs) if costs else 0.0
-    print(f"\nbond: {of_bond*1e9:.2f} ns; copy: {of_copy*1e9:.0f} ns a step with its messages on this machine")
+    # What a copy costs beside its bytes: what ranks with a core each take longer than as many threads, which share
+    # the memory, too; at least half of its bonds, which the rank computes
+    costs = [(found[strong, p, 1][0] - found[strong, 1, p][0]) / (halo_of(strong, p) / p)
+             for p in numbers if p <= (os.cpu_count() or 1)]
+    of_copy = max([122 / 2 * of_bond, *costs])
+    print(f"\nbond: {of_bond*1e9:.2f} ns; copy: {of_copy*1e9:.0f} ns a step")
     print(f"\nExtrapolation, not measured: efficiency of cubes on clusters by that, a rank on each core, "
           f"{CORES_OF_A_NODE} cores to a node, for networks of\n")
     print("| points | cores | " + " | ".join(name for name, _, _ in NETWORKS) + " |")
