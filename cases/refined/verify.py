@@ -34,8 +34,7 @@ def hole(case):
               refined.field("stress_yy").max() / PULL, fine.field("stress_yy").max() / PULL, relative=0.01)
     case.near("hole: stress over 1 mm beside it over the load [-]", ahead(refined), ahead(fine),
               relative=0.01)
-    times(case, "hole", "plate_hole", "fine_hole", 0.2,
-          "lists take longer for a bond than lattices")
+    times(case, "hole", "plate_hole", "fine_hole", 0.2)
     return refined
 
 
@@ -52,17 +51,20 @@ def crack(case):
     case.near("crack: dissipated energy [J]", refined.history["dissipated_energy"][-1],
               fine.history["dissipated_energy"][-1], relative=0.05)
     times(case, "crack", "plate_crack", "fine_crack", 0.2,
-          "lists take longer for a bond, and all points take the step of the finest")
+          "bonds between levels take longer, and all points take the step of the finest")
     return refined
 
 
-def times(case, what, refined, fine, target, reason):
-    """The ratio of the times of two runs, if both were made now."""
+def times(case, what, refined, fine, target, reason=""):
+    """The ratio of the times of two runs, if both were made now; with a reason the target is known to be missed."""
     if refined not in case.run_times or fine not in case.run_times:
         return
     ratio = case.run_times[refined] / case.run_times[fine]
-    case.not_met(f"{what}: time over that of fine points everywhere, 1 thread [-]", ratio, target,
-                 ratio <= target, reason)
+    name = f"{what}: time over that of fine points everywhere, 1 thread [-]"
+    if reason:
+        case.not_met(name, ratio, target, ratio <= target, reason)
+    else:
+        case.below(name, ratio, target)
 
 
 def pulse(case, dim, levels):
