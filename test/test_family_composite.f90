@@ -1,5 +1,6 @@
 !> Composite families: which bodies have one, and that they compute what a list of all bonds does.
 module test_family_composite
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, i1
   use pd_body_body, only: gather
@@ -10,10 +11,12 @@ module test_family_composite
   use pd_force_reference, only: reference_force
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_static_relaxation, only: run_relaxation
+  use pd_motion_system, only: system_type
   use pd_output_results_files, only: make_directory
   use pd_output_results_sink, only: sink_type
   use pd_scene_content_types, only: scene_type, unset
   use pd_set_up_prepare, only: set_up_type
+  use pd_study_limits_vibration, only: free_body
   use bodies, only: box_scene, diary_type, expect_true, noise, ready, shake
   use comparisons, only: expect_close, max_abs
   use force_subjects, only: some_gradient, spacing
@@ -36,6 +39,7 @@ contains
       & new_unittest('bonds are counted and listed as in a list', test_bonds), &
       & new_unittest('forces agree with the theory point by point', test_forces), &
       & new_unittest('a crack through the joint grows as in a list', test_crack), &
+      & new_unittest('cracks cut the bonds that they cut in a list', test_cuts), &
       & new_unittest('static equilibrium is that of a list', test_static), &
       & new_unittest('a cloud beside a lattice moves as in a list', test_cloud), &
       & new_unittest('a run in pieces has the same bits', test_pieces)]
@@ -287,6 +291,57 @@ contains
       end do
     end do
   end subroutine test_crack
+
+  !> Bonds of points that lie far apart share bytes of the list: cutting on several threads must not
+  !> lose any. The free twin, on which limits are measured, has the same cuts.
+  subroutine test_cuts(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: composite, list
+    type(system_type) :: twin
+    type(fault_type), allocatable :: fault
+    integer :: before, i
+
+    call two_bodies(2, .true., scene)
+    deallocate (scene%cracks)
+    allocate (scene%cracks(1))
+    scene%cracks(1)%from(:2) = spacing*[16.1_wp, -1.0_wp]
+    scene%cracks(1)%to(:2) = spacing*[16.2_wp, 9.1_wp]
+    before = omp_get_max_threads()
+    call omp_set_num_threads(4)
+    do i = 1, 5
+      call ready(scene, composite, error)
+      if (allocated(error)) exit
+      scene%horizon%family = 'list'
+      call ready(scene, list, error)
+      scene%horizon%family = 'automatic'
+      if (allocated(error)) exit
+      call expect_true(error, list%cut > 100, 'the crack cuts little')
+      call expect_true(error, composite%cut == list%cut, 'cut bonds')
+      call expect_close(error, sum(composite%system%state%damage), sum(list%system%state%damage), &
+        & of_order*sum(list%system%state%damage), 'damage')
+    end do
+    if (.not. allocated(error)) call free_body(composite%system, 0.0_wp, 1.0_wp, twin, fault)
+    call omp_set_num_threads(before)
+    if (allocated(fault)) call test_failed(error, fault%message)
+    if (allocated(error)) return
+    call expect_close(error, sum(intact_of(twin)), sum(intact_of(composite%system)), 0.0_wp, &
+      & 'intact bonds of the twin')
+  end subroutine test_cuts
+
+  !> Intact bonds of each slot.
+  function intact_of(system) result(number)
+    type(system_type), intent(in) :: system
+    real(wp) :: number(system%body%n_slots)
+    type(bonds_type) :: bonds
+    integer :: k
+
+    call allocate_bonds(system%family, bonds)
+    do k = 1, system%body%n_slots
+      call system%family%bonds_of(k, bonds)
+      number(k) = count(bonds%intact(:bonds%n))
+    end do
+  end function intact_of
 
   subroutine test_static(error)
     type(error_type), allocatable, intent(out) :: error

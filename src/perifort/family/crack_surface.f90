@@ -41,7 +41,7 @@ contains
     reach = family%rule%delta + 2*maxval(body%spacing, mask=body%point > 0)
     call sort_facets(surface, reach, cubes)
     !$omp parallel default(none) shared(surface, body, family, cubes, reach) private(bonds, k, i) &
-    !$omp reduction(+:cut)
+    !$omp reduction(+:cut) if(.not. family%bytes_are_shared())
     call allocate_bonds(family, bonds)
     ! chunks of whole groups, whose bonds one thread must break
     !$omp do schedule(dynamic, 256)

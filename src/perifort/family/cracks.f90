@@ -92,7 +92,8 @@ contains
     end do
     do c = 1, size(pieces)
       crack = pieces(c)
-      !$omp parallel default(none) shared(crack, body, family) private(bonds, k, i) reduction(+:cut)
+      !$omp parallel default(none) shared(crack, body, family) private(bonds, k, i) &
+      !$omp reduction(+:cut) if(.not. family%bytes_are_shared())
       call allocate_bonds(family, bonds)
       ! chunks of whole groups, whose bonds one thread must break
       !$omp do schedule(dynamic, 256)
@@ -124,7 +125,7 @@ contains
 
     parted = 0_i8
     !$omp parallel default(none) shared(side, body, family) private(bonds, k, i, mine, its) &
-    !$omp reduction(+:parted)
+    !$omp reduction(+:parted) if(.not. family%bytes_are_shared())
     call allocate_bonds(family, bonds)
     !$omp do schedule(dynamic, 256)
     do k = 1, body%n_slots

@@ -10,10 +10,12 @@ module pd_study_limits_vibration
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never, new_material
   use pd_family_family, only: bonds_type, allocate_bonds
+  use pd_family_composite, only: composite_family_type, composite_suits, new_composite_family
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
+  use pd_force_composite, only: prepare_composite
   use pd_force_generic_bonds, only: begin_laws
   use pd_force_model, only: give_horizons, model_type, new_model
   use pd_force_weights, only: build_weights
@@ -56,8 +58,11 @@ contains
     type(material_type), allocatable :: materials(:)
     type(lattice_family_type), allocatable :: lattice
     type(list_family_type), allocatable :: list
+    type(composite_family_type), allocatable :: composite
     type(volume_rule_type) :: rule
-    logical :: cut
+    character(:), allocatable :: reason
+    logical, allocatable :: listed(:)
+    logical :: cut, suits
 
     call copy_points(system%body, shift, factor, twin%body)
     rule = system%family%rule
@@ -76,6 +81,13 @@ contains
       allocate (list)
       call new_list_family(twin%body, rule, list)
       call move_alloc(list, twin%family)
+    type is (composite_family_type)
+      allocate (composite)
+      call composite_suits(twin%body, rule, suits, reason, listed)
+      if (.not. suits) call internal_fault('a twin of another kind: '//reason)
+      call new_composite_family(twin%body, rule, listed, cut, composite, error)
+      if (allocated(error)) return
+      call move_alloc(composite, twin%family)
     class default
       call internal_fault('free_body does not know a kind of family')
     end select
@@ -99,6 +111,8 @@ contains
       call build_weights(family, twin%model, twin%workspace%lattice)
     type is (list_family_type)  ! its first pass prepares the workspace
       continue
+    type is (composite_family_type)
+      call prepare_composite(family, twin%model, twin%workspace)
     class default
       call internal_fault('free_body does not know a kind of family')
     end select
