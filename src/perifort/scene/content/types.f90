@@ -158,7 +158,7 @@ contains
   !> Whether all bodies are lattices, whose spacings differ, with horizons by a ratio.
   pure logical function has_different_grids(scene)
     type(scene_type), intent(in) :: scene  !! any scene
-    real(wp), parameter :: same = 1.0e-9_wp
+    real(wp), parameter :: same = 1.0e-6_wp  ! as cells may be off from cubes by digits of corners
     real(wp) :: spacing, least, most
     integer :: i
 
