@@ -9,9 +9,9 @@ module force_subjects
   use pd_law_laws, only: all_laws, law_item_type, law_table_type
   use pd_law_material, only: material_type, new_material
   use pd_family_cracks, only: cut_bonds
-  use pd_family_composite, only: composite_family_type, composite_suits, new_composite_family
+  use pd_family_composite, only: composite_family_type, new_composite_family
   use pd_family_family, only: family_type
-  use pd_family_lattice, only: lattice_family_type, new_lattice_family
+  use pd_family_lattice, only: find_listed, lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type, volume_none, volume_linear, &
@@ -85,9 +85,7 @@ contains
     type(lattice_family_type), allocatable :: lattice
     type(composite_family_type), allocatable :: composite
     type(fault_type), allocatable :: fault
-    character(:), allocatable :: reason
     logical, allocatable :: listed(:)
-    logical :: suits
 
     select case (kind)
     case ('list', 'tables')
@@ -99,7 +97,7 @@ contains
     case ('composite')
       call part_grids(body)
       allocate (composite)
-      call composite_suits(body, rule, suits, reason, listed)
+      call find_listed(body, rule, listed)
       call new_composite_family(body, rule, listed, breakable, composite, fault)
       call move_alloc(composite, family)
     case default

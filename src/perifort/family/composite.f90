@@ -7,11 +7,10 @@ module pd_family_composite
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_text, only: to_text
   use pd_body_body, only: allocate_points, body_type
-  use pd_family_cells, only: cells_type, points_across, sort_into_cells
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
-  use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
+  use pd_family_lattice, only: grids_fit, lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
-  use pd_family_volume, only: reach, volume_rule_type
+  use pd_family_volume, only: volume_rule_type
   implicit none (type, external)
   private
   public :: composite_family_type, composite_suits, new_composite_family
@@ -39,34 +38,22 @@ contains
 
   !> Whether the grids of a body can have lattices that a list joins, and few enough points have
   !> bonds in that. Otherwise `reason` says why not.
-  subroutine composite_suits(body, rule, suits, reason, listed)
+  subroutine composite_suits(body, rule, listed, suits, reason)
     type(body_type), intent(in) :: body         !! in point order, not yet arranged in slots
     type(volume_rule_type), intent(in) :: rule  !! how far families reach
+    logical, intent(in) :: listed(:)            !! (n_points) from `find_listed`
     logical, intent(out) :: suits               !! a composite family can be made
     character(:), allocatable, intent(out) :: reason
       !! why not, without a full stop; empty if it suits
-    logical, allocatable, intent(out) :: listed(:)
-      !! (n_points) whether a point has bonds in the list
-    type(cells_type) :: cells
-    real(wp), allocatable :: half_reach(:)
-    integer :: k
 
-    allocate (listed(body%n_points), source=.true.)
     suits = .false.
-    reason = 'no point is on a grid'
-    if (all(body%grid == 0)) return
-    allocate (half_reach(body%n_points))
-    do k = 1, body%n_points
-      half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
-    end do
-    call sort_into_cells(body%x, 2*maxval(half_reach), cells)
-    call points_across(body%x, half_reach, cells, body%grid, listed)
-    listed = listed .or. body%grid == 0
-    if (count(listed) > most_listed*body%n_points) then
+    if (all(body%grid == 0)) then
+      reason = 'no point is on a grid'
+    else if (count(listed) > most_listed*body%n_points) then
       reason = 'too many points have bonds beyond their grid'
-      return
+    else
+      call grids_fit(body, rule, suits, reason)
     end if
-    call lattice_suits(body, rule, suits, reason, joined=.true.)
   end subroutine composite_suits
 
   !> Families of a body that `composite_suits`; the body is arranged in slots: those of its grids,
@@ -75,7 +62,7 @@ contains
     type(body_type), intent(inout) :: body
       !! in point order; arranged in the slots of the family on return
     type(volume_rule_type), intent(in) :: rule         !! volume correction and horizon
-    logical, intent(in) :: listed(:)                   !! (n_points) from `composite_suits`
+    logical, intent(in) :: listed(:)                   !! (n_points) from `find_listed`
     logical, intent(in) :: breakable                   !! bonds may break or be cut
     type(composite_family_type), intent(out) :: family !! whole, all bonds intact
     type(error_type), allocatable, intent(out) :: error

@@ -29,7 +29,7 @@ module pd_family_lattice
   implicit none (type, external)
   private
   public :: lattice_family_type, offsets_type, new_lattice_family, lattice_suits, use_double, &
-    & grid_at, both_ends
+    & grids_fit, find_listed, grid_at, both_ends
 
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers
@@ -64,26 +64,37 @@ module pd_family_lattice
 contains
 
   !> Whether lattice families are possible for a body in point order: every point on a grid, grids
-  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not. In a
-  !> composite family a list has the bonds between grids and those of points on none.
-  subroutine lattice_suits(body, rule, suits, reason, joined)
+  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not.
+  subroutine lattice_suits(body, rule, suits, reason, listed)
     type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
     type(volume_rule_type), intent(in) :: rule        !! how far families reach
     logical, intent(out) :: suits                     !! a lattice family can be made
     character(:), allocatable, intent(out) :: reason
       !! why not, without a full stop; empty if it suits
-    logical, intent(in), optional :: joined
-      !! a list joins the grids; absent: none does
-    real(wp) :: room
-    logical :: alone
-    integer :: g
+    logical, allocatable, intent(out) :: listed(:)    !! (n_points) as `find_listed` has them
 
     suits = .false.
+    call find_listed(body, rule, listed)
+    if (any(body%grid == 0)) then
+      reason = 'some points are a cloud, a mesh or cut cells'
+    else if (any(listed)) then
+      reason = 'bonds join bodies on different grids'
+    else
+      call grids_fit(body, rule, suits, reason)
+    end if
+  end subroutine lattice_suits
+
+  !> Whether the grids of a body are filled reasonably and have room for their slots.
+  subroutine grids_fit(body, rule, suits, reason)
+    type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
+    type(volume_rule_type), intent(in) :: rule        !! how far families reach
+    logical, intent(out) :: suits                     !! they have
+    character(:), allocatable, intent(out) :: reason
+      !! why not, without a full stop; empty if it suits
+    real(wp) :: room
+    integer :: g
+
     reason = ''
-    alone = .true.
-    if (present(joined)) alone = .not. joined
-    if (alone) call look_across(body, rule, reason)
-    if (reason /= '') return
     room = 0.0_wp
     do g = 1, size(body%grids)
       if (any(body%grid == g)) room = room + product(real(extent(body, g), wp))
@@ -100,31 +111,29 @@ contains
     suits = room <= most_slots
     if (.not. suits) reason = 'with its padding the grid has '//to_text(room, 3)// &
       & ' cells, more than '//to_text(most_slots)
-  end subroutine lattice_suits
+  end subroutine grids_fit
 
-  !> Why a lattice alone cannot have all bonds of a body; `reason` is empty if it can.
-  subroutine look_across(body, rule, reason)
-    type(body_type), intent(in) :: body
-    type(volume_rule_type), intent(in) :: rule
-    character(:), allocatable, intent(out) :: reason
+  !> The points of a body that a lattice alone cannot serve: those with bonds to points of another
+  !> grid, and those on none.
+  subroutine find_listed(body, rule, listed)
+    type(body_type), intent(in) :: body           !! in point order, not yet arranged in slots
+    type(volume_rule_type), intent(in) :: rule    !! how far families reach
+    logical, allocatable, intent(out) :: listed(:)  !! (n_points) whether a point is one
     type(cells_type) :: cells
     real(wp), allocatable :: half_reach(:)
-    logical, allocatable :: across(:)
     integer :: k
 
-    reason = ''
-    if (any(body%grid == 0)) then
-      reason = 'some points are a cloud, a mesh or cut cells'
-    else if (any(body%grid /= body%grid(1))) then
-      allocate (half_reach(body%n_points), across(body%n_points))
-      do k = 1, body%n_points
-        half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
-      end do
-      call sort_into_cells(body%x, 2*maxval(half_reach), cells)
-      call points_across(body%x, half_reach, cells, body%grid, across)
-      if (any(across)) reason = 'bonds join bodies on different grids'
-    end if
-  end subroutine look_across
+    allocate (listed(body%n_points))
+    listed = body%grid == 0
+    if (all(body%grid == body%grid(1))) return
+    allocate (half_reach(body%n_points))
+    do k = 1, body%n_points
+      half_reach(k) = reach(rule, body%spacing(k), body%dim)/2
+    end do
+    call sort_into_cells(body%x, 2*maxval(half_reach), cells)
+    call points_across(body%x, half_reach, cells, body%grid, listed)
+    listed = listed .or. body%grid == 0
+  end subroutine find_listed
 
   !> The rule for the bonds within a grid: with the horizon that its spacing has.
   pure type(volume_rule_type) function rule_of_grid(rule, spacing) result(own)

@@ -48,7 +48,7 @@ contains
     if (scene%horizon%family == 'list') then
       choice%reason = 'asked for'
     else
-      call lattice_suits(body, rule, choice%regular, choice%reason)
+      call lattice_suits(body, rule, choice%regular, choice%reason, choice%listed)
       if (choice%regular) choice%kind = 'lattice'
     end if
     if (scene%horizon%family == 'lattice' .and. .not. choice%regular) then
@@ -85,7 +85,7 @@ contains
       if (.not. laws(i)%law%weighted) reason = 'bond laws on the generic pass'
     end do
     if (reason == '') then
-      call composite_suits(body, rule, suits, reason, choice%listed)
+      call composite_suits(body, rule, choice%listed, suits, reason)
       if (suits) choice%kind = 'composite'
     end if
     if (reason /= '') choice%reason = choice%reason//'; no composite family: '//reason

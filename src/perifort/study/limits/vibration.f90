@@ -10,8 +10,8 @@ module pd_study_limits_vibration
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type, never, new_material
   use pd_family_family, only: bonds_type, allocate_bonds
-  use pd_family_composite, only: composite_family_type, composite_suits, new_composite_family
-  use pd_family_lattice, only: lattice_family_type, new_lattice_family
+  use pd_family_composite, only: composite_family_type, new_composite_family
+  use pd_family_lattice, only: find_listed, lattice_family_type, new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
@@ -60,9 +60,8 @@ contains
     type(list_family_type), allocatable :: list
     type(composite_family_type), allocatable :: composite
     type(volume_rule_type) :: rule
-    character(:), allocatable :: reason
     logical, allocatable :: listed(:)
-    logical :: cut, suits
+    logical :: cut
 
     call copy_points(system%body, shift, factor, twin%body)
     rule = system%family%rule
@@ -83,8 +82,7 @@ contains
       call move_alloc(list, twin%family)
     type is (composite_family_type)
       allocate (composite)
-      call composite_suits(twin%body, rule, suits, reason, listed)
-      if (.not. suits) call internal_fault('a twin of another kind: '//reason)
+      call find_listed(twin%body, rule, listed)
       call new_composite_family(twin%body, rule, listed, cut, composite, error)
       if (allocated(error)) return
       call move_alloc(composite, twin%family)
