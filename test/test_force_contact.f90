@@ -118,6 +118,7 @@ contains
     if (allocated(error)) return
     rule%side = [1, 2]
     rule%stiffness = 2.0_wp
+    rule%smoothed = .false.
     associate (system => set_up%system, body => set_up%system%body)
       call new_contact(body, system%family%rule%delta, 0.0_wp, rule, of_normal_force, contact)
       call view_of(system, 0.0_wp, view)

@@ -251,9 +251,9 @@ contains
       call judge(block//"&body name = 'shot' lower = -1e-3, -1e-3, 1e-3 upper = 1e-3, 1e-3, 3e-3 " &
         & //'points = 2, 2, 2 /'//line//"&region name = 'shot' where = 'z > 0.5e-3' /"//line// &
         & "&initial region = 'shot' velocity_z = -"//trim(speeds(i))//" velocity_x = 30 /"//line// &
-        & "&contact between = 'block', 'shot' /"//line//"&time integrator = '"// &
-        & trim(integrators(i))//"' steps = "//trim(merge('150', '60 ', i == 1))//' /', searches, &
-        & error)
+        & "&contact between = 'block', 'shot' normals = 'centres' /"//line// &
+        & "&time integrator = '"//trim(integrators(i))//"' steps = "// &
+        & trim(merge('150', '60 ', i == 1))//' /', searches, error)
       if (i == 1) call expect_true(error, searches > 2 .and. searches < 75, 'searches')
       if (i == 3) call expect_true(error, searches > 30, 'it was searched too seldom')
       if (allocated(error)) return
@@ -333,8 +333,8 @@ contains
     call judge(block//"&body name = 'shot' lower = -1e-3, -1e-3, 1e-3 upper = 1e-3, 1e-3, 3e-3 "// &
       & 'points = 2, 2, 2 /'//line//"&region name = 'shot' where = 'z > 0.5e-3' /"//line// &
       & "&initial region = 'shot' velocity_z = -50 velocity_x = 30 /"//line// &
-      & "&contact between = 'block', 'shot' /"//line//'&time steps = 150 /', searches, error, &
-      & listed=0.0_wp)
+      & "&contact between = 'block', 'shot' normals = 'centres' /"//line// &
+      & '&time steps = 150 /', searches, error, listed=0.0_wp)
     call rigid_bodies(bodies)
     do i = 1, size(bodies)
       if (i == 2) cycle

@@ -782,7 +782,7 @@ contains
   subroutine test_contact(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: meet = line//'&time steps = 1 /'//line// &
-      & "&contact between = 'a', 'b' distance = 0.12 /"//line
+      & "&contact between = 'a', 'b' distance = 0.12 normals = 'centres' /"//line
     real(wp), allocatable :: own(:, :), single(:, :), coarse(:, :), fine(:, :)
 
     call forces_of(own_grids('&horizon ratio = 3.015 /'//meet), own)

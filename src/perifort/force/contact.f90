@@ -5,8 +5,8 @@
 !> constant of the mean of both materials. What separates pushes less if there is a restitution e,
 !> by e^2; or a dashpot acts along the line. Friction acts across it.
 !>
-!> With smoothed normals the overlap is that along the normal of both surfaces, shared among all
-!> that are beside each other (`pd_force_normals`).
+!> With smoothed normals the overlap of points of different bodies is that along the normal of both
+!> surfaces, shared among all that are beside each other (`pd_force_normals`).
 !>
 !> Pairs are searched in cells whose reach is D and a skin; the pairs are kept until some point has
 !> moved by half the skin, so that none is missed: two points that were farther apart than D and the
@@ -16,13 +16,14 @@
 module pd_force_contact
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_kinds, only: wp, i4
   use pd_body_body, only: body_type
   use pd_family_family, only: allocate_bonds, bonds_type
-  use pd_base_order, only: place_in
   use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
     & remember_places
-  use pd_force_normals, only: meet, normal_of_pair, patch_radius, patch_type, surface_normals
+  use pd_force_normals, only: add_couples, find_normals, find_rates, frame_type, meet, &
+    & normal_of_pair, patch_radius, patch_type, renew_intact, surface_normals, surface_type, &
+    & take_surface
   use pd_force_pairs, only: pairs_type, search_pairs
   use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
   use pd_law_material, only: material_type
@@ -43,6 +44,9 @@ module pd_force_contact
   integer, parameter :: most_contacts(3) = [2, 4, 8]
   integer, parameter :: at_once = 128            !! points of a chunk of a thread
   integer, parameter :: worth_threads = 1000     !! points that are near others
+  !> Overlap over the spacing that is none: pairs that are where they were at the start do not touch
+  !> yet, however their distance is rounded; a dashpot would act at once.
+  real(wp), parameter :: nothing = 1.0e-12_wp
   !> Half of the skin may be used up but for rounding.
   real(wp), parameter :: but_rounding = 1 - 1.0e-6_wp
 
@@ -55,7 +59,7 @@ module pd_force_contact
     real(wp) :: friction = 0.0_wp          !! [-]
     real(wp) :: returned = 1.0_wp          !! e^2, part of the energy that comes back [-]
     real(wp) :: damping = 0.0_wp           !! over the critical one [-]
-    logical :: smoothed = .false.          !! they push along normals of their surfaces
+    logical :: smoothed = .true.           !! bodies push along normals of their surfaces
   end type contact_rule_type
 
   !> Contact as a term.
@@ -64,10 +68,13 @@ module pd_force_contact
     type(contact_rule_type) :: rule
     integer(i4), allocatable :: slots(:)     !! points that may touch, in order
     integer, allocatable :: side(:)          !! of each of these
-    real(wp), allocatable :: reach(:)        !! half of D of each, and its half of the skin [m]
+    real(wp), allocatable :: reach(:)        !! up to which each meets points of other bodies, its
+                                             !! half of the distance and of the skin [m]
+    real(wp), allocatable :: within(:)       !! and of its own body [m]
     real(wp), allocatable :: begun(:, :)     !! (n_slots, dim) where points were at the start [m]
-    real(wp), allocatable :: normals(:, :)   !! (dim, n_slots) normals of their surfaces then, if
-                                             !! the rule is smoothed
+    logical :: smoothed = .false.            !! there are bodies that push along normals
+    real(wp), allocatable :: normals(:, :)   !! (3, n_slots) normals of their surfaces then, times
+                                             !! their weights, if so
     real(wp) :: skin = 0.0_wp                !! [m]
     real(wp) :: delta = 1.0_wp               !! horizon, the largest one of all points [m]
     real(wp) :: ratio = 0.0_wp               !! horizon over spacing of each point; 0: one horizon
@@ -75,6 +82,8 @@ module pd_force_contact
                                              !! the same rule, and takes what that has found
     type(movement_type) :: movement          !! since the last search
     type(pairs_type) :: pairs                !! then
+    type(surface_type) :: surface            !! of these points, if it is smoothed
+    type(frame_type) :: frame                !! its normals at the noted instant
   contains
     procedure :: add_force
     procedure :: add_energy
@@ -86,6 +95,14 @@ module pd_force_contact
     procedure :: keep
     procedure :: describe
   end type contact_type
+
+  !> How two points meet.
+  type :: meeting_type
+    type(patch_type) :: patch
+    real(wp) :: n(3) = 0.0_wp        !! unit vector along which they push
+    real(wp) :: begins = 0.0_wp      !! gap at which they begin to [m]
+    real(wp) :: length = 0.0_wp      !! of the difference of their normals; 0: along their line [-]
+  end type meeting_type
 
 contains
 
@@ -103,28 +120,41 @@ contains
 
     contact%name = 'contact'
     if (part == of_friction) contact%name = 'friction'
+    contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
+    contact%side = rule%side(body%body(contact%slots))
+    contact%smoothed = rule%smoothed .and. body%dim > 1 .and. count(rule%side > 0) > 1
     ! without losses no account of work is needed, which would look at all points in every step
-    ! normals turn without work: the account tells what that comes to
     contact%conservative = part == of_normal_force .and. rule%returned >= 1.0_wp .and. &
-      & rule%damping <= 0.0_wp .and. .not. rule%smoothed
+      & rule%damping <= 0.0_wp
     contact%tangent = no_tangent
     contact%part = part
     contact%rule = rule
     contact%delta = delta
     contact%ratio = ratio
     contact%acts_on_few = .true.
-    contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
-    contact%side = rule%side(body%body(contact%slots))
     least = minval(body%spacing(contact%slots))
     contact%skin = merge(skin_within, skin_between, rule%pieces)*least
-    contact%reach = [((usual_distance*body%spacing(contact%slots(i)) + contact%skin)/2, i=1, &
-      & size(contact%slots))]
-    if (rule%distance > 0.0_wp) contact%reach = (rule%distance + contact%skin)/2
-    if (rule%smoothed) contact%reach = sqrt(max((contact%reach - contact%skin/2)**2, &
-      & patch_radius(body%spacing(contact%slots))**2/4) + patch_radius(body%spacing( &
-      & contact%slots))**2/4) + contact%skin/2
+    allocate (contact%within(size(contact%slots)), contact%reach(size(contact%slots)))
+    do i = 1, size(contact%slots)
+      associate (spacing => body%spacing(contact%slots(i)))
+        contact%within(i) = usual_distance*spacing/2
+        if (rule%distance > 0.0_wp) contact%within(i) = rule%distance/2
+        contact%reach(i) = contact%within(i)
+        if (contact%smoothed) contact%reach(i) = reach_of_patch(contact%within(i), spacing/2)
+      end associate
+    end do
+    contact%within = contact%within + contact%skin/2
+    contact%reach = contact%reach + contact%skin/2
     call new_movement(body, contact%slots, contact%movement)
   end subroutine new_contact
+
+  !> The longest distance of two points that touch along a normal [m].
+  pure real(wp) function reach_of_patch(distance, spacing) result(reach)
+    real(wp), intent(in) :: distance   !! at which they begin to push [m]
+    real(wp), intent(in) :: spacing    !! mean of both [m]
+
+    reach = sqrt(max(distance, patch_radius(spacing))**2 + patch_radius(spacing)**2)
+  end function reach_of_patch
 
   !> Where points are at the start: pairs that are nearer then push from that distance on.
   subroutine begin(self, view)
@@ -134,10 +164,10 @@ contains
     real(wp), allocatable :: normals(:, :)
 
     self%begun = view%body%x + view%u
-    if (.not. self%rule%smoothed) return
+    if (.not. self%smoothed) return
     call surface_normals(view, self%slots, normals)
     if (allocated(self%normals)) deallocate (self%normals)
-    allocate (self%normals(size(view%u, 2), size(view%u, 1)), source=0.0_wp)
+    allocate (self%normals(3, size(view%u, 1)), source=0.0_wp)
     self%normals(:, self%slots) = normals
   end subroutine begin
 
@@ -153,14 +183,23 @@ contains
       type is (contact_type)
         if (self%movement%searches /= before%movement%searches) then
           self%pairs = before%pairs
+          self%surface = before%surface
           self%movement%searches = before%movement%searches
+        end if
+        if (self%smoothed) then
+          call renew_intact(self%surface, view)
+          self%frame = before%frame
         end if
       class default
         call internal_fault('friction follows no contact')
       end select
     else if (.not. still_holds(self, view)) then
-      call find_pairs(self, view, self%pairs)
+      call find_pairs(self, view, self%pairs, self%surface)
       call remember_places(self%movement, view%u)
+    end if
+    if (self%smoothed .and. .not. self%follows) then
+      call renew_intact(self%surface, view)
+      call find_frame(self, self%pairs, self%surface, view, self%frame)
     end if
     call note_instant(self%movement, view)
   end subroutine search
@@ -175,28 +214,35 @@ contains
       & holds = moved(self%movement, view%u) < but_rounding*self%skin/2
   end function still_holds
 
-  !> The pairs that are near.
-  subroutine find_pairs(self, view, pairs)
+  !> The pairs that are near, and the surfaces of those that had one at the start.
+  subroutine find_pairs(self, view, pairs, surface)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
     type(pairs_type), intent(out) :: pairs
+    type(surface_type), intent(out) :: surface
+    integer :: i
 
     if (.not. allocated(self%begun)) call internal_fault('contact has not begun')
-    call search_pairs(view, self%slots, self%side, self%reach, self%rule%pieces, pairs)
+    call search_pairs(view, self%slots, self%side, self%reach, self%within, self%rule%pieces, pairs)
+    if (self%smoothed) call take_surface(view, pairs%slots, &
+      & [(norm2(self%normals(:, pairs%slots(i))), i=1, size(pairs%slots))], surface)
   end subroutine find_pairs
 
-  !> Points that are near others.
+  !> Points that are near others, and with smoothed normals their families.
   subroutine acting(self, view, slots)
     class(contact_type), intent(in) :: self     !! the contact
     type(term_view_type), intent(in) :: view    !! the instant
     integer(i4), allocatable, intent(out) :: slots(:)
-    type(pairs_type) :: anew
+    type(pairs_type) :: pairs
+    type(surface_type) :: surface
 
     if (is_noted(self%movement, view)) then
       slots = self%pairs%slots
+      if (self%smoothed) slots = self%surface%around
     else
-      call find_pairs(self, view, anew)
-      call move_alloc(anew%slots, slots)
+      call find_pairs(self, view, pairs, surface)
+      slots = pairs%slots
+      if (self%smoothed) slots = surface%around
     end if
   end subroutine acting
 
@@ -229,58 +275,127 @@ contains
     type(term_view_type), intent(in) :: view
     real(wp), intent(inout), contiguous :: force(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
-    type(pairs_type) :: anew
+    type(pairs_type) :: pairs
+    type(surface_type) :: surface
+    type(frame_type) :: frame
 
-    if (self%rule%smoothed) then
-      if (is_noted(self%movement, view)) then
-        call sum_smoothed(self, self%pairs, view, force, energy)
-      else
-        call find_pairs(self, view, anew)
-        call sum_smoothed(self, anew, view, force, energy)
-      end if
-    else if (is_noted(self%movement, view)) then
-      call sum_pairs(self, self%pairs, view, force, energy)
+    if (is_noted(self%movement, view) .and. (.not. self%smoothed &
+      & .or. self%surface%broken == view%broken)) then
+      call sum_up(self, self%pairs, self%surface, self%frame, view, force, energy)
     else
-      call find_pairs(self, view, anew)
-      call sum_pairs(self, anew, view, force, energy)
+      call find_pairs(self, view, pairs, surface)
+      if (self%smoothed) call find_frame(self, pairs, surface, view, frame)
+      call sum_up(self, pairs, surface, frame, view, force, energy)
     end if
   end subroutine pass
 
-  !> Sum up near pairs, point by point.
-  subroutine sum_pairs(self, pairs, view, force, energy)
+  !> The normals of points that may touch.
+  subroutine find_frame(self, pairs, surface, view, frame)
     class(contact_type), intent(in) :: self
     type(pairs_type), intent(in) :: pairs
+    type(surface_type), intent(in) :: surface
+    type(term_view_type), intent(in) :: view
+    type(frame_type), intent(out) :: frame
+    logical, allocatable :: may_touch(:)
+
+    if (.not. allocated(self%normals)) call internal_fault('contact has not begun')
+    call find_close(self, pairs, view, may_touch)
+    call find_normals(surface, view, may_touch, frame)
+  end subroutine find_frame
+
+  !> Sum up near pairs, and what acts on normals.
+  subroutine sum_up(self, pairs, surface, frame, view, force, energy)
+    class(contact_type), intent(in) :: self
+    type(pairs_type), intent(in) :: pairs
+    type(surface_type), intent(in) :: surface
+    type(frame_type), intent(in) :: frame
     type(term_view_type), intent(in) :: view
     real(wp), intent(inout), contiguous :: force(:, :)
     real(wp), intent(inout), contiguous :: energy(:)
-    type(bonds_type) :: bonds
-    real(wp), dimension(size(view%u, 2)) :: r, r0, n, v, total
-    real(wp) :: distance, begins, stiffness, stored, push, critical, speed
+    real(wp), allocatable :: rates(:, :), couples(:, :)
+
+    if (self%smoothed) then
+      if (self%part == of_friction .or. loses(self%rule)) &
+        & call find_rates(surface, frame, view, rates)
+      allocate (couples(3, size(pairs%slots)))
+    end if
+    call sum_pairs(self, pairs, frame, rates, view, force, energy, couples)
+    if (self%smoothed .and. size(force) > 0) call add_couples(surface, frame, couples, force)
+  end subroutine sum_up
+
+  !> Which points have one of another body so close that they may touch along a normal.
+  subroutine find_close(self, pairs, view, may_touch)
+    class(contact_type), intent(in) :: self
+    type(pairs_type), intent(in) :: pairs
+    type(term_view_type), intent(in) :: view
+    logical, allocatable, intent(out) :: may_touch(:)
+    real(wp) :: r(3), reach
     integer :: i, e, k, j
+
+    allocate (may_touch(size(pairs%slots)))
+    !$omp parallel do if (size(pairs%slots) >= worth_threads) default(none) &
+    !$omp schedule(dynamic, at_once) shared(self, pairs, view, may_touch) &
+    !$omp private(r, reach, i, e, k, j)
+    do i = 1, size(pairs%slots)
+      k = pairs%slots(i)
+      may_touch(i) = .false.
+      do e = pairs%start(i), pairs%start(i + 1) - 1
+        j = pairs%other(e)
+        if (view%body%body(k) == view%body%body(j)) cycle
+        reach = reach_of_patch(reach_of(self, k, j, view%body), (view%body%spacing(k) &
+          & + view%body%spacing(j))/2)
+        r = difference(view%body%x, k, j) + difference(view%u, k, j)
+        may_touch(i) = dot_product(r, r) < reach**2
+        if (may_touch(i)) exit
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine find_close
+
+  !> Sum up near pairs, point by point. Along a normal n the force is minus the gradient of the
+  !> energy K w (b - g)^2/2, with the gap g along it and the weight w across it. What acts on n
+  !> itself is the couple of the points, which goes to their families.
+  subroutine sum_pairs(self, pairs, frame, rates, view, force, energy, couples)
+    class(contact_type), intent(in) :: self
+    type(pairs_type), intent(in) :: pairs
+    type(frame_type), intent(in) :: frame
+    real(wp), allocatable, intent(in) :: rates(:, :)       !! of the normals, if needed
+    type(term_view_type), intent(in) :: view
+    real(wp), intent(inout), contiguous :: force(:, :)
+    real(wp), intent(inout), contiguous :: energy(:)
+    real(wp), allocatable, intent(inout) :: couples(:, :)
+    type(bonds_type) :: bonds
+    type(meeting_type) :: meeting
+    real(wp), dimension(3) :: r, v, turning, total, couple
+    real(wp) :: stiffness, stored, push, critical, speed, aside, back
+    integer :: i, e, k, j, dim
     logical :: ready, listed
 
+    dim = size(view%u, 2)
     !$omp parallel if (size(pairs%slots) >= worth_threads) default(none) &
-    !$omp shared(self, pairs, view, force, energy) &
-    !$omp private(bonds, r, r0, n, v, total, distance, begins, stiffness, stored, push, critical, &
-    !$omp speed, i, e, k, j, ready, listed)
+    !$omp shared(self, pairs, frame, rates, view, force, energy, couples, dim) &
+    !$omp private(bonds, meeting, r, v, turning, total, couple, stiffness, stored, push, &
+    !$omp critical, speed, aside, back, i, e, k, j, ready, listed)
     ready = .false.
     !$omp do schedule(dynamic, at_once)
     do i = 1, size(pairs%slots)
       k = pairs%slots(i)
       listed = .false.
       total = 0.0_wp
+      couple = 0.0_wp
       stored = 0.0_wp
       do e = pairs%start(i), pairs%start(i + 1) - 1
         j = pairs%other(e)
-        r = (view%body%x(j, :) - view%body%x(k, :)) + (view%u(j, :) - view%u(k, :))
-        distance = norm2(r)
         ! the layer of a boundary is moved as one
         if (view%body%layer(k) > 0 .and. view%body%layer(k) == view%body%layer(j)) cycle
-        begins = reach_of(self, k, j, view%body)
-        if (distance >= begins) cycle
-        r0 = self%begun(j, :) - self%begun(k, :)
-        begins = min(begins, norm2(r0))
-        if (distance >= begins) cycle
+        r = difference(view%body%x, k, j) + difference(view%u, k, j)
+        if (self%smoothed) then
+          call meet_pair(self, view, k, j, r, meeting, frame%normals(:, i), &
+            & frame%normals(:, pairs%place(e)))
+        else
+          call meet_pair(self, view, k, j, r, meeting)
+        end if
+        if (.not. meeting%patch%touches) cycle
         if (self%rule%pieces) then
           if (.not. ready) call allocate_bonds(view%family, bonds)
           ready = .true.
@@ -288,123 +403,109 @@ contains
           listed = .true.
           if (any(bonds%j(:bonds%n) == j .and. bonds%intact(:bonds%n))) cycle
         end if
-        ! points at one place push along the line that they began with
-        n = r0
-        if (distance > 0.0_wp) n = r
-        n = n/norm2(n)
-        v = view%v(j, :) - view%v(k, :)
-        speed = dot_product(v, n)
-        stiffness = stiffness_of(self, view, k, j)
-        critical = 0.0_wp
-        if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
-          & critical = critical_damping(view, k, j, stiffness)
-        push = normal_force(self%rule, stiffness, begins - distance, speed, critical)
-        if (self%part == of_normal_force) then
-          total = total - push*n
-          stored = stored + stiffness*(begins - distance)**2/4
-        else
+        associate (patch => meeting%patch, n => meeting%n, t => meeting%patch%across, &
+          & overlap => meeting%begins - meeting%patch%gap)
+          v = difference(view%v, k, j)
+          speed = dot_product(v, n)
           v = v - speed*n
-          speed = norm2(v)
-          if (speed > 0.0_wp) total = total &
-            & + min(self%rule%friction*push, slope*critical*speed)*(v/speed)
-        end if
+          if (meeting%length > 0.0_wp .and. allocated(rates)) then
+            ! the normal turns, too: across it that is no sliding, and it changes the gap
+            turning = (rates(:, i) - rates(:, pairs%place(e)))/meeting%length
+            turning = turning - dot_product(turning, n)*n
+            speed = speed + dot_product(turning, t)
+            v = v - patch%gap*turning
+          end if
+          stiffness = stiffness_of(self, view, k, j)
+          critical = 0.0_wp
+          if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
+            & critical = critical_damping(view, k, j, stiffness*patch%weight)
+          push = normal_force(self%rule, stiffness*patch%weight, overlap, speed, critical)
+          if (self%part == of_normal_force) then
+            total = total - push*n
+            stored = stored + stiffness*patch%weight*overlap**2/4
+            if (meeting%length > 0.0_wp) then
+              back = 1.0_wp
+              if (speed > 0.0_wp) back = self%rule%returned
+              back = back*stiffness*overlap**2/2*patch%slope
+              total = total + back*t
+              couple = couple + (push + back*patch%gap)/meeting%length*t
+            end if
+          else
+            aside = sqrt(dot_product(v, v))
+            if (.not. aside > 0.0_wp) cycle
+            v = min(self%rule%friction*push, slope*critical*aside)*(v/aside)
+            total = total + v
+            if (meeting%length > 0.0_wp) couple = couple + patch%gap/meeting%length*v
+          end if
+        end associate
       end do
-      if (size(force) > 0) force(k, :) = force(k, :) + total
+      if (size(force) > 0) force(k, :) = force(k, :) + total(:dim)
       if (size(energy) > 0) energy(k) = energy(k) + stored
+      if (self%smoothed) couples(:, i) = couple
     end do
     !$omp end parallel
   end subroutine sum_pairs
 
-  !> Sum up near pairs of surfaces, point by point. Along normals that stay the force is the
-  !> gradient of the energy K w (b - g)^2/2, with the overlap b - g along the normal and the weight
-  !> w across it, whose gradient is the part across.
-  subroutine sum_smoothed(self, pairs, view, force, energy)
-    class(contact_type), intent(in) :: self
-    type(pairs_type), intent(in) :: pairs
-    type(term_view_type), intent(in) :: view
-    real(wp), intent(inout), contiguous :: force(:, :)
-    real(wp), intent(inout), contiguous :: energy(:)
-    type(patch_type) :: patch
-    integer(i8), allocatable :: points(:)
-    real(wp), allocatable :: normals(:, :)
-    real(wp), dimension(size(view%u, 2)) :: r, n, v, total
-    real(wp) :: begins, stiffness, stored, push, critical, speed, back
-    integer :: i, e, k, j
-
-    if (.not. allocated(self%normals)) call internal_fault('contact has not begun')
-    call surface_normals(view, pairs%slots, normals)
-    points = int(view%body%point(pairs%slots), i8)
-    !$omp parallel do if (size(pairs%slots) >= worth_threads) default(none) &
-    !$omp schedule(dynamic, at_once) shared(self, pairs, view, force, energy, normals, points) &
-    !$omp private(patch, r, n, v, total, begins, stiffness, stored, push, critical, speed, back, &
-    !$omp i, e, k, j)
-    do i = 1, size(pairs%slots)
-      k = pairs%slots(i)
-      total = 0.0_wp
-      stored = 0.0_wp
-      do e = pairs%start(i), pairs%start(i + 1) - 1
-        j = pairs%other(e)
-        if (view%body%layer(k) > 0 .and. view%body%layer(k) == view%body%layer(j)) cycle
-        r = (view%body%x(j, :) - view%body%x(k, :)) + (view%u(j, :) - view%u(k, :))
-        n = normal_of_pair(normals(:, i), normals(:, place_in(points, int(view%body%point(j), i8))))
-        call meet_pair(self, view, k, j, r, n, begins, patch)
-        if (.not. patch%touches) cycle
-        v = view%v(j, :) - view%v(k, :)
-        speed = dot_product(v, n)
-        stiffness = stiffness_of(self, view, k, j)
-        critical = 0.0_wp
-        if (self%rule%damping > 0.0_wp .or. self%part == of_friction) &
-          & critical = critical_damping(view, k, j, stiffness*patch%weight)
-        push = normal_force(self%rule, stiffness*patch%weight, begins - patch%gap, speed, critical)
-        if (self%part == of_normal_force) then
-          back = 1.0_wp
-          if (speed > 0.0_wp) back = self%rule%returned
-          total = total - push*n + back*stiffness*(begins - patch%gap)**2/2*patch%slope &
-            & *patch%across(:size(r))
-          stored = stored + stiffness*patch%weight*(begins - patch%gap)**2/4
-        else
-          v = v - speed*n
-          speed = norm2(v)
-          if (speed > 0.0_wp) total = total &
-            & + min(self%rule%friction*push, slope*critical*speed)*(v/speed)
-        end if
-      end do
-      if (size(force) > 0) force(k, :) = force(k, :) + total
-      if (size(energy) > 0) energy(k) = energy(k) + stored
-    end do
-    !$omp end parallel do
-  end subroutine sum_smoothed
-
   !> How two points meet: along the normal of their surfaces, from the gap on that they had at the
-  !> start if they were near then; along the line of centres, which `n` then becomes, without one.
-  pure subroutine meet_pair(self, view, k, j, r, n, begins, patch)
+  !> start if they were near then; along the line of centres where one has none, or had none.
+  pure subroutine meet_pair(self, view, k, j, r, meeting, one, other)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
     integer, intent(in) :: k, j              !! slots
-    real(wp), intent(in) :: r(:)             !! from k to j [m]
-    real(wp), intent(inout) :: n(:)          !! unit vector; 0: none of both
-    real(wp), intent(out) :: begins          !! [m]
-    type(patch_type), intent(out) :: patch
-    real(wp) :: r0(size(r)), n0(size(r)), spacing
+    real(wp), intent(in) :: r(3)             !! from k to j [m]
+    type(meeting_type), intent(out) :: meeting
+    real(wp), intent(in), optional :: one(3), other(3)   !! their normals, if they are smoothed
+    real(wp) :: r0(3), n0(3), spacing, length, distance
+    logical :: smooth
 
-    r0 = self%begun(j, :) - self%begun(k, :)
-    n0 = normal_of_pair(self%normals(:, k), self%normals(:, j))
-    begins = reach_of(self, k, j, view%body)
-    if (any(abs(n) > 0.0_wp) .and. any(abs(n0) > 0.0_wp)) then
+    meeting%begins = reach_of(self, k, j, view%body)
+    smooth = .false.
+    if (present(one) .and. view%body%body(k) /= view%body%body(j)) then
+      call normal_of_pair(one, other, meeting%n, meeting%length)
+      call normal_of_pair(self%normals(:, k), self%normals(:, j), n0, length)
+      smooth = meeting%length > 0.0_wp .and. length > 0.0_wp
+    end if
+    if (smooth) then
       spacing = (view%body%spacing(k) + view%body%spacing(j))/2
-      if (sum(r0**2) < begins**2 + patch_radius(spacing)**2) begins = min(begins, &
-        & dot_product(r0, n0))
-      call meet(r, n, spacing, begins, patch)
+      r0 = difference(self%begun, k, j)
+      if (dot_product(r0, r0) < meeting%begins**2 + patch_radius(spacing)**2) &
+        & meeting%begins = min(meeting%begins, dot_product(r0, n0))
+      call meet(r, meeting%n, view%body%dim, spacing, meeting%begins - nothing*spacing, &
+        & meeting%patch)
     else
-      begins = min(begins, norm2(r0))
-      patch%gap = norm2(r)
-      patch%weight = 1.0_wp
-      patch%touches = patch%gap < begins
-      n = r0
-      if (patch%gap > 0.0_wp) n = r
-      n = n/norm2(n)
+      meeting%length = 0.0_wp
+      distance = sqrt(dot_product(r, r))
+      if (distance >= meeting%begins) return
+      r0 = difference(self%begun, k, j)
+      meeting%begins = min(meeting%begins, sqrt(dot_product(r0, r0)))
+      if (distance >= (1 - nothing)*meeting%begins) return
+      meeting%patch%touches = .true.
+      meeting%patch%gap = distance
+      meeting%patch%weight = 1.0_wp
+      ! points at one place push along the line that they began with
+      if (distance > 0.0_wp) r0 = r
+      meeting%n = r0/sqrt(dot_product(r0, r0))
     end if
   end subroutine meet_pair
+
+  !> From the vector of one slot to that of another, with three components.
+  pure function difference(values, k, j) result(from)
+    real(wp), intent(in) :: values(:, :)   !! (n_slots, dim)
+    integer, intent(in) :: k, j            !! slots
+    real(wp) :: from(3)
+    integer :: c
+
+    from = 0.0_wp
+    do c = 1, size(values, 2)
+      from(c) = values(j, c) - values(k, c)
+    end do
+  end function difference
+
+  !> Whether forces depend on velocities.
+  pure logical function loses(rule)
+    type(contact_rule_type), intent(in) :: rule
+    loses = rule%returned < 1.0_wp .or. rule%damping > 0.0_wp
+  end function loses
 
   !> The force density by which two points push: never an attraction [N/m3].
   pure real(wp) function normal_force(rule, stiffness, overlap, speed, critical) result(push)
@@ -545,7 +646,7 @@ contains
     class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
 
     call archive%keep(self%name//' began', self%begun)
-    if (self%rule%smoothed) call archive%keep(self%name//' normals began', self%normals)
+    if (self%smoothed) call archive%keep(self%name//' normals began', self%normals)
   end subroutine keep
 
   !> The scene's own lines describe it.

@@ -13,7 +13,7 @@
 module pd_force_term
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
   use pd_law_material, only: material_type
   use pd_family_family, only: family_type
@@ -43,6 +43,7 @@ module pd_force_term
                                                     !! surfaces of rigid bodies
     real(wp) :: time = 0.0_wp                       !! of the displacements [s]
     integer :: step = 0                             !! complete steps (iterations) then
+    integer(i8) :: broken = 0_i8                    !! bonds that have broken until then
   end type term_view_type
 
   type, abstract :: force_term_type

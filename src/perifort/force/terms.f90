@@ -1,7 +1,8 @@
 !> The terms of a system (`pd_force_term`) in their order, and the account of their work.
 module pd_force_terms
   use pd_base_archive, only: archive_type
-  use pd_base_kinds, only: wp, i4
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_order, only: place_in
   use pd_base_reduce, only: inner, sum_listed
   use pd_base_text, only: to_text
   use pd_force_term, only: force_term_type, name_of, no_stiffness, no_tangent, term_view_type
@@ -15,8 +16,10 @@ module pd_force_terms
     real(wp), allocatable :: last_u(:, :)      !! displacements and forces at the last instant
     real(wp), allocatable :: last_force(:, :)  !! that was accounted [m], [N/m3]
     integer(i4), allocatable :: slots(:)       !! of a term that acts on few points: instead of
-    real(wp), allocatable :: few(:, :)         !! these where it acted then, and its forces there
+    real(wp), allocatable :: few(:, :)         !! these where it acted then, its forces there
                                                !! (slots, dim) [N/m3]
+    real(wp), allocatable :: few_u(:, :)       !! and displacements (slots, dim) [m]
+    real(wp) :: last_time = 0.0_wp             !! and the time [s]
     real(wp) :: last_energy = 0.0_wp           !! that it stored then [J]
     real(wp) :: lost = 0.0_wp                  !! of a term that is not conservative: it took [J]
   end type item_type
@@ -26,8 +29,6 @@ module pd_force_terms
     type(item_type), allocatable :: items(:)   !! not allocated: none
     integer :: inside = 0                      !! terms that are not external
     integer :: outside = 0                     !! external ones
-    real(wp), allocatable :: last_u(:, :)      !! of all terms that act on few points: displacements
-                                               !! at the last instant that was accounted [m]
     real(wp), allocatable :: force(:, :)       !! room for forces and energies of these, 0
     real(wp), allocatable :: density(:)
   contains
@@ -237,15 +238,12 @@ contains
     real(wp), allocatable :: force(:, :), density(:)
     real(wp) :: work, stored
     integer :: i
-    logical :: any_few
 
-    any_few = .false.
     do i = 1, self%number()
       associate (item => self%items(i))
         if (item%term%summed_apart) cycle
         if (.not. item%term%external .and. item%term%conservative) cycle
         if (item%term%acts_on_few) then
-          any_few = .true.
           call account_few(self, i, view, lost)
           cycle
         end if
@@ -274,23 +272,7 @@ contains
         item%last_energy = stored
       end associate
     end do
-    if (any_few) call remember_places(self, view%u)
   end subroutine account
-
-  !> Displacements for the next account.
-  subroutine remember_places(self, u)
-    class(term_list_type), intent(inout) :: self
-    real(wp), intent(in), contiguous :: u(:, :)
-    integer :: c, k
-
-    if (.not. allocated(self%last_u)) allocate (self%last_u, mold=u)
-    !$omp parallel do collapse(2) schedule(static) default(none) shared(self, u) private(c, k)
-    do c = 1, size(u, 2)
-      do k = 1, size(u, 1)
-        self%last_u(k, c) = u(k, c)
-      end do
-    end do
-  end subroutine remember_places
 
   !> The account of a term that acts on few points: nothing else is visited.
   subroutine account_few(self, i, view, lost)
@@ -299,7 +281,7 @@ contains
     type(term_view_type), intent(in) :: view
     real(wp), intent(inout) :: lost
     integer(i4), allocatable :: slots(:)
-    real(wp), allocatable :: few(:, :)
+    real(wp), allocatable :: few(:, :), few_u(:, :)
     real(wp) :: work, stored
 
     if (.not. allocated(self%force)) then
@@ -314,27 +296,30 @@ contains
       call item%term%add_energy(view, self%density)
       stored = sum_listed(body%order, body%point(slots), self%density(slots)*body%volume(slots))
       self%density(slots) = 0.0_wp
-      if (allocated(item%last_force)) call take_few(item, body%slot)
+      few_u = view%u(slots, :)
       if (allocated(item%few)) then
-        if (allocated(item%last_u)) call move_alloc(item%last_u, self%last_u)
-        work = half_work(item%slots, item%few) + half_work(slots, few)
+        work = half_work(item%slots, item%few, view%u(item%slots, :) - item%few_u) &
+          & + half_work(slots, few, few_u - places_before(item, view, slots))
         lost = lost - work - (stored - item%last_energy)
         item%lost = item%lost - work - (stored - item%last_energy)
       end if
       call move_alloc(slots, item%slots)
       call move_alloc(few, item%few)
+      call move_alloc(few_u, item%few_u)
+      item%last_time = view%time
       item%last_energy = stored
     end associate
 
   contains
 
     !> Half of what forces on some points do [J].
-    real(wp) function half_work(slots, few) result(work)
+    real(wp) function half_work(slots, few, way) result(work)
       integer(i4), intent(in) :: slots(:)
       real(wp), intent(in) :: few(:, :)
+      real(wp), intent(in) :: way(:, :)    !! (slots, dim) by how much they have moved [m]
       real(wp), allocatable :: moved(:, :)
 
-      moved = view%u(slots, :) - self%last_u(slots, :)
+      moved = way
       if (self%items(i)%term%has_partner) &
         & call self%items(i)%term%subtract_partner(view, slots, moved)
       work = sum_listed(view%body%order, view%body%point(slots), &
@@ -342,26 +327,33 @@ contains
     end function half_work
   end subroutine account_few
 
-  !> Of the forces on all points that a checkpoint had, those that are not 0.
-  subroutine take_few(item, slots)
-    type(item_type), intent(inout) :: item
-    integer(i4), intent(in) :: slots(:)     !! of all points, in their order
+  !> Displacements of some points at the last instant: of those on which the term did not act then
+  !> by their velocities, which leaps between instants have exactly.
+  function places_before(item, view, slots) result(u)
+    type(item_type), intent(in) :: item
+    type(term_view_type), intent(in) :: view
+    integer(i4), intent(in) :: slots(:)              !! in the order of points
+    real(wp), allocatable :: u(:, :)                 !! (slots, dim) [m]
+    integer(i8), allocatable :: points(:)
+    integer :: i, n
 
-    item%slots = pack(slots, any(abs(item%last_force(slots, :)) > 0.0_wp, 2))
-    item%few = item%last_force(item%slots, :)
-    deallocate (item%last_force)
-  end subroutine take_few
-
-  !> Let an item have its forces and places on all points, as checkpoints keep them.
-  subroutine give_all(item, last_u)
-    type(item_type), intent(inout) :: item
-    real(wp), intent(in) :: last_u(:, :)    !! at the last instant that was accounted
-
-    allocate (item%last_force(size(last_u, 1), size(last_u, 2)), source=0.0_wp)
-    item%last_force(item%slots, :) = item%few
-    item%last_u = last_u
-    deallocate (item%slots, item%few)
-  end subroutine give_all
+    if (size(slots) == size(item%slots)) then
+      if (all(slots == item%slots)) then
+        u = item%few_u
+        return
+      end if
+    end if
+    points = int(view%body%point(item%slots), i8)
+    allocate (u(size(slots), size(view%u, 2)))
+    do i = 1, size(slots)
+      n = place_in(points, int(view%body%point(slots(i)), i8))
+      if (n > 0) then
+        u(i, :) = item%few_u(n, :)
+      else
+        u(i, :) = view%u(slots(i), :) - (view%time - item%last_time)*view%v(slots(i), :)
+      end if
+    end do
+  end function places_before
 
   !> Keep all terms and the accounts of their work.
   subroutine keep_list(self, archive)
@@ -374,14 +366,34 @@ contains
       associate (item => self%items(i))
         call item%term%keep(archive)
         if (item%term%summed_apart) cycle
-        if (allocated(item%few)) call give_all(item, self%last_u)
-        call archive%keep('last place of term '//to_text(i), item%last_u)
-        call archive%keep('last force of term '//to_text(i), item%last_force)
+        if (item%term%acts_on_few) then
+          call keep_few(archive, item, 'of term '//to_text(i))
+        else
+          call archive%keep('last place of term '//to_text(i), item%last_u)
+          call archive%keep('last force of term '//to_text(i), item%last_force)
+        end if
         call archive%keep('last energy of term '//to_text(i), item%last_energy)
         call archive%keep('loss of term '//to_text(i), item%lost)
       end associate
     end do
   end subroutine keep_list
+
+  !> Keep where a term that acts on few points acted.
+  subroutine keep_few(archive, item, name)
+    class(archive_type), intent(inout) :: archive
+    type(item_type), intent(inout) :: item
+    character(*), intent(in) :: name
+    integer(i8), allocatable :: slots(:, :)
+
+    ! there may have been fewer or more of them
+    if (archive%reading .and. allocated(item%slots)) deallocate (item%slots, item%few, item%few_u)
+    if (allocated(item%slots)) slots = reshape(int(item%slots, i8), [size(item%slots), 1])
+    call archive%keep('slots '//name, slots)
+    if (allocated(slots)) item%slots = int(slots(:, 1), i4)
+    call archive%keep('places '//name, item%few_u)
+    call archive%keep('forces '//name, item%few)
+    call archive%keep('time '//name, item%last_time)
+  end subroutine keep_few
 
   !> The lines of all terms, each ended by a newline.
   function describe_list(self) result(text)

@@ -132,6 +132,7 @@ contains
     if (allocated(system%obstacles)) view%obstacles => system%obstacles
     view%time = t
     view%step = max(0, system%memory%step)
+    view%broken = system%broken
   end subroutine view_of
 
   !> Make the rigid bodies of pins, in their places of the initial displacements and with the

@@ -182,7 +182,7 @@ contains
       call add_loads_to(system%terms, loads)
       call add_springs_of_scene(scene, system%body, system%terms)
       call add_dashpots_of_scene(scene, system%body, materials, system%motions, system%terms)
-      call add_contacts_of_scene(scene, system%body, rule, system%terms)
+      call add_contacts_of_scene(scene, system%body, rule, system%model%breaking, system%terms)
       if (present(terms)) call system%terms%add(terms)
       call timer%stop('conditions')
 

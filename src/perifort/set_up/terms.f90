@@ -137,10 +137,11 @@ contains
 
   !> Every `&contact`: a term for the force along the line between points and, with friction, one
   !> for that across it, so that each has its account.
-  subroutine add_contacts_of_scene(scene, body, rule_of_bonds, terms)
+  subroutine add_contacts_of_scene(scene, body, rule_of_bonds, breakable, terms)
     type(scene_type), intent(in) :: scene         !! a checked scene
     type(body_type), intent(in) :: body           !! its points, arranged in slots
     type(volume_rule_type), intent(in) :: rule_of_bonds  !! with the horizons of the points
+    logical, intent(in) :: breakable              !! bonds may break
     type(term_list_type), intent(inout) :: terms  !! with the contacts on return
     type(contact_rule_type) :: rule
     type(contact_type) :: contact
@@ -164,6 +165,8 @@ contains
         if (all(rule%side == 0)) cycle
         call new_contact(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, of_normal_force, &
           & contact)
+        ! the account has the energy by which normals jump when bonds break
+        if (contact%smoothed .and. breakable) contact%conservative = .false.
         call terms%add(contact)
         if (.not. rule%friction > 0.0_wp) cycle
         call new_contact(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, of_friction, &

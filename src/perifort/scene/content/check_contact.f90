@@ -54,19 +54,6 @@ contains
       end do
       if (allocated(error)) return
       call check_rigid_ones()
-      if (allocated(error) .or. contact%normals /= 'smoothed') return
-      if (contact%within /= '' .or. any(contact%between == 'all')) then
-        call rule_fault(error, 'contact', number, 'normals', "normals = 'smoothed' of pieces", &
-          & 'surfaces that cracks make have no normals at the start: name two bodies in '// &
-          & "'between'", source)
-      else if (scene%header%dimension == 1) then
-        call rule_fault(error, 'contact', number, 'normals', "normals = 'smoothed' in 1D", &
-          & 'the line of centres is the normal there', source)
-      else if (count([(any(scene%bodies%name == contact%between(i)), i=1, &
-        & size(contact%between))]) < 2) then
-        call rule_fault(error, 'contact', number, 'normals', "normals = 'smoothed' of one body", &
-          & 'rigid bodies have normals of their own: this is for two bodies of points', source)
-      end if
     end associate
 
   contains

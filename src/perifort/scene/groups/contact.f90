@@ -9,7 +9,7 @@ module pd_scene_groups_contact
   public :: contact_group, contact_normals
 
   !> Along what points push.
-  character(8), parameter :: contact_normals(2) = [character(8) :: 'centres', 'smoothed']
+  character(8), parameter :: contact_normals(2) = [character(8) :: 'smoothed', 'centres']
 
   !> `&contact`
   type, extends(group_type) :: contact_group
@@ -17,7 +17,7 @@ module pd_scene_groups_contact
     character(name_length) :: within = ''              !! a body whose pieces meet
     real(wp) :: stiffness = 1.0_wp                     !! over that of the bonds [-]
     real(wp) :: distance = unset                       !! at which it begins [m]
-    character(name_length) :: normals = 'centres'      !! one of `contact_normals`
+    character(name_length) :: normals = 'smoothed'     !! one of `contact_normals`
     real(wp) :: friction = 0.0_wp                      !! Coulomb's coefficient [-]
     real(wp) :: restitution = unset                    !! speed after over before [-]
     real(wp) :: damping = unset                        !! part of the critical one [-]
@@ -43,8 +43,9 @@ contains
     call keys%key('distance', group%distance, 'm', 'distance of points below which they push; '// &
       & 'with a rigid body that of points from its surface', above=0.0_wp, &
       & default='0.9 of the smaller spacing; from a surface 0.5')
-    call keys%key('normals', group%normals, 'along what points of bodies push: the line '// &
-      & 'between their centres, or normals of both surfaces', allowed=contact_normals)
+    call keys%key('normals', group%normals, 'along what points of different bodies '// &
+      & 'push: normals of both surfaces, or the line between their centres', &
+      & allowed=contact_normals)
     call keys%key('friction', group%friction, '', 'Coulomb''s coefficient of friction', &
       & at_least=0.0_wp)
     call keys%key('restitution', group%restitution, '', 'speed after an impact over that '// &
