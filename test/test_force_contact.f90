@@ -3,7 +3,8 @@
 module test_force_contact
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp
-  use pd_force_contact, only: contact_rule_type, contact_type, new_contact, of_normal_force
+  use pd_force_contact, only: contact_type, new_contact
+  use pd_force_contact_law, only: contact_rule_type, of_normal_force
   use pd_force_term, only: term_view_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_observer, only: instant_type, observer_type

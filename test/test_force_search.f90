@@ -153,7 +153,7 @@ contains
     call allocate_bonds(system%family, bonds)
     associate (body => system%body, u => system%state%u)
       ! 18 K/(pi delta^4), the density of a pair's force per volume of the other point
-      stiffness = contact%rule%stiffness*18*bulk &
+      stiffness = contact%law%rule%stiffness*18*bulk &
         & /(acos(-1.0_wp)*system%family%rule%delta**5)
       do k = 1, body%n_slots
         if (body%point(k) == 0) cycle
@@ -165,7 +165,7 @@ contains
           r = r + u(j, :) - u(k, :)
           d = norm2(r)
           if (d >= begins) cycle
-          if (contact%rule%pieces) then
+          if (contact%law%rule%pieces) then
             if (any(bonds%j(:bonds%n) == j .and. bonds%intact(:bonds%n))) cycle
           else
             if (body%body(k) == body%body(j)) cycle

@@ -3,7 +3,7 @@
 !> A point nearer to the surface than a distance D, or than it was at the start if that was less, is
 !> pushed along the normal of the surface with the force density s d (d + 1) K/delta^2 (D - gap) in
 !> d dimensions, what the bonds of half a family make of such a displacement. Restitution, damping
-!> and friction are those of contact between points (`pd_force_contact`). The body bears the
+!> and friction are those of contact between points (`pd_force_contact_law`). The body bears the
 !> opposite force where the point is, so that no moment is lost.
 !>
 !> The points within D and a skin of the surface are listed. The distance of a point changes by no
@@ -16,7 +16,8 @@ module pd_force_touch
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
   use pd_base_vectors, only: cross
   use pd_body_body, only: body_type
-  use pd_force_contact, only: contact_rule_type, normal_force, of_friction, of_normal_force, slope
+  use pd_force_contact_law, only: contact_rule_type, normal_force, of_friction, of_normal_force, &
+    & slope
   use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
     & remember_places
   use pd_force_obstacle, only: find_gap, note_pose, obstacle_type, reach_of_shape, shift_at, &

@@ -9,7 +9,7 @@ module pd_set_up_rigid_bodies
   use pd_base_vectors, only: cross
   use pd_body_body, only: body_type
   use pd_family_volume, only: volume_rule_type
-  use pd_force_contact, only: contact_rule_type, of_friction, of_normal_force
+  use pd_force_contact_law, only: contact_rule_type, of_friction, of_normal_force
   use pd_force_obstacle, only: a_box, a_cylinder, a_half_space, a_sphere, obstacle_type
   use pd_force_term, only: term_view_type
   use pd_force_terms, only: term_list_type

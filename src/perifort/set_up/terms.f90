@@ -4,8 +4,8 @@ module pd_set_up_terms
   use pd_body_body, only: body_type
   use pd_body_waves, only: longitudinal_speed, shear_speed
   use pd_family_volume, only: volume_rule_type
-  use pd_force_contact, only: contact_rule_type, contact_type, new_contact, of_friction, &
-    & of_normal_force
+  use pd_force_contact, only: contact_type, new_contact
+  use pd_force_contact_law, only: contact_rule_type, of_friction, of_normal_force
   use pd_force_dashpots, only: new_dashpots
   use pd_force_springs, only: new_springs
   use pd_force_terms, only: term_list_type
@@ -166,7 +166,7 @@ contains
         call new_contact(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, of_normal_force, &
           & contact)
         ! the account has the energy by which normals jump when bonds break
-        if (contact%smoothed .and. breakable) contact%conservative = .false.
+        if (contact%law%smoothed .and. breakable) contact%conservative = .false.
         call terms%add(contact)
         if (.not. rule%friction > 0.0_wp) cycle
         call new_contact(body, rule_of_bonds%delta, rule_of_bonds%ratio, rule, of_friction, &
