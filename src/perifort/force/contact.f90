@@ -262,7 +262,7 @@ contains
     real(wp), allocatable :: rates(:, :), couples(:, :)
 
     if (self%law%smoothed) then
-      if (self%part == of_friction .or. loses(self%law%rule)) &
+      if (size(force) > 0 .and. (self%part == of_friction .or. loses(self%law%rule))) &
         & call find_rates(surface, frame, view, rates)
       allocate (couples(3, size(pairs%slots)))
     end if

@@ -28,6 +28,7 @@ module pd_force_pairs
     integer, allocatable :: body(:)        !! of each
     integer, allocatable :: in_order(:)    !! which candidate each is
     logical :: alike = .false.             !! points of one side are searched, too
+    real(wp) :: farthest = 0.0_wp          !! square of the distance of any pair [m2]
   end type near_type
 
   !> What one piece of work finds.
@@ -68,6 +69,7 @@ contains
     call sort_into_cells(y, 2*maxval(reach), cells)
     ! side by side, cell by cell, in three dimensions, so that loops over them are none
     near%alike = alike
+    near%farthest = max(2*maxval(reach), 2*maxval(within))**2
     near%in_order = cells%order
     allocate (near%place(3, size(number)), source=0.0_wp)
     do c = 1, size(y, 2)
@@ -170,9 +172,10 @@ contains
       do q = rows(1, r), rows(2, r)
         d2 = (near%place(1, q) - here(1))**2 + (near%place(2, q) - here(2))**2 &
           & + (near%place(3, q) - here(3))**2
+        if (d2 > near%farthest .or. q == p) cycle
         sum_of_both = near%reach(p) + near%reach(q)
         if (near%body(q) == near%body(p)) sum_of_both = near%within(p) + near%within(q)
-        if (d2 > sum_of_both**2 .or. q == p) cycle
+        if (d2 > sum_of_both**2) cycle
         if (.not. near%alike .and. near%side(q) == near%side(p)) cycle
         if (n == size(others)) others = [others, others]
         n = n + 1
