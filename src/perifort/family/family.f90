@@ -34,6 +34,7 @@ module pd_family_family
     procedure(describe_interface), deferred :: describe
     procedure :: alike
     procedure :: bytes_are_shared
+    procedure :: level_of_bond
   end type family_type
 
   abstract interface
@@ -99,6 +100,14 @@ contains
     class(family_type), intent(in) :: family  !! the family
     bytes_are_shared = family%n_slots < 0
   end function bytes_are_shared
+
+  !> The level of the step that the bond of slots `k` and `j` takes, 0 without substeps.
+  pure integer function level_of_bond(family, k, j)
+    class(family_type), intent(in) :: family  !! the family; this version knows of no substeps
+    integer, intent(in) :: k                  !! slot of one end
+    integer, intent(in) :: j                  !! slot of the other end
+    level_of_bond = min(0, k, j, family%n_slots)
+  end function level_of_bond
 
   !> Room for the bonds of any one point.
   pure subroutine allocate_bonds(family, bonds)
