@@ -40,6 +40,7 @@ module pd_family_composite
     procedure :: alike
     procedure :: bytes_are_shared
     procedure :: level_of_bond
+    procedure :: has_level
     procedure :: give_levels
   end type composite_family_type
 
@@ -204,6 +205,15 @@ contains
     ! loops that add to both ends compute a bond where its first slot is
     level_of_bond = family%bond_level(min(k, j))
   end function level_of_bond
+
+  !> Whether slot `k` may have bonds of a level of substeps: of that of its grid, or of the finest.
+  pure logical function has_level(family, k, level)
+    class(composite_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                            !! slot
+    integer, intent(in) :: level                        !! 0 or above
+    has_level = level == family%levels
+    if (family%levels > 0) has_level = has_level .or. level == int(family%grid_level(k))
+  end function has_level
 
   !> Give bonds and points the levels of substeps (doc/theory.md, 5). Those of the list have the
   !> finest; so has the dilatation of every point with a bond there, and every block of the lattice

@@ -370,8 +370,11 @@ contains
     real(wp), allocatable :: others(:, :, :), products(:)
     real(wp) :: dissipated
     integer(i8) :: broken
+    integer :: m
 
     call strained_slots(system%strained, slots)
+    if (present(level)) slots = pack(slots, [(system%family%has_level(int(slots(m)), level), &
+      & m=1, size(slots))])
     if (size(slots) == 0 .and. .not. associated(system%body%order%ranks)) return
     if (abs(pairing%offset) > 0.0_wp .or. abs(pairing%held) > 0.0_wp) then
       call displacements_at(system, t, pairing, slots, others)
