@@ -10,7 +10,9 @@ module test_motion_substeps
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_explicit_substeps, only: evaluate_level, level_due
   use pd_motion_system, only: inverse_density, pairing_type, system_type
-  use pd_scene_content_types, only: scene_type
+  use pd_output_results_files, only: make_directory
+  use pd_output_results_sink, only: sink_type
+  use pd_scene_content_types, only: scene_type, unset
   use pd_set_up_prepare, only: prepare, set_up_type
   use perifort, only: public_fault => error_type, read_scene_text
   use bodies, only: box_scene, diary_type, expect_true, noise, ready, ready_alone, shake
@@ -33,6 +35,7 @@ contains
     testsuite = [ &
       & new_unittest('which levels are due', test_due), &
       & new_unittest('forces of a whole step are those of the body', test_forces), &
+      & new_unittest('points on no grid take the shortest step', test_cloud), &
       & new_unittest('impulses keep both momenta', test_momentum), &
       & new_unittest('the motion is of second order in the step', test_order), &
       & new_unittest('bonds break at the steps of their level', test_levels_of_breaking), &
@@ -40,7 +43,7 @@ contains
       & new_unittest('a run in pieces has the same bits', test_pieces), &
       & new_unittest('the step and its limit', test_limit), &
       & new_unittest('what is refused', test_refusals), &
-      & new_unittest('long: the energy stays bounded', test_energy)]
+      & new_unittest('long: the energy stays bounded over 100000 steps', test_energy)]
   end subroutine collect_motion_substeps
 
   !> A bar, a plate or a block of coarse cells of 1 m, refined at its end along x; with nu = 1/3 in
@@ -91,47 +94,98 @@ contains
     end do
   end subroutine test_due
 
-  !> Forces at the beginning of a step are those of one pass over all bonds; what kicks have beside
-  !> them balances. Between, only what belongs to finer levels is there, which balances, too.
+  !> Forces of lattices in one to three dimensions, with and without a dilatation.
   subroutine test_forces(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: dims(*) = [1, 2, 2, 2, 3], levels(*) = [2, 1, 2, 1, 1]
     real(wp), parameter :: ratios(*) = [0.3_wp, 1.0_wp/3, 0.2_wp, 0.4_wp, 0.3_wp]
     type(set_up_type) :: set_up
-    type(pairing_type) :: pairings(0:2)
-    real(wp), allocatable :: force(:, :)
-    real(wp) :: largest
-    integer :: trial, c, l
+    integer :: trial
 
     do trial = 1, size(dims)
       call ready_text(refined(dims(trial), levels(trial), ratios(trial), fast//'steps = 1'), &
         & set_up, error)
       if (allocated(error)) return
-      associate (system => set_up%system)
-        call shake(system%body, some_gradient(0.01_wp), 0.01_wp, 7, system%state%u)
-        allocate (force, mold=system%state%force)
-        call internal_force(system%body, system%family, system%model, options_of(system%model), &
-          & system%workspace, system%state%u, system%state%p, force, system%strained)
-        largest = max_abs(force)
-        call evaluate_level(system, 0.0_wp, 0, pairings(0:levels(trial)))
-        call expect_close(error, system%state%force, force, 1.0e-13_wp*largest, 'forces')
-        call expect_true(error, max_abs(system%beyond) > 1.0e-3_wp*largest, 'no longer impulses')
-        do l = 0, levels(trial)
-          if (l > 0) call evaluate_level(system, 0.0_wp, l, pairings(0:levels(trial)))
-          do c = 1, dims(trial)
-            call expect_close(error, sum(system%state%force(:, c)*system%body%volume), 0.0_wp, &
-              & 1.0e-13_wp*sum(abs(force(:, c))*system%body%volume), 'sum of forces')
-            if (l < levels(trial)) call expect_close(error, sum(system%beyond(:, c) &
-              & *system%body%volume), 0.0_wp, 1.0e-13_wp*sum(abs(force(:, c)) &
-              & *system%body%volume), 'sum of what is beyond')
-          end do
-        end do
-        call expect_true(error, max_abs(system%state%force - force) > 1.0e-3_wp*largest, &
-          & 'the finest level has all forces')
-        deallocate (force)
-      end associate
+      call expect_split(error, set_up%system)
     end do
   end subroutine test_forces
+
+  !> Forces of two lattices and a cloud beside the finer one, with one horizon for all.
+  subroutine test_cloud(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: here = 'build/test_motion_substeps'
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    type(sink_type) :: sink
+    character(120) :: row
+    integer :: i, j, state, trial
+
+    state = 5
+    call make_directory(here, fault)
+    if (.not. allocated(fault)) call sink%open(here//'/cloud.txt', fault)
+    do j = 1, 10
+      do i = 1, 5
+        write (row, '(4(es24.16, 1x))') spacing*(31.5_wp + i + 0.1_wp*noise(state)), &
+          & spacing*(j - 0.5_wp + 0.1_wp*noise(state)), 0.0_wp, 2.0e-3_wp*spacing**2
+        if (.not. allocated(fault)) call sink%put(trim(row)//line, fault)
+      end do
+    end do
+    if (.not. allocated(fault)) call sink%close(fault)
+    call accept(error, fault)
+    if (allocated(error)) return
+    do trial = 1, 2
+      call box_scene([20, 10], spacing, merge(1.0_wp/3, 0.3_wp, trial == 1), scene)
+      scene%horizon%length = 3.015_wp*spacing
+      scene%bodies = [scene%bodies(1), scene%bodies(1), scene%bodies(1)]
+      scene%bodies(2)%name = 'fine'
+      scene%bodies(2)%lower(1) = 20*spacing
+      scene%bodies(2)%upper(1) = 32*spacing
+      scene%bodies(2)%points(:2) = [24, 20]
+      scene%bodies(3)%name = 'cloud'
+      scene%bodies(3)%file = here//'/cloud.txt'
+      scene%bodies(3)%points = 0
+      scene%bodies(3)%lower = unset
+      scene%bodies(3)%upper = unset
+      scene%time%substeps = .true.
+      call ready_alone(scene, set_up, error)
+      if (allocated(error)) return
+      call expect_split(error, set_up%system)
+    end do
+  end subroutine test_cloud
+
+  !> Forces at the beginning of a step are those of one pass over all bonds; what kicks have beside
+  !> them balances. Between, only what belongs to finer levels is there, which balances, too.
+  subroutine expect_split(error, system)
+    type(error_type), allocatable, intent(inout) :: error
+    type(system_type), intent(inout) :: system
+    type(pairing_type) :: pairings(0:system%levels)
+    real(wp) :: force(system%body%n_slots, system%body%dim), largest, size_of_sum
+    integer :: c, l
+
+    if (allocated(error)) return
+    call shake(system%body, some_gradient(0.01_wp), 0.01_wp*minval(system%body%spacing), 7, &
+      & system%state%u)
+    call internal_force(system%body, system%family, system%model, options_of(system%model), &
+      & system%workspace, system%state%u, system%state%p, force, system%strained)
+    largest = max_abs(force)
+    do l = 0, system%levels
+      call evaluate_level(system, 0.0_wp, l, pairings)
+      if (l == 0) then
+        call expect_close(error, system%state%force, force, 1.0e-13_wp*largest, 'forces')
+        call expect_true(error, max_abs(system%beyond) > 1.0e-3_wp*largest, 'no longer impulses')
+      end if
+      do c = 1, system%body%dim
+        size_of_sum = sum(abs(force(:, c))*system%body%volume)
+        call expect_close(error, sum(system%state%force(:, c)*system%body%volume), 0.0_wp, &
+          & 1.0e-13_wp*size_of_sum, 'sum of forces')
+        if (l < system%levels) call expect_close(error, sum(system%beyond(:, c) &
+          & *system%body%volume), 0.0_wp, 1.0e-13_wp*size_of_sum, 'sum of what is beyond')
+      end do
+    end do
+    call expect_true(error, max_abs(system%state%force - force) > 1.0e-3_wp*largest, &
+      & 'the finest level has all forces')
+  end subroutine expect_split
 
   !> Momentum and angular momentum of velocities as the integrator keeps them, and the sizes of
   !> their terms. Points come to their places with these velocities: where on that way they are
@@ -454,11 +508,28 @@ contains
       & no//'a scene without lattices that a list joins|asked for')
     i = index(text, '&refine')
     other = text(:i - 1)//text(index(text, '&time'):)
+    call refuse(error, named(text)//"&body name = 'tool' lower = 40, 0 upper = 44, 6 "// &
+      & "points = 4, 6 /"//line//"&contact between = 'plate', 'tool' /"//line, no//'&contact')
+    call refuse(error, named(refined(3, 1, 0.25_wp, fast//'steps = 5'))//"&rigid name = 'tool' "// &
+      & "shape = 'box' edges = 1, 2, 3 centre = 30, 2, 2 density = 1 /"//line// &
+      & "&contact between = 'plate', 'tool' /"//line, no//'&rigid')
     call refuse(error, other, no//'a scene without lattices that a list joins')
     call refuse(error, other//'&body lower = 34, 0 upper = 40, 6 points = 9, 9 /'//line// &
       & '&horizon local = .true. /'//line, no//'lattices with spacings of')
     call refuse(error, other//'&body lower = 34.5, 0 upper = 40.5, 6 points = 6, 6 /'//line, &
       & no//'lattices of one spacing')
+
+  contains
+
+    !> The text with a name of its body.
+    pure function named(text) result(new)
+      character(*), intent(in) :: text
+      character(:), allocatable :: new
+      integer :: at
+
+      at = index(text, '&body ') + 6
+      new = text(:at - 1)//"name = 'plate' "//text(at:)
+    end function named
   end subroutine test_refusals
 
   !> 10^5 steps of a small body at 0.8 of the stable step. The energy that leapfrog keeps is another

@@ -45,11 +45,11 @@ contains
         & 'they have no level')
       if (allocated(error)) return
     end do
-    if (size(scene%contacts) > 0) then
-      call refuse('contact', 1, '', '&contact', 'its forces have no level')
-    else if (size(scene%rigids) > 0) then
+    if (size(scene%rigids) > 0) then
       call refuse('rigid', 1, '', '&rigid', &
         & 'the motion of rigid bodies is integrated in whole steps')
+    else if (size(scene%contacts) > 0) then
+      call refuse('contact', 1, '', '&contact', 'its forces have no level')
     else if (system%terms%number() > number_of_loads(system%terms)) then
       call refuse('time', 1, 'substeps', 'terms of the force', 'they have no level')
     else if (allocated(system%heating%curves)) then
