@@ -1,15 +1,15 @@
 !> Bodies that tests share, built from plain numbers, and what tests do with all of them.
 module bodies
   use omp_lib, only: omp_set_num_threads
-  use pd_base_kinds, only: wp, i1, i4
+  use pd_base_kinds, only: wp
   use pd_base_error, only: fault_type => error_type
   use pd_base_reduce, only: noise
   use pd_body_body, only: body_type
   use pd_law_material, only: material_type, new_material
   use pd_set_up_prepare, only: set_up_type, prepare
   use pd_motion_observer, only: observer_type, instant_type
-  use pd_motion_account, only: energies_type, energies_of
-  use pd_motion_system, only: system_type, add_loads, inverse_density
+  use pd_motion_account, only: energies_type, energies_of, velocities_now
+  use pd_motion_system, only: system_type
   use pd_scene_content_types, only: scene_type, name_length
   use comparisons, only: expect => close_number, text_of
   use testdrive, only: error_type, test_failed
@@ -167,7 +167,6 @@ contains
     type(fault_type), allocatable, intent(out) :: error
     type(energies_type) :: energies
     real(wp), allocatable :: v(:, :), now(:)
-    integer :: k
 
     if (allocated(error)) return
     if (instant%settled .and. instant%load_step > 0) observer%settled = observer%settled + 1
@@ -180,12 +179,7 @@ contains
       allocate (observer%time(0), observer%kinetic(0), observer%strain(0), observer%dissipated(0), &
         & observer%work(0), observer%u(system%body%dim, 0))
     end if
-    v = system%state%v
-    do k = 1, size(v, 1)
-      v(k, :) = v(k, :) + instant%kick*system%state%force(k, :)*inverse_density(system%model, k)
-    end do
-    call add_loads(system, instant%time, instant%kick, .true., v)
-    where (system%held == 1_i1) v = system%state%v
+    call velocities_now(system, instant%time, instant%kick, v)
     call energies_of(system, v, energies)
     observer%n = observer%n + 1
     observer%time = [observer%time, instant%time]

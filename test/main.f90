@@ -74,6 +74,7 @@ program main
   use test_motion_coarse, only: collect_motion_coarse
   use test_motion_pins, only: collect_motion_pins
   use test_motion_plastic, only: collect_motion_plastic
+  use test_motion_substeps, only: collect_motion_substeps
   use test_motion_reactions, only: collect_motion_reactions
   use test_motion_static_events, only: collect_motion_static_events
   use test_motion_static_relaxation, only: collect_motion_static_relaxation
@@ -210,6 +211,7 @@ program main
   call register('motion_coarse', collect_motion_coarse)
   call register('motion_pins', collect_motion_pins)
   call register('motion_plastic', collect_motion_plastic)
+  call register('motion_substeps', collect_motion_substeps)
   call register('motion_reactions', collect_motion_reactions)
   call register('motion_static_events', collect_motion_static_events)
   call register('motion_static_relaxation', collect_motion_static_relaxation)

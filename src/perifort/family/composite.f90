@@ -4,11 +4,12 @@
 module pd_family_composite
   use pd_base_archive, only: archive_type
   use pd_base_error, only: error_type
-  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_text, only: to_text
   use pd_body_body, only: allocate_points, body_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
-  use pd_family_lattice, only: grids_fit, lattice_family_type, new_lattice_family
+  use pd_family_lattice, only: both_ends, grid_at, grids_fit, lattice_family_type, &
+    & new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_rule_type
   implicit none (type, external)
@@ -24,6 +25,12 @@ module pd_family_composite
     integer(i4), allocatable :: slot(:)        !! of each live slot of the list, its slot here
     integer(i4), allocatable :: place(:)       !! of each slot, its slot of the list; 0: has none
     integer :: first_free = 0                  !! the first slot behind the grids
+    ! of substeps, for which each bond has a level, and each point's dilatation
+    integer :: levels = 0                      !! the finest one; 0: there are no substeps
+    integer(i1), allocatable :: own_level(:)   !! of each slot, that of its dilatation
+    integer(i1), allocatable :: bond_level(:)  !! of each slot, that of the lattice's bonds which
+                                               !! its block computes
+    integer(i1), allocatable :: grid_level(:)  !! of each slot, that of its spacing
   contains
     procedure :: bonds_of
     procedure :: break_bond
@@ -32,6 +39,9 @@ module pd_family_composite
     procedure :: describe
     procedure :: alike
     procedure :: bytes_are_shared
+    procedure :: level_of_bond
+    procedure :: has_level
+    procedure :: give_levels
   end type composite_family_type
 
 contains
@@ -179,5 +189,82 @@ contains
     class(composite_family_type), intent(in) :: family  !! the family
     bytes_are_shared = size(family%slot) > 0
   end function bytes_are_shared
+
+  !> The level of the step that the bond of slots `k` and `j` takes, 0 without substeps: bonds of
+  !> the list take the finest.
+  pure integer function level_of_bond(family, k, j)
+    class(composite_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                            !! slot of one end
+    integer, intent(in) :: j                            !! slot of the other end
+
+    level_of_bond = 0
+    if (family%levels == 0) return
+    level_of_bond = family%levels
+    if (max(k, j) >= family%first_free) return
+    if (grid_at(family%lattice, int(k, i8)) /= grid_at(family%lattice, int(j, i8))) return
+    ! loops that add to both ends compute a bond where its first slot is
+    level_of_bond = family%bond_level(min(k, j))
+  end function level_of_bond
+
+  !> Whether slot `k` may have bonds of a level of substeps: of that of its grid, or of the finest.
+  pure logical function has_level(family, k, level)
+    class(composite_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                            !! slot
+    integer, intent(in) :: level                        !! 0 or above
+    has_level = level == family%levels
+    if (family%levels > 0) has_level = has_level .or. level == int(family%grid_level(k))
+  end function has_level
+
+  !> Give bonds and points the levels of substeps (doc/theory.md, 5). Those of the list have the
+  !> finest; so has the dilatation of every point with a bond there, and every block of the lattice
+  !> that computes a bond of such a point. All others have the level of their grid.
+  pure subroutine give_levels(family, of_grid, part)
+    class(composite_family_type), intent(inout) :: family  !! whole; has levels on return
+    integer, intent(in) :: of_grid(:)  !! (grids of the lattice) their levels, from 0
+    integer(i1), allocatable, intent(out) :: part(:)
+      !! (blocks of the lattice) in which part of the passes each one is: those of the levels; that
+      !! of the finest level has the blocks of coarser grids alone, the blocks of its own grids
+      !! follow in a part behind
+    type(bonds_type) :: bonds
+    integer(i4), allocatable :: block_at(:)
+    integer :: b, k, i, m
+
+    family%levels = maxval(of_grid)
+    allocate (part(size(family%lattice%block)), block_at(family%n_slots))
+    if (allocated(family%own_level)) &
+      & deallocate (family%own_level, family%bond_level, family%grid_level)
+    allocate (family%grid_level(family%n_slots), source=int(family%levels, i1))
+    block_at = 0_i4
+    associate (lattice => family%lattice)
+      do b = 1, size(part)
+        associate (first => lattice%block(b), last => lattice%block(b) + lattice%block_length - 1)
+          part(b) = int(of_grid(grid_at(lattice, first)), i1)
+          family%grid_level(first:last) = part(b)
+          block_at(first:last) = int(b, i4)
+          if (part(b) == family%levels) part(b) = part(b) + 1_i1
+        end associate
+      end do
+      family%own_level = family%grid_level
+      if (both_ends(family%dim, lattice%mixed)) then
+        call allocate_bonds(lattice, bonds)
+        do i = 1, size(family%slot)
+          k = family%slot(i)
+          family%own_level(k) = int(family%levels, i1)
+          if (k >= family%first_free) cycle
+          call lattice%bonds_of(k, bonds)
+          do m = 1, bonds%n
+            b = block_at(min(k, int(bonds%j(m))))
+            part(b) = max(int(family%levels, i1), part(b))
+          end do
+        end do
+      end if
+      allocate (family%bond_level(family%n_slots), source=int(family%levels, i1))
+      do b = 1, size(part)
+        associate (first => lattice%block(b), last => lattice%block(b) + lattice%block_length - 1)
+          family%bond_level(first:last) = min(part(b), int(family%levels, i1))
+        end associate
+      end do
+    end associate
+  end subroutine give_levels
 
 end module pd_family_composite

@@ -34,6 +34,8 @@ module pd_family_family
     procedure(describe_interface), deferred :: describe
     procedure :: alike
     procedure :: bytes_are_shared
+    procedure :: level_of_bond
+    procedure :: has_level
   end type family_type
 
   abstract interface
@@ -99,6 +101,22 @@ contains
     class(family_type), intent(in) :: family  !! the family
     bytes_are_shared = family%n_slots < 0
   end function bytes_are_shared
+
+  !> The level of the step that the bond of slots `k` and `j` takes, 0 without substeps.
+  pure integer function level_of_bond(family, k, j)
+    class(family_type), intent(in) :: family  !! the family; this version knows of no substeps
+    integer, intent(in) :: k                  !! slot of one end
+    integer, intent(in) :: j                  !! slot of the other end
+    level_of_bond = min(0, k, j, family%n_slots)
+  end function level_of_bond
+
+  !> Whether slot `k` may have bonds of a level of substeps.
+  pure logical function has_level(family, k, level)
+    class(family_type), intent(in) :: family  !! the family; this version knows of no substeps
+    integer, intent(in) :: k                  !! slot
+    integer, intent(in) :: level              !! 0 or above
+    has_level = level == 0 .and. k <= family%n_slots
+  end function has_level
 
   !> Room for the bonds of any one point.
   pure subroutine allocate_bonds(family, bonds)

@@ -49,7 +49,7 @@ contains
   !> the stretches and dilatations under `u` and under that set in place of the squares
   !> (doc/theory.md, 9).
   subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated, others, &
-    & products, laws, part)
+    & products, laws, part, level)
     type(body_type), intent(in) :: body          !! its volumes [m3]
     class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
     type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
@@ -67,6 +67,8 @@ contains
       !! of the generic pass, where the model is generic; knows the broken bonds on return
     real(wp), intent(in), optional :: part
       !! of its limit, beyond which a bond breaks; 1 by default [-]
+    integer, intent(in), optional :: level
+      !! of substeps: bonds of this level alone break; all by default
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:), after(:)
     logical, allocatable :: gone(:)
@@ -75,8 +77,10 @@ contains
     type(running_type) :: running
     real(wp) :: totals(6)
     logical :: breaks, together
-    integer :: g, m, k, i, sets
+    integer :: g, m, k, i, sets, only
 
+    only = -1
+    if (present(level)) only = level
     of_limit = 1.0_wp
     if (present(part)) of_limit = part
     sets = 0
@@ -87,7 +91,7 @@ contains
     together = family%bytes_are_shared()
     !$omp parallel default(none) &
     !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
-    !$omp shared(of_limit) &
+    !$omp shared(of_limit, only) &
     !$omp firstprivate(before, after) private(bonds, gone, g, m, k, i, breaks) if(.not. together)
     call allocate_bonds(family, bonds)
     allocate (gone(family%most_bonds))
@@ -98,6 +102,8 @@ contains
         call family%bonds_of(k, bonds)
         do i = 1, bonds%n
           call decide(model, u, k, bonds, i, of_limit, breaks)
+          if (breaks .and. only >= 0) &
+            & breaks = family%level_of_bond(k, int(bonds%j(i))) == only
           gone(i) = breaks
           if (.not. breaks) cycle
           number(m) = number(m) + 1

@@ -54,14 +54,15 @@ contains
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
-    logical :: both
+    logical :: both, in_parts
     integer :: b, s, k, colour
 
     call prepare_blocks(family, model, workspace)
     both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model, options)
+    in_parts = allocated(workspace%part)
     !$omp parallel default(none) &
-    !$omp shared(family, model, options, workspace, u, p, strained, both, limit) &
+    !$omp shared(family, model, options, workspace, u, p, strained, both, limit, in_parts) &
     !$omp private(scratch, own, b, s, k, colour)
     call allocate_scratch(family, scratch)
     if (family%mixed) call split_displacements(workspace%singles, u)
@@ -77,6 +78,9 @@ contains
       !$omp do schedule(static)
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
+          if (in_parts) then
+            if (.not. is_due(workspace, b)) cycle
+          end if
           if (shared_weights(family, workspace, b, both)) then
             call dilatation_of_block(family, model, options, workspace%singles, both, limit, b, &
               & workspace%table(workspace%weights(b)), scratch, u, p, &
@@ -118,20 +122,23 @@ contains
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
-    logical :: both
+    logical :: both, in_parts, fresh
     integer :: b, c, s, k, colour
 
     call prepare_blocks(family, model, workspace)
     both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model, options)
+    in_parts = allocated(workspace%part)
+    fresh = .not. (in_parts .and. workspace%onto)
     !$omp parallel default(none) &
-    !$omp shared(family, model, options, workspace, u, p, force, strained, both, limit) &
+    !$omp shared(family, model, options, workspace, u, p, force, strained, both, limit, in_parts) &
+    !$omp shared(fresh) &
     !$omp private(scratch, own, b, c, s, k, colour)
     call allocate_scratch(family, scratch)
     if (family%mixed .and. .not. options%dilatation) call split_displacements(workspace%singles, u)
     if (family%mixed .and. options%dilatation) call round_dilatation(workspace%singles, p)
     if (family%mixed .and. both) call clear_sums(workspace%singles, size(force, 2))
-    if (both) then
+    if (fresh .and. (both .or. in_parts)) then
       do c = 1, size(force, 2)
         !$omp do simd schedule(static)
         do k = 1, size(force, 1)
@@ -140,11 +147,14 @@ contains
         !$omp end do simd nowait
       end do
     end if
-    call clear(strained)
+    if (fresh) call clear(strained)
     do colour = 1, 2
       !$omp do schedule(static)
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
+          if (in_parts) then
+            if (.not. is_due(workspace, b)) cycle
+          end if
           if (shared_weights(family, workspace, b, both)) then
             call force_of_block(family, model, options, workspace%singles, both, limit, b, &
               & workspace%table(workspace%weights(b)), scratch, u, p, &
@@ -258,6 +268,13 @@ contains
       strained(k) = 0_i1
     end do
   end subroutine clear
+
+  !> Whether the passes take block `b`, where they take some.
+  pure logical function is_due(workspace, b)
+    type(lattice_workspace_type), intent(in) :: workspace
+    integer, intent(in) :: b
+    is_due = workspace%part(b) >= workspace%due(1) .and. workspace%part(b) <= workspace%due(2)
+  end function is_due
 
   !> Whether the block can take the weights it shares with others: it has some, and no broken bond
   !> (with `forward` among those alone that lie forward).

@@ -48,6 +48,11 @@ module pd_force_workspace
     integer(i1), allocatable :: formulas_used(:)  !! range of the fast formulas of each block in the
                                                   !! last dilatation pass, 0: none
     type(singles_type) :: singles              !! in mixed precision
+    ! of substeps (`pd_motion_substeps`), which take some of the blocks at a time
+    integer(i1), allocatable :: part(:)        !! of the blocks, in which each one is; not
+                                               !! allocated: passes take all blocks
+    integer(i1) :: due(2) = [0_i1, 0_i1]       !! first and last part that passes take
+    logical :: onto = .false.                  !! forces are added to what is there
   end type lattice_workspace_type
 
   !> Of a list family. Made by the first pass, if nobody has (`prepare_list`).

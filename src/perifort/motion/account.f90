@@ -301,6 +301,13 @@ contains
         v(k, c) = v(k, c) + kick*system%state%force(k, c)*inverse_density(system%model, k)
       end do
     end do
+    if (system%goes_beyond) then
+      do c = 1, size(v, 2)
+        do k = 1, size(v, 1)
+          v(k, c) = v(k, c) + kick*system%beyond(k, c)*inverse_density(system%model, k)
+        end do
+      end do
+    end if
     call add_loads(system, t, kick, .true., v)
     where (system%held == 1) v = system%state%v
   end subroutine velocities_now

@@ -29,6 +29,10 @@ contains
     call archive%keep('displacement', system%state%u)
     call archive%keep('velocity', system%state%v)
     call archive%keep('force', system%state%force)
+    if (system%levels > 0) then
+      call archive%keep('force beyond', system%beyond)
+      call archive%keep('goes beyond', system%goes_beyond)
+    end if
     call archive%keep('damage', system%state%damage)
     call archive%keep('strained', system%strained)
     call system%family%keep_bonds(archive)

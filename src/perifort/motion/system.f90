@@ -28,8 +28,9 @@ module pd_motion_system
   implicit none (type, external)
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
-    & renew_forces, renew_conditions, explain_condition, break_now, break_batch, greatest_ratio, &
-    & add_loads, inverse_density, view_of, find_loaded, apply_to_held
+    & renew_forces, renew_conditions, explain_condition, break_now, break_batch, break_marked, &
+    & greatest_ratio, settle_account, add_loads, inverse_density, view_of, find_loaded, &
+    & apply_to_held
 
   !> What moves. All arrays are over slots; dead slots stay zero.
   type :: state_type
@@ -72,6 +73,10 @@ module pd_motion_system
     type(watch_type) :: watch                   !! over the energies
     type(condition_fault), allocatable :: fault !! first value of a condition that is not finite
     real(wp) :: stable_step = 0.0_wp            !! the integrator's limit, 0: unknown [s]
+    integer :: levels = 0                       !! finest level of substeps; 0: there are none
+    real(wp), allocatable :: beyond(:, :)       !! with them: what kicks have beside the forces, for
+                                                !! bonds of longer steps (n_slots, dim) [N/m3]
+    logical :: goes_beyond = .false.            !! such bonds are due at the present instant
   end type system_type
 
   !> The other instant in the products of stretches by which the energy of breaking bonds is counted
@@ -356,31 +361,37 @@ contains
   end subroutine break_batch
 
   !> Break bonds of the marked slots and count what that dissipates.
-  subroutine break_marked(system, t, pairing, slots)
+  subroutine break_marked(system, t, pairing, slots, level)
     type(system_type), intent(inout) :: system
+      !! after the pass that marks; bonds, damage and accounts are up to date on return
     real(wp), intent(in) :: t                          !! of the present displacements [s]
-    type(pairing_type), intent(in) :: pairing
-    integer(i4), allocatable, intent(out) :: slots(:)  !! those that lost some
+    type(pairing_type), intent(in) :: pairing          !! for their energy
+    integer(i4), allocatable, intent(out) :: slots(:)  !! those that lost some, ascending
+    integer, intent(in), optional :: level             !! of substeps: bonds of this level alone
     real(wp), allocatable :: others(:, :, :), products(:)
     real(wp) :: dissipated
     integer(i8) :: broken
+    integer :: m
 
     call strained_slots(system%strained, slots)
+    if (present(level)) slots = pack(slots, [(system%family%has_level(int(slots(m)), level), &
+      & m=1, size(slots))])
     if (size(slots) == 0 .and. .not. associated(system%body%order%ranks)) return
     if (abs(pairing%offset) > 0.0_wp .or. abs(pairing%held) > 0.0_wp) then
       call displacements_at(system, t, pairing, slots, others)
       allocate (products(size(others, 3)))
       call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
-        & system%state%damage, broken, dissipated, others, products, system%workspace%generic)
+        & system%state%damage, broken, dissipated, others, products, system%workspace%generic, &
+        & level=level)
       ! what bonds that break after the forces still do, they do in the step to come
-      system%dissipation_due = products(1) - dissipated
+      system%dissipation_due = system%dissipation_due + (products(1) - dissipated)
       ! the trapezoidal rule lets bonds pull at constrained points up to half a step before or after
       ! the present, whatever the integrator does
-      if (size(products) > 1) system%work_due = products(1) - products(2)
+      if (size(products) > 1) system%work_due = system%work_due + (products(1) - products(2))
       if (.not. system%break_late) call settle_account(system)
     else
       call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
-        & system%state%damage, broken, dissipated, laws=system%workspace%generic)
+        & system%state%damage, broken, dissipated, laws=system%workspace%generic, level=level)
     end if
     system%broken = system%broken + broken
     system%dissipated = system%dissipated + dissipated
@@ -388,7 +399,7 @@ contains
 
   !> Add what is due to the accounts.
   pure subroutine settle_account(system)
-    type(system_type), intent(inout) :: system
+    type(system_type), intent(inout) :: system  !! its dissipated energy and external work change
     system%dissipated = system%dissipated + system%dissipation_due
     system%external_work = system%external_work + system%work_due
     system%dissipation_due = 0.0_wp
@@ -442,6 +453,10 @@ contains
         ! constrained components are imposed below, and those of pins know their velocities
         where (system%held(k, :) == 0_i1) v = v + pairing%kick*inverse_density(system%model, k) &
           & *system%state%force(k, :)
+        if (system%goes_beyond) then
+          where (system%held(k, :) == 0_i1) v = v + pairing%kick &
+            & *inverse_density(system%model, k)*system%beyond(k, :)
+        end if
         if (allocated(loads)) then
           where (system%held(k, :) == 0_i1) v = v + pairing%kick &
             & *inverse_density(system%model, k)*loads(k, :)

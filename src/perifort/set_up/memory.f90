@@ -57,6 +57,7 @@ contains
     real(wp), parameter :: per_weight = 16.0_wp                         !! tables of lattices
     real(wp), parameter :: per_bit = 0.16_wp                            !! of a lattice, padded
     real(wp), parameter :: per_breaking = 30.0_wp                       !! limits and damage
+    real(wp), parameter :: per_beyond = 10.0_wp                         !! substeps, a component
     real(wp), parameter :: per_solver = 95.0_wp, per_rule = 24.0_wp     !! a component
     real(wp), parameter :: block = 8.0_wp                               !! slots with one table
     real(wp), parameter :: per_generic_bond = 33.0_wp                   !! of both directions each
@@ -83,6 +84,7 @@ contains
     call find_laws(scene, generic, history)
     bytes = program + points*per_point(dim)
     if (breaking) bytes = bytes + points*per_breaking
+    if (scene%time%substeps) bytes = bytes + points*dim*per_beyond
     ! the part of the points that stands in lists
     listed = 0.0_wp
     if (scene%horizon%family == 'list' .or. any(.not. has_grid(scene%bodies))) then

@@ -4,6 +4,7 @@ module pd_set_up_plan
   use pd_base_error, only: error_type, internal_fault
   use pd_base_reduce, only: any_of_ranks, least_over
   use pd_base_text, only: to_text
+  use pd_set_up_substeps, only: bound_by_levels
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
   use pd_scene_groups_relaxation, only: batch_of, safety_of
@@ -78,6 +79,7 @@ contains
       call plan_growth(scene, system, plan%relaxation, error)
       return
     end if
+    call bound_by_levels(system, bound)
     plan%equation = stable_step(system%body, system%model, bound) &
       & *integrator_limit(plan%integrator)/2
     if (damping > 0.0_wp) plan%equation = damped_step(plan%equation, damping, plan%integrator)

@@ -43,6 +43,7 @@ module pd_set_up_prepare
   use pd_set_up_ranks, only: bonds_of_ranks, broken_bonds, check_ranks, divide_body, &
     & find_lowest, join_ranks, reproducible_layer
   use pd_set_up_plan, only: plan_type, make_plan
+  use pd_set_up_substeps, only: arrange_substeps, check_step
   use pd_set_up_rigid_bodies, only: check_within, rigid_bodies_of_scene
   use pd_set_up_toughness_toughness, only: set_critical_by_lattice
   implicit none (type, external)
@@ -238,6 +239,8 @@ contains
       system%break_late = scene%time%breaking == 'after_forces'
       call rigid_bodies_of_scene(scene, system, error)
       if (allocated(error)) return
+      call arrange_substeps(scene, system, error)
+      if (allocated(error)) return
       call start_system(system)
       if (allocated(system%fault)) then
         call explain_condition(system, status_input, error)
@@ -247,6 +250,7 @@ contains
       call check_within(scene, system, error)
       if (allocated(error)) return
       call make_plan(scene, system, set_up%plan, error)
+      if (.not. allocated(error)) call check_step(scene, set_up%plan%step, set_up%plan%limit, error)
       if (allocated(error)) return
       call check_bounds(scene, system, set_up%plan, error)
       if (allocated(error)) return

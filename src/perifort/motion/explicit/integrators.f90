@@ -17,6 +17,7 @@ module pd_motion_explicit_integrators
   use pd_motion_watch_fault, only: explain_fault, faulty_slot, points_at_once, stays_within
   use pd_motion_watch_rescue, only: good_state_type, keep_good, show_good
   use pd_motion_energy_watch, only: watch_type
+  use pd_motion_explicit_substeps, only: evaluate_level, level_due
   use pd_motion_account, only: energies_type, energies_of, account, velocities_now
   use pd_motion_system, only: system_type, pairing_type, evaluate, add_loads, inverse_density, &
     & explain_condition
@@ -69,8 +70,12 @@ contains
       system%memory%step = n
       system%time = instant%time
       if (n > seen) then
-        call evaluate(system, instant%time, breaking=.true., &
-          & pairing=pairing_of(integrator, n, dt, system%break_late))
+        if (system%levels > 0) then
+          call evaluate_level(system, instant%time, 0, pairings_of(system, n, 0, dt))
+        else
+          call evaluate(system, instant%time, breaking=.true., &
+            & pairing=pairing_of(integrator, n, dt, system%break_late))
+        end if
         if (allocated(system%fault)) then
           call explain_condition(system, status_no_answer, error)
           call show_good(good, system, observer, error)
@@ -78,7 +83,7 @@ contains
         end if
         ! forward_backward and Verlet keep v at half steps: half a kick brings it to this instant
         instant%kick = 0.0_wp
-        if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2
+        if (n > 0 .and. at_half_steps(integrator)) instant%kick = dt/2**(system%levels + 1)
         call gather_pins(system, instant%time, instant%kick)
         call gather_rigid_bodies(system, instant%time, instant%kick)
         call account(system, instant%time)
@@ -88,7 +93,14 @@ contains
       end if
       if (n == steps) exit
       call check_energies(system, instant, bound, good)
-      if (at_half_steps(integrator)) then
+      if (system%levels > 0) then
+        call leap_in_substeps(system, n, dt, squares, sound)
+        if (allocated(system%fault)) then
+          call explain_condition(system, status_no_answer, error)
+          call show_good(good, system, observer, error)
+          return
+        end if
+      else if (at_half_steps(integrator)) then
         ! the first velocity gets only half its kick: the scheme as printed is of first order
         call leap(system, instant%time, merge(dt/2, dt, n == 0), dt, squares, sound)
         call move_pins(system, instant%time, dt)
@@ -219,6 +231,46 @@ contains
     if (at_half_steps(integrator)) pairing%kick = merge(dt, dt/2, n > 0)
   end function pairing_of
 
+  !> The pairings of bonds of each level at the `m`-th shortest substep of step `n` of `dt`: by the
+  !> steps of their level, from velocities that the kick of the shortest substep brings on.
+  pure function pairings_of(system, n, m, dt) result(pairings)
+    type(system_type), intent(in) :: system  !! with substeps, and forward_backward
+    integer, intent(in) :: n, m
+    real(wp), intent(in) :: dt               !! [s]
+    type(pairing_type) :: pairings(0:system%levels)
+    type(pairing_type) :: shortest
+    integer :: l
+
+    shortest = pairing_of('forward_backward', n + m, dt/2**system%levels, system%break_late)
+    do l = 0, system%levels
+      pairings(l) = pairing_of('forward_backward', n + m, dt/2**l, system%break_late)
+      pairings(l)%kick = shortest%kick
+    end do
+  end function pairings_of
+
+  !> Step `n` from the instant of its forces to the last kick before the next: in it the finest
+  !> level takes 2^levels substeps. `sound` and `squares` as of `leap`, for the last of them.
+  subroutine leap_in_substeps(system, n, dt, squares, sound)
+    type(system_type), intent(inout) :: system
+      !! with levels; a value of a condition that is not finite is noted in its `fault`
+    integer, intent(in) :: n
+    real(wp), intent(in) :: dt
+    real(wp), intent(out) :: squares
+    logical, intent(out) :: sound
+    real(wp) :: t, short
+    integer :: m
+
+    short = dt/2**system%levels
+    do m = 0, 2**system%levels - 1
+      t = n*dt + m*short
+      if (m > 0) call evaluate_level(system, t, level_due(system%levels, m), &
+        & pairings_of(system, n, m, dt))
+      if (allocated(system%fault)) return
+      call leap(system, t, merge(short/2, short, n + m == 0), short, squares, sound)
+      if (.not. sound) return
+    end do
+  end subroutine leap_in_substeps
+
   !> Room for what the integrator carries from step to step.
   subroutine begin_memory(system, integrator)
     type(system_type), intent(inout) :: system
@@ -304,6 +356,8 @@ contains
         end do
       end if
       do c = 1, system%body%dim
+        if (system%goes_beyond) system%state%force(first:last, c) &
+          & = system%state%force(first:last, c) + system%beyond(first:last, c)
         call leap_block(last - first + 1, scale, dt, system%state%force(first:last, c), &
           & system%state%v(first:last, c), system%state%u(first:last, c), sum_of_block)
         squares = squares + sum_of_block

@@ -134,7 +134,10 @@ contains
     else if (scene%time%limit == 'spectral') then
       text = text//line('', 'the largest frequency does not allow a larger step')
     end if
-    if (.not. (system%model%weighted .or. system%model%generic)) then
+    if (system%levels > 0) then
+      text = text//line('substeps', to_text(2**system%levels)//' of '//with_unit(plan%step &
+        & /2**system%levels, 's', 6)//' for the finest lattice')
+    else if (.not. (system%model%weighted .or. system%model%generic)) then
       text = text//line('7.25 as printed', printed(plan))
       text = text//line('book''s estimate', with_unit(plan%book, 's', 6))
     end if

@@ -197,6 +197,15 @@ contains
       & .not. is_set(scene%time%duration)) then
       call rule_fault(error, 'time', 1, '', "group &time lacks the key 'steps' or 'duration'", &
         & 'explicit steps in time need one of them', source)
+    else if (scene%time%substeps .and. scene%time%method == 'relaxation') then
+      call rule_fault(error, 'time', 1, 'substeps', "'substeps' is not for relaxation", &
+        & 'it has no steps in time', source)
+    else if (scene%time%substeps .and. scene%time%integrator /= 'forward_backward') then
+      call rule_fault(error, 'time', 1, 'substeps', "'substeps' is not for integrator = '"// &
+        & trim(scene%time%integrator)//"'", "expected 'forward_backward'", source)
+    else if (scene%time%substeps .and. scene%time%limit == 'spectral') then
+      call rule_fault(error, 'time', 1, 'limit', "'substeps' is not for limit = 'spectral'", &
+        & "the largest frequency is that of the finest points: expected 'equation'", source)
     else if (scene%output%every > 0 .and. is_set(scene%output%interval)) then
       call rule_fault(error, 'output', 1, 'interval', "'every' and 'interval' are both given", &
         & 'give one of them', source)

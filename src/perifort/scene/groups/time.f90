@@ -18,6 +18,7 @@ module pd_scene_groups_time
     integer :: steps = 0
     real(wp) :: duration = unset                 !! [s], instead of steps
     character(name_length) :: breaking = 'before_forces'      !! 'after_forces'
+    logical :: substeps = .false.                !! finer grids take shorter steps
   contains
     procedure :: visit
     procedure, nopass :: change_of
@@ -48,6 +49,9 @@ contains
     call keys%key('breaking', group%breaking, 'explicit: a bond beyond its limit breaks before '// &
       & "the forces of the step are computed, or after that (as in the book's programs)", &
       & allowed=[character(13) :: 'before_forces', 'after_forces'])
+    call keys%key('substeps', group%substeps, 'explicit, with lattices of different spacings: '// &
+      & 'the step is that of the coarsest one, and a lattice 2^n times as fine takes 2^n '// &
+      & 'substeps of it')
   end subroutine visit
 
   !> A run may become longer or shorter.
