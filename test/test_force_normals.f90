@@ -167,7 +167,7 @@ contains
         call run(blocks(dim, trim(rules(way))), set_up, error)
         if (allocated(error)) return
         associate (body => set_up%system%body)
-          do trial = 1, 3
+          do trial = 1, 2
             call deform(body, state, u, v)
             ! the couple of friction about the normal is left in 3D
             part = merge(1, 0, dim == 3)
@@ -178,7 +178,7 @@ contains
             if (allocated(error)) return
             if (way > 1) cycle
             probed = 0
-            do k = 1, body%n_slots, 3
+            do k = 1, body%n_slots, merge(11, 3, dim == 3)
               if (body%point(k) == 0) cycle
               if (norm2(force(k, :)) < 1.0e-3_wp*largest) cycle
               probed = probed + 1
