@@ -46,6 +46,7 @@ module pd_output_checkpoint_merger
     private
     type(part_path_type), allocatable :: paths(:)  !! of the files, by the rank that wrote them
     type(reader_type), allocatable :: files(:)     !! those that are read, the first rank's first
+    integer :: used = 0                            !! how many of them there are
     type(rows_type) :: named(2)                    !! the rows of slots, and those named last
     integer(i8), allocatable :: extents(:, :)      !! of the value in hand (extent, file)
     integer(i8) :: element = 0_i8                  !! bytes of one of its elements
@@ -61,13 +62,17 @@ contains
 
   !> Begin with the files of a set, each of which some rank has verified.
   subroutine open_merger(self, paths)
-    class(merger_type), intent(out) :: self         !! before its first value on return
+    class(merger_type), intent(inout) :: self       !! fresh; before its first value on return
     type(part_path_type), intent(in) :: paths(:)    !! (ranks that wrote them)
+    integer :: r
+
     self%reading = .true.
     self%merges = .true.
     self%rows = same
-    self%paths = paths
-    allocate (self%files(0))
+    allocate (self%paths(size(paths)), self%files(size(paths)))
+    do r = 1, size(paths)
+      self%paths(r)%path = paths(r)%path
+    end do
   end subroutine open_merger
 
   !> Close the files.
@@ -75,11 +80,10 @@ contains
     class(merger_type), intent(inout) :: self  !! open or not; not open on return
     integer :: f
 
-    if (.not. allocated(self%files)) return
-    do f = 1, size(self%files)
+    do f = 1, self%used
       call self%files(f)%close()
     end do
-    deallocate (self%files)
+    self%used = 0
   end subroutine close_merger
 
   !> Find the rows of the files that are needed here. The rows of slots come first: by them files
@@ -116,31 +120,27 @@ contains
     integer(i8), intent(in) :: sorted(:)
     integer, intent(in) :: order(:)
     logical, intent(inout) :: found(:)
-    type(reader_type), allocatable :: file, files(:)
-    type(map_type), allocatable :: maps(:)
-    type(map_type) :: map
-    integer :: r
+    integer :: r, f
 
-    allocate (files(0), maps(0))
-    do r = 1, size(self%paths)
-      allocate (file)
-      call file%open(self%paths(r)%path, self%error, verified=.true.)
-      if (allocated(self%error)) exit
-      call file%find('points of '//of_slots)
-      call read_map(file, of_slots, sorted, order, map, found)
-      if (r == 1 .or. size(map%from) > 0 .or. allocated(file%error)) then
-        files = [files, file]
-        maps = [maps, map]
-      else
-        call file%close()
-      end if
-      deallocate (file)
-    end do
-    self%files = files
-    call take_errors(self)
-    self%named(the_slots)%name = of_slots
-    self%named(the_slots)%rows = size(order, kind=i8)
-    call move_alloc(maps, self%named(the_slots)%of_file)
+    associate (rows => self%named(the_slots))
+      rows%name = of_slots
+      rows%rows = size(order, kind=i8)
+      allocate (rows%of_file(size(self%paths)))
+      do r = 1, size(self%paths)
+        f = self%used + 1
+        call self%files(f)%open(self%paths(r)%path, self%error, verified=.true.)
+        if (allocated(self%error)) return
+        self%used = f
+        call self%files(f)%find('points of '//of_slots)
+        call read_map(self%files(f), of_slots, sorted, order, rows%of_file(f), found)
+        call take_errors(self)
+        if (allocated(self%error)) return
+        ! the first rank's file has what all ranks have alike
+        if (r == 1 .or. size(rows%of_file(f)%from) > 0) cycle
+        call self%files(f)%close()
+        self%used = f - 1
+      end do
+    end associate
   end subroutine choose_files
 
   !> Rows of another name, of the files that are open.
@@ -156,8 +156,8 @@ contains
       rows%name = name
       rows%rows = size(order, kind=i8)
       if (allocated(rows%of_file)) deallocate (rows%of_file)
-      allocate (rows%of_file(size(self%files)))
-      do f = 1, size(self%files)
+      allocate (rows%of_file(self%used))
+      do f = 1, self%used
         call read_map(self%files(f), name, sorted, order, rows%of_file(f), found)
       end do
     end associate
@@ -198,7 +198,7 @@ contains
     type(merger_type), intent(inout) :: self
     integer :: f
 
-    do f = 1, size(self%files)
+    do f = 1, self%used
       if (allocated(self%error)) return
       if (allocated(self%files(f)%error)) self%error = self%files(f)%error
     end do
@@ -225,11 +225,11 @@ contains
     integer(i8) :: of_file(size(extents))
     integer :: f, which
 
-    if (size(self%files) == 0) call internal_fault('the rows of slots have not been named')
+    if (self%used == 0) call internal_fault('the rows of slots have not been named')
     self%element = bytes_of_kind(kind_name)
     if (allocated(self%extents)) deallocate (self%extents)
-    allocate (self%extents(most_extents, size(self%files)), source=1_i8)
-    do f = 1, size(self%files)
+    allocate (self%extents(most_extents, self%used), source=1_i8)
+    do f = 1, self%used
       if (self%rows == joined) call self%files(f)%find(name)
       if (.not. allocated(self%files(f)%error)) &
         & call self%files(f)%describe(name, kind_name, of_file)
@@ -266,13 +266,13 @@ contains
 
     n = size(extents)
     if (all(self%extents(:n, :) < 0_i8)) return  ! not allocated anywhere
-    if (all(self%extents(1, :) == rows%of_file%rows)) then
+    if (all(self%extents(1, :) == rows%of_file(:self%used)%rows)) then
       extents(1) = rows%rows
     else if (any(self%extents(1, :) /= 0_i8)) then
       call fail(self%error, name//' has other rows than '//rows%name//' in the checkpoints')
       return
     end if
-    if (any(self%extents(2:n, :) /= spread(extents(2:n), 2, size(self%files)))) &
+    if (any(self%extents(2:n, :) /= spread(extents(2:n), 2, self%used))) &
       & call fail(self%error, name//' has different extents in the checkpoints')
   end subroutine take_extents
 
@@ -290,7 +290,7 @@ contains
     integer, intent(in) :: first
     integer :: f
 
-    do f = first, size(self%files)
+    do f = first, self%used
       call self%files(f)%skip(bytes_in(self, f))
     end do
   end subroutine skip_all
@@ -312,7 +312,7 @@ contains
     if (which > 0) then
       here = 0_i1
       associate (rows => self%named(which))
-        do f = 1, size(self%files)
+        do f = 1, self%used
           if (size(rows%of_file(f)%from) == 0) then
             call self%files(f)%skip(bytes_in(self, f))
           else if (bytes_in(self, f) > 0_i8) then
@@ -325,7 +325,7 @@ contains
       end associate
     else if (self%rows == joined) then
       at = 0_i8
-      do f = 1, size(self%files)
+      do f = 1, self%used
         if (bytes_in(self, f) == 0_i8) cycle
         part => here(at + 1:at + bytes_in(self, f))
         call self%files(f)%move(c_loc(part), bytes_in(self, f))

@@ -93,8 +93,12 @@ contains
       restart%newest = .false.
       if (world%rank < set%ranks) &
         & restart%newest = set%path_of(directory, stem, world%rank) == newest
-      if (set%ranks /= world%ranks) restart%parts = [(part_path_type(set%path_of(directory, stem, &
-        & r)), r=0, set%ranks - 1)]
+      if (set%ranks /= world%ranks) then
+        allocate (restart%parts(set%ranks))
+        do r = 0, set%ranks - 1
+          restart%parts(r + 1)%path = set%path_of(directory, stem, r)
+        end do
+      end if
     end if
     call open_about(path, restart%reader, restart%about, error, set%verified)
     if (allocated(error)) then
