@@ -331,6 +331,14 @@ def check_sets(case):
                    (status, len(re.findall(r"^error: no set of checkpoints", errors, re.M))), (1, 1))
     case.equal("sets: --overwrite", run(1, "--overwrite")[0], 0)
     case.equal("sets: nothing is left of 2 ranks", files() == of_one, True)
+    # one rank cannot write: all keep what they have
+    shutil.rmtree(folder)
+    run(3, "--set", "time%steps=160")
+    kept = [(folder / name).read_bytes() for name in of_three]
+    (folder / "sets.rank-1.checkpoint.part" / "x").mkdir(parents=True)
+    case.equal("sets: a rank that cannot write", run(3, "--restart", "--set", "time%steps=240")[0], 0)
+    case.equal("sets: all keep those before",
+               [(folder / name).read_bytes() for name in of_three] == kept, True)
 
 
 def check_messages(case, ranks):
