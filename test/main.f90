@@ -101,6 +101,7 @@ program main
   use test_output_results_files, only: collect_output_results_files
   use test_output_results_layout, only: collect_output_results_layout
   use test_output_report_overview, only: collect_output_report_overview
+  use test_output_checkpoint_merger, only: collect_output_checkpoint_merger
   use test_output_checkpoint_parts, only: collect_output_checkpoint_parts
   use test_output_checkpoint_restart, only: collect_output_checkpoint_restart
   use test_output_checkpoint_static, only: collect_output_checkpoint_static
@@ -239,6 +240,7 @@ program main
   call register('output_results_layout', collect_output_results_layout)
   call register('output_report_overview', collect_output_report_overview)
   call register('output_checkpoint_restart', collect_output_checkpoint_restart)
+  call register('output_checkpoint_merger', collect_output_checkpoint_merger)
   call register('output_checkpoint_parts', collect_output_checkpoint_parts)
   call register('output_results_results', collect_output_results_results)
   call register('output_results_xdmf', collect_output_results_xdmf)

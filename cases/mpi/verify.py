@@ -51,6 +51,19 @@ SHORT = ("bar", "block", "plate", "hole", "failure", "crack", "glass", "mixed")
 # the steps, so the runs are short.
 LISTS = ("crack", "glass")
 ROUNDING = 1.0e-12
+# Stopped again and again and continued on other numbers of ranks, in turn: the scene, changed keys,
+# and whether bonds break.
+REGROUPED = [
+    ("crack", (), True),
+    ("glass", ("--set", "time%integrator='velocity_verlet'"), True),
+    ("kalthoff", ("--set", "time%integrator='adams_bashforth'"), True),
+    ("plate", (), False),
+    ("hole", (), False),
+    ("failure", (), True),
+]
+REGROUPED_SHORT = ("crack", "failure")
+MOST_PIECES = 5
+PIECE = 0.12  # of the time that the run in one piece takes
 
 
 class Mpi(Case):
@@ -221,6 +234,113 @@ def check_ends(case):
         case.equal("results can be read", len(arrays(folder)) > 3, True)
 
 
+def in_pieces(case, path, folder, minutes, turns, *options):
+    """Run a scene in pieces, each on as many ranks as is its turn, the last one to the end; the
+    number of pieces, and those ranks that found a checkpoint of another number of them.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    regrouped = set()
+    last = None
+    for piece in range(MOST_PIECES + 1):
+        n = turns[piece % len(turns)]
+        limit = ["--max-minutes", str(minutes)] if piece < MOST_PIECES else []
+        _, process = case.start(path, n, *options, *limit, *(["--restart"] if piece else []),
+                                folder=folder, anew=False)
+        errors = process.communicate()[1]
+        if process.returncode not in (0, 4):
+            sys.exit(f"error: {path} in pieces on {n} ranks ended with status {process.returncode}:\n"
+                     f"{errors}")
+        if piece and n != last:
+            regrouped.add((last, n))
+        last = n
+        if process.returncode == 0:
+            break
+    return piece + 1, regrouped
+
+
+def check_regrouped(case):
+    """Runs that go on on other numbers of ranks end as the run in one piece on one rank."""
+    for name, options, breaks in REGROUPED:
+        if case.options.short and name not in REGROUPED_SHORT:
+            continue
+        [(origin, changes)] = [(o, c) for n, o, c in SCENES if n == name]
+        path = case.write(name, origin, changes)
+        begin = time.time()
+        whole = case.complete(path, 1, *options, *ONE)
+        minutes = PIECE * (time.time() - begin) / 60
+        pieces = path.with_name(f"{name}.pieces")
+        number, regrouped = in_pieces(case, path, pieces, minutes, (3, 2, 1, 3, 1), *options, *ONE)
+        case.equal(f"{name}, on 3, 2, 1, 3, 1 ranks in turn: pieces", number > 3, True)
+        case.equal(f"{name}: goes on on other numbers of ranks",
+                   {(3, 2), (2, 1), (1, 3)} <= regrouped or number < 4, True)
+        case.equal(f"{name}, on 3, 2, 1, 3, 1 ranks in turn: the same bits",
+                   same_bits(whole, pieces), True)
+        if breaks:
+            table = np.genfromtxt(pieces / "history.csv", delimiter=",", names=True)
+            column = [c for c in table.dtype.names if c.startswith("broken_bonds")][0]
+            case.equal(f"{name}: bonds break", table[column][-1] > table[column][0], True)
+        if name not in LISTS:
+            continue
+        options = (*options, "--set", "horizon%family='list'", "--set",
+                   "output%fields='displacement'", "--set", "output%precision='double'")
+        whole = case.complete(path, 1, *options)
+        number, _ = in_pieces(case, path, pieces, minutes, (3, 2, 1, 3, 1), *options)
+        case.equal(f"{name}, list, in pieces: pieces", number > 3, True)
+        case.below(f"{name}, list, in pieces: of the largest displacement",
+                   difference_of_fields(whole, pieces), ROUNDING)
+
+
+def check_sets(case):
+    """Which checkpoints count, and what is said of those that do not."""
+    path = case.write("sets", "plate_crack/slow.nml",
+                      {"body": {"points": "60, 60"}, "time": {"step": "5.0e-8", "steps": "300"},
+                       "output": {"every": "100", "history_every": "10", "checkpoint_every": "40"}})
+    whole = case.complete(path, 1, *ONE)
+    folder = path.with_name("sets.3")
+
+    def run(n, *options):
+        _, process = case.start(path, n, *ONE, *options, folder=folder, anew=False)
+        errors = process.communicate()[1]
+        return process.returncode, errors
+
+    def files():
+        return sorted(p.name for p in folder.glob("*.checkpoint*"))
+
+    shutil.rmtree(folder, ignore_errors=True)
+    case.equal("sets: on 3 ranks", run(3, "--set", "time%steps=160")[0], 0)
+    of_three = [f"sets.rank-{r}.checkpoint{old}" for r in range(3) for old in ("", ".old")]
+    of_one = ["sets.checkpoint", "sets.checkpoint.old"]
+    case.equal("sets: files of 3 ranks", files() == of_three, True)
+    # one file alone is a part
+    status, errors = run(1, "--restart", str(folder / "sets.rank-1.checkpoint"))
+    case.equal("sets: a part is refused", (status, "a part of the points" in errors), (1, True))
+    # without one of the newest the older set counts
+    hidden = folder / "hidden"
+    (folder / "sets.rank-1.checkpoint").rename(hidden)
+    case.equal("sets: the older one, on one rank", run(1, "--restart", "--set", "time%steps=200")[0], 0)
+    case.equal("sets: those of 3 ranks are gone", files() == of_one, True)
+    case.equal("sets: to the end on 2 ranks", run(2, "--restart")[0], 0)
+    case.equal("sets: the same bits", same_bits(whole, folder), True)
+    case.equal("sets: files of 2 ranks", files() == of_three[:4], True)
+    # none complete
+    for name in of_three[2:4]:
+        (folder / name).unlink()
+    for n in (1, 2, 3):
+        status, errors = run(n, "--restart", "--set", "time%steps=400")
+        case.equal(f"sets: none is complete, {n} ranks",
+                   (status, len(re.findall(r"^error: no set of checkpoints", errors, re.M))), (1, 1))
+    case.equal("sets: --overwrite", run(1, "--overwrite")[0], 0)
+    case.equal("sets: nothing is left of 2 ranks", files() == of_one, True)
+    # one rank cannot write: all keep what they have
+    shutil.rmtree(folder)
+    run(3, "--set", "time%steps=160")
+    kept = [(folder / name).read_bytes() for name in of_three]
+    (folder / "sets.rank-1.checkpoint.part" / "x").mkdir(parents=True)
+    case.equal("sets: a rank that cannot write", run(3, "--restart", "--set", "time%steps=240")[0], 0)
+    case.equal("sets: all keep those before",
+               [(folder / name).read_bytes() for name in of_three] == kept, True)
+
+
 def check_messages(case, ranks):
     """Ranks send what the formula says: displacements and dilatation of each copy."""
     path = scaling.scene(case.out, 16, 1)
@@ -278,6 +398,8 @@ def main():
     ranks = [int(n) for n in (case.options.ranks or ("3" if case.options.short else "2,3,4,7")).split(",")]
     compare_scenes(case, ranks)
     check_messages(case, ranks)
+    check_regrouped(case)
+    check_sets(case)
     check_ends(case)
     case.finish()
 

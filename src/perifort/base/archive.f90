@@ -7,6 +7,16 @@
 !> When it writes, an archive takes the values; when it reads, it puts them back, in the same order.
 !> An array that is allocated gets back values of its own shape only; one that is not takes that of
 !> the archive. The first failure stays in `error`, and the calls after it do nothing.
+!>
+!> What one rank has written, other ranks of another number may read. So arrays whose rows belong to
+!> points say to which:
+!>
+!>     call archive%name_rows(of_slots, numbers, own)
+!>     call archive%over(of_slots)
+!>     call archive%keep('displacement', state%u)
+!>     call archive%over(same)                        ! values that all ranks have alike
+!>
+!> An archive in memory, which nobody else reads, takes no note of that.
 module pd_base_archive
   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
   use pd_base_error, only: error_type, fail
@@ -14,14 +24,24 @@ module pd_base_archive
   use pd_base_text, only: to_text
   implicit none (type, external)
   private
-  public :: archive_type
+  public :: archive_type, same, joined, of_slots
+
+  character(*), parameter :: same = ''          !! values that all ranks have alike
+  character(*), parameter :: joined = 'joined'  !! tables whose rows belong to all ranks together
+  character(*), parameter :: of_slots = 'slots' !! arrays with a row for each slot
 
   integer(i8), parameter :: absent = -1_i8  !! first extent of an array that is not allocated
 
   type, abstract :: archive_type
     logical :: reading = .false.
+    logical :: in_memory = .false.      !! of this process alone: rows have no names
+    logical :: merges = .false.         !! reads what ranks of another number have written
+    character(:), allocatable :: rows   !! what rows of the values to come belong to; `same`,
+                                        !! `joined` or a name; not allocated: `same`
     type(error_type), allocatable :: error
   contains
+    procedure :: name_rows
+    procedure :: over
     procedure(describe_interface), deferred :: describe
     procedure(move_interface), deferred :: move
     procedure, private :: keep_real, keep_integer, keep_long, keep_logical, keep_text
@@ -59,6 +79,36 @@ module pd_base_archive
   end interface
 
 contains
+
+  !> Say which points the rows of some arrays belong to. A file keeps the keys, and gives back what
+  !> was written with the same ones.
+  subroutine name_rows(self, rows, keys, own)
+    class(archive_type), intent(inout) :: self  !! the archive; its `error` is set if the keys
+                                                !! cannot be kept, or in reading are others
+    character(*), intent(in) :: rows     !! name of the rows for `over`, at most 40 characters
+    integer(i8), intent(in) :: keys(:)
+      !! (rows) above 0, different ones; 0: a row without a meaning; below 0: the key -`keys`, of
+      !! which files of other ranks need not know: the values of the row are then 0
+    logical, intent(in) :: own(:)
+      !! (rows) whether the values here count: over all ranks each key has one such row
+    integer(i8), allocatable :: table(:, :)
+
+    if (self%in_memory .or. allocated(self%error)) return
+    call self%over(same)
+    allocate (table(size(keys), 1))
+    table(:, 1) = merge(keys, 0_i8, own)
+    call self%keep('points of '//rows, table)
+    if (allocated(self%error) .or. .not. self%reading) return
+    if (any(table(:, 1) /= merge(keys, 0_i8, own))) &
+      & call fail(self%error, 'the points of '//rows//' are others')
+  end subroutine name_rows
+
+  !> What the rows of the values to come belong to.
+  subroutine over(self, rows)
+    class(archive_type), intent(inout) :: self  !! the archive
+    character(*), intent(in) :: rows  !! `same`, `joined`, or a name that `name_rows` has given
+    self%rows = rows
+  end subroutine over
 
   !> Describe a value and say whether its bytes are to be moved. `there` says whether the value is
   !> allocated; on return whether it is to be.

@@ -4,13 +4,15 @@
 !>
 !> Eight bytes are taken at a time, each through a table of its own ("slicing by 8").
 module pd_base_checksum
-  use pd_base_kinds, only: i1, i8
+  use pd_base_kinds, only: wp, i1, i8
   implicit none (type, external)
   private
-  public :: checksum_type
+  public :: checksum_type, parts_of, value_of
 
   integer(i8), parameter :: polynomial = not(int(z'3693A86A2878F0BD', i8))  ! C96C5795D7870F42
   integer(i8), parameter :: byte = 255_i8
+  integer, parameter :: parts_in_number = 4, bits_of_part = 16
+  integer(i8), parameter :: largest_part = 2_i8**bits_of_part - 1
 
   !> A checksum in progress.
   type :: checksum_type
@@ -20,6 +22,7 @@ module pd_base_checksum
   contains
     procedure :: add
     procedure :: value
+    procedure :: begin_again
   end type checksum_type
 
 contains
@@ -54,6 +57,38 @@ contains
     class(checksum_type), intent(in) :: self  !! the checksum, which may go on
     value = not(self%state)
   end function value
+
+  !> Forget the bytes so far.
+  pure subroutine begin_again(self)
+    class(checksum_type), intent(inout) :: self  !! the checksum, of no bytes on return
+    self%state = -1_i8
+  end subroutine begin_again
+
+  !> A number in parts of 16 bits, whose sums over up to 2^37 numbers are exact as reals.
+  pure function parts_of(number) result(parts)
+    integer(i8), intent(in) :: number  !! any
+    real(wp) :: parts(parts_in_number)
+    integer :: i
+
+    do i = 1, parts_in_number
+      parts(i) = real(iand(ishft(number, -bits_of_part*(i - 1)), largest_part), wp)
+    end do
+  end function parts_of
+
+  !> The sum of numbers, modulo 2^64, from the sums of their parts.
+  pure integer(i8) function value_of(parts) result(number)
+    real(wp), intent(in) :: parts(:)  !! (4) sums of `parts_of`, whole numbers from 0 to 2^53
+    integer(i8) :: carried
+    integer :: i
+
+    number = 0_i8
+    carried = 0_i8
+    do i = 1, parts_in_number
+      carried = carried + int(parts(i), i8)
+      number = ior(number, ishft(iand(carried, largest_part), bits_of_part*(i - 1)))
+      carried = ishft(carried, -bits_of_part)
+    end do
+  end function value_of
 
   pure subroutine make_table(self)
     class(checksum_type), intent(inout) :: self

@@ -35,6 +35,7 @@ contains
     logical, intent(in) :: reading  !! whether values are to be put back; else they are taken
 
     self%reading = reading
+    self%in_memory = .true.
     self%at = 0
     if (allocated(self%error)) deallocate (self%error)
     if (.not. allocated(self%parcels)) allocate (self%parcels(32))

@@ -38,6 +38,7 @@ module pd_family_composite
     procedure :: bytes
     procedure :: describe
     procedure :: alike
+    procedure :: may_have_broken
     procedure :: bytes_are_shared
     procedure :: level_of_bond
     procedure :: has_level
@@ -183,6 +184,15 @@ contains
     alike = k
     if (family%place(k) == 0_i4) alike = family%lattice%alike(k)
   end function alike
+
+  !> Whether some bond of slot `k` is broken.
+  pure logical function may_have_broken(family, k)
+    class(composite_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                            !! slot
+    may_have_broken = family%lattice%may_have_broken(k)
+    if (family%place(k) > 0_i4) may_have_broken = may_have_broken .or. &
+      & family%list%may_have_broken(int(family%place(k)))
+  end function may_have_broken
 
   !> Bonds of slots that lie far apart may share a byte of the list.
   pure logical function bytes_are_shared(family)

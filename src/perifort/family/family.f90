@@ -33,6 +33,7 @@ module pd_family_family
     procedure(memory_interface), deferred :: bytes
     procedure(describe_interface), deferred :: describe
     procedure :: alike
+    procedure :: may_have_broken
     procedure :: bytes_are_shared
     procedure :: level_of_bond
     procedure :: has_level
@@ -94,6 +95,13 @@ contains
     integer, intent(in) :: k                  !! slot
     alike = min(k, family%n_slots)
   end function alike
+
+  !> Whether some bond of slot `k` may be broken: cheap, to pass over those that are whole.
+  pure logical function may_have_broken(family, k)
+    class(family_type), intent(in) :: family  !! the family; this version knows no bits
+    integer, intent(in) :: k                  !! slot
+    may_have_broken = k <= family%n_slots
+  end function may_have_broken
 
   !> Whether bonds of slots of different groups of `lanes` may share a byte, so that one thread must
   !> break all of them.

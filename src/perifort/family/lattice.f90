@@ -58,6 +58,7 @@ module pd_family_lattice
     procedure :: bytes
     procedure :: describe
     procedure :: alike
+    procedure :: may_have_broken
     procedure :: allow_breaking
   end type lattice_family_type
 
@@ -425,6 +426,14 @@ contains
     if (.not. allocated(family%class_of)) return
     if (family%class_of(k) > 0_i4) alike = family%first_of(family%class_of(k))
   end function alike
+
+  !> Whether some bond of slot `k` is broken.
+  pure logical function may_have_broken(family, k)
+    class(lattice_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                          !! slot
+    may_have_broken = .false.
+    if (allocated(family%broken)) may_have_broken = any(family%broken(k, :) /= 0_i8)
+  end function may_have_broken
 
   !> Give every bond its bit, all intact.
   subroutine allow_breaking(family)

@@ -38,6 +38,7 @@ module pd_family_list
     procedure :: bonds_of
     procedure :: number_at
     procedure :: break_bond
+    procedure :: may_have_broken
     procedure :: keep_bonds
     procedure :: bytes
     procedure :: describe
@@ -247,6 +248,22 @@ contains
       return
     end do
   end subroutine break_bond
+
+  !> Whether some bond of slot `k` is broken.
+  pure logical function may_have_broken(family, k)
+    class(list_family_type), intent(in) :: family  !! the family
+    integer, intent(in) :: k                       !! slot
+    integer(i8) :: e
+    integer :: c
+
+    c = (k - 1)/lanes + 1
+    may_have_broken = .false.
+    do e = family%start(c), family%start(c + 1) - 1
+      if (iand(ieor(family%bits(e), family%intact(e)), lane_bit(k - lanes*(c - 1))) == 0_i1) cycle
+      may_have_broken = .true.
+      return
+    end do
+  end function may_have_broken
 
   !> Keep the bits of intact bonds, or put them back.
   subroutine keep_bonds(family, archive)

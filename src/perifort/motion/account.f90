@@ -1,9 +1,10 @@
 !> The accounts of a system in motion: work, reactions and energies of an instant
 !> (doc/theory.md, 9 and 10).
 module pd_motion_account
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i8
   use pd_base_reduce, only: add_point, inner, new_running, running_type, sum_listed, &
     & total_of_running
+  use pd_body_body, only: number_at, owned
   use pd_force_forces, only: energy_pass
   use pd_force_generic_points, only: commit_laws
   use pd_force_term, only: term_view_type
@@ -16,7 +17,7 @@ module pd_motion_account
     & view_of
   implicit none (type, external)
   private
-  public :: account, energies_type, energies_of, stored_energy, velocities_now
+  public :: account, energies_type, energies_of, stored_energy, velocities_now, rows_of_work
 
   !> Points of a load from which on threads share the sum of its work.
   integer, parameter :: worth_threads = 4096
@@ -283,6 +284,68 @@ contains
     n = n*system%body%dim
     allocate (system%last_u(n), system%last_force(n), system%last_v(n), source=0.0_wp)
   end subroutine allocate_account
+
+  !> Which point and which component of what each value of `last_u`, `last_force` and `last_v`
+  !> belongs to, in the order of `account`.
+  subroutine rows_of_work(system, keys, own)
+    type(system_type), intent(in), target :: system  !! with its motions and loads
+    integer(i8), allocatable, intent(out) :: keys(:)
+      !! (values) a number for each, the same on any number of ranks; 0: not used; below 0, with
+      !! the sign changed: of a load that is 0 here and need not be there elsewhere
+    logical, allocatable, intent(out) :: own(:)      !! (values) whether the point is this rank's
+    type(load_type), pointer :: load
+    integer(i8) :: codes, code
+    integer :: n, m, l, c, i
+
+    associate (body => system%body, motions => system%motions)
+      n = 0
+      do m = 1, size(motions)
+        n = n + size(motions(m)%slots)
+      end do
+      do l = 1, number_of_loads(system%terms)
+        load => load_of(system%terms, l)
+        n = n + size(load%slots)
+      end do
+      allocate (keys(body%dim*n), source=0_i8)
+      allocate (own(body%dim*n), source=.false.)
+      codes = int(body%dim, i8)*(size(motions) + number_of_loads(system%terms))
+      code = 0_i8
+      n = 0
+      do m = 1, size(motions)
+        do c = 1, body%dim
+          do i = 1, size(motions(m)%slots)
+            if (motions(m)%held(i, c) == 0_i1) cycle
+            call add(int(motions(m)%slots(i)), .true.)
+          end do
+          code = code + 1
+        end do
+      end do
+      do l = 1, number_of_loads(system%terms)
+        load => load_of(system%terms, l)
+        do c = 1, body%dim
+          if (acts_along(load, c) .or. associated(body%order%ranks)) then
+            do i = 1, size(load%slots)
+              call add(int(load%slots(i)), acts_along(load, c))
+            end do
+          end if
+          code = code + 1
+        end do
+      end do
+    end associate
+
+  contains
+
+    !> The next value, of a slot.
+    subroutine add(slot, acts)
+      integer, intent(in) :: slot
+      logical, intent(in) :: acts  !! else the value may be missing elsewhere
+
+      n = n + 1
+      keys(n) = number_at(system%body, slot)*codes + code
+      if (.not. acts) keys(n) = -keys(n)
+      own(n) = owned(system%body, slot)
+    end subroutine add
+  end subroutine rows_of_work
 
   !> Velocities at the time `t` of the displacements [m/s], half a kick [s] on from those that the
   !> integrator keeps.

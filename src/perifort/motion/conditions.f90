@@ -1,12 +1,13 @@
 !> Imposed motion of points (7.8; doc/theory.md, 10): by a course in time, or by expressions of
 !> position and time.
 module pd_motion_conditions
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, same
   use pd_base_expression, only: derivative_in_time, expression_type
   use pd_base_field, only: field_type, field_values, new_field
   use pd_base_kinds, only: wp, i1, i4
   use pd_base_text, only: to_text
   use pd_base_vectors, only: cross
+  use pd_body_body, only: body_type, number_at, owned
   use pd_motion_curve, only: curve_type
   use pd_motion_pose, only: pose_type, arm_of, displacement_of, keep_pose, spin_of, spin_rate_of
   implicit none (type, external)
@@ -384,14 +385,22 @@ contains
   end subroutine advance_paths
 
   !> Keep the paths, or put them back.
-  subroutine keep_paths(archive, motions)
+  subroutine keep_paths(archive, body, motions)
     class(archive_type), intent(inout) :: archive   !! a checkpoint that is written or read
+    type(body_type), intent(in) :: body             !! whose slots the motions have
     type(motion_type), intent(inout) :: motions(:)  !! (any number) get their paths where it reads
+    character(:), allocatable :: name
+    integer, allocatable :: slots(:)
     integer :: m
 
     do m = 1, size(motions)
       if (.not. any(motions(m)%by_time .and. motions(m)%kind == moved_by_velocity)) cycle
-      call archive%keep('path of boundary '//to_text(m), motions(m)%path)
+      name = 'path of boundary '//to_text(m)
+      slots = int(motions(m)%slots)
+      call archive%name_rows(name, number_at(body, slots), owned(body, slots))
+      call archive%over(name)
+      call archive%keep(name, motions(m)%path)
+      call archive%over(same)
       call archive%keep('time of path '//to_text(m), motions(m)%path_time)
       motions(m)%time = never
     end do

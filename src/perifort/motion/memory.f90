@@ -2,7 +2,7 @@
 !> that an observer sees to the next. It lies in the system, so that whoever keeps the system can go
 !> on from there as if nothing had been in between.
 module pd_motion_memory
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, of_slots, same
   use pd_base_kinds, only: wp
   use pd_motion_coarse, only: coarse_type
   use pd_motion_newton, only: newton_type, keep_newton
@@ -55,15 +55,19 @@ contains
 
     call archive%keep('step', memory%step)
     call archive%keep('earlier steps', memory%filled)
+    call archive%over(of_slots)
     call archive%keep('earlier velocities', memory%v)
     call archive%keep('earlier accelerations', memory%a)
+    call archive%over(same)
     call archive%keep('load step', memory%load_step)
     call archive%keep('begin of load step', memory%began)
     call archive%keep('iteration', memory%iteration)
+    call archive%over(of_slots)
     call archive%keep('rate', memory%rate)
     call archive%keep('base', memory%base)
     call archive%keep('trend', memory%trend)
     call archive%keep('start of load step', memory%start)
+    call archive%over(same)
     call archive%keep('next judgement', memory%next_judgement)
     call archive%keep('softness', memory%softness)
     call archive%keep('residual', memory%residual)

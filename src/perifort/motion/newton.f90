@@ -1,7 +1,7 @@
 !> Where a relaxation by conjugate gradients stands between two of its iterations: all that passes
 !> from one to the next (doc/theory.md, 7). Everything else follows from the system and its loads.
 module pd_motion_newton
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, of_slots, same
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
@@ -77,6 +77,7 @@ module pd_motion_newton
     logical :: asked = .false.        !! the solve's residual has been below the tolerance
     logical :: fresh = .true.         !! nothing has been gained yet
     logical :: strict = .false.       !! no solve may go uphill
+    logical :: coarse = .false.       !! the solve's preconditioner has a coarse part
     real(wp), allocatable :: best(:, :)  !! displacements of `least`, if `ahead` of them [m]
   end type newton_type
 
@@ -88,10 +89,12 @@ contains
     type(newton_type), intent(inout) :: newton  !! set where the archive reads, else left as it is
 
     associate (krylov => newton%krylov)
+      call archive%over(of_slots)
       call archive%keep('residual force', krylov%residual)
       call archive%keep('direction', krylov%direction)
       call archive%keep('origin', krylov%origin)
       call archive%keep('forces at the origin', krylov%forces)
+      call archive%over(same)
       call archive%keep('residual of pins', krylov%of_pins)
       call archive%keep('scale', krylov%scale)
       call archive%keep('largest', krylov%largest)
@@ -118,7 +121,10 @@ contains
     call archive%keep('asked', newton%asked)
     call archive%keep('fresh', newton%fresh)
     call archive%keep('strict', newton%strict)
+    call archive%keep('coarse part', newton%coarse)
+    call archive%over(of_slots)
     call archive%keep('best', newton%best)
+    call archive%over(same)
   end subroutine keep_newton
 
   subroutine keep_sums(archive, sums)

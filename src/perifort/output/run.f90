@@ -9,12 +9,11 @@ module pd_output_run
   use pd_base_error, only: error_type, status_input, status_interrupted
   use pd_base_kinds, only: wp, i8
   use pd_base_text, only: newline, to_text
-  use pd_motion_keep, only: checksum_of_start
+  use pd_motion_keep, only: checksum_of_points, checksum_of_start
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_earlier, only: mark_complete, refuse_existing
   use pd_comm_world, only: world_type
-  use pd_output_checkpoint_checkpoint, only: stem_of_rank
-  use pd_output_checkpoint_restart, only: common_checkpoint, find_restart, put_back, restart_type
+  use pd_output_checkpoint_restart, only: find_restart, put_back, restart_type
   use pd_output_fields_check, only: check_names
   use pd_output_report_after, only: summary_after
   use pd_output_report_before, only: foresee_output
@@ -43,7 +42,6 @@ module pd_output_run
     character(:), allocatable, private :: directory  !! '' = no files
     character(:), allocatable, private :: stem
     character(:), allocatable, private :: folder     !! of checkpoints, which all ranks write
-    character(:), allocatable, private :: kept_stem  !! of their names
   contains
     procedure :: look_back
     procedure :: foresee
@@ -62,23 +60,19 @@ contains
     type(run_options_type), intent(in) :: options
     type(world_type), intent(inout) :: world   !! the ranks of the run
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: named
 
     call check_names(scene, fields_of(options), error)
     if (allocated(error)) return
     self%stem = stem_of(scene)
     self%folder = output_directory(scene, options)
-    self%kept_stem = self%stem
-    if (world%ranks > 1) self%kept_stem = stem_of_rank(self%stem, world%rank)
+    self%restart%rank = world%rank
+    self%restart%ranks = world%ranks
     self%directory = self%folder
     if (world%rank > 0) self%directory = ''
     if (self%folder == '') return
     if (options%restart) then
-      named = text_of(options%checkpoint)
-      if (world%ranks > 1) call common_checkpoint(self%folder, self%kept_stem, world, named, error)
-      if (allocated(error)) return
-      call find_restart(self%folder, self%stem, named, scene, command_of(options), self%restart, &
-        & error, self%kept_stem)
+      call find_restart(self%folder, self%stem, text_of(options%checkpoint), scene, &
+        & command_of(options), world, self%restart, error)
       if (allocated(error)) return
       call say(self%restart%note, options%quiet)
       self%complete = self%restart%complete
@@ -106,11 +100,12 @@ contains
     type(set_up_type), intent(inout) :: set_up
     logical, intent(in) :: in_memory
     type(error_type), allocatable, intent(out) :: error
-    integer(i8) :: start
+    integer(i8) :: start, points
 
     associate (system => set_up%system, plan => set_up%plan, recorder => self%recorder)
       start = checksum_of_start(system)
-      if (self%restart%found) call put_back(self%restart, scene, system, plan, &
+      points = checksum_of_points(system)
+      if (self%restart%found) call put_back(self%restart, scene, points, system, plan, &
         & self%measures, error)
       if (allocated(error)) return
       self%complete = self%restart%complete
@@ -127,8 +122,8 @@ contains
       call open_recorder(scene, options, system, plan, self%directory, self%stem, self%restart, &
         & recorder, in_memory, error)
       if (allocated(error)) return
-      call keep_checkpoints(scene, options, plan, start, self%folder, self%kept_stem, &
-        & self%restart, recorder)
+      call keep_checkpoints(scene, options, plan, start, points, self%folder, self%restart, &
+        & recorder)
       call recorder%timer%start(recorder%phase())
     end associate
   end subroutine open_output

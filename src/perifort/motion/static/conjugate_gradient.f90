@@ -97,6 +97,11 @@ contains
       call move_alloc(system%memory%newton, newton)
       call make_room(system, relaxation%mass, newton%krylov)
       call make_coarse_part(system, newton%krylov)
+      if (newton%coarse .neqv. allocated(newton%krylov%slow)) then
+        ! on another number of ranks: directions of another preconditioner are of no use
+        call evaluate_residual(system, instant%time, newton%krylov, newton%sums)
+        amid = .false.
+      end if
     else
       allocate (newton)
       call make_room(system, relaxation%mass, newton%krylov)
@@ -109,6 +114,7 @@ contains
       call begin(system, instant%time, change, .false., newton)
       newton%least = newton%sums%residual
     end if
+    newton%coarse = allocated(newton%krylov%slow)
     if (.not. allocated(change)) change = trend(:0, :)
     do
       if (.not. amid) call begin_solve(system, rigid, newton)

@@ -3,7 +3,7 @@
 module pd_output_checkpoint_earlier
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: newline
-  use pd_output_checkpoint_checkpoint, only: checkpoint_path
+  use pd_output_checkpoint_checkpoint, only: checkpoint_path, stem_of_rank
   use pd_output_results_files, only: file_exists, in_directory, remove_file
   use pd_output_results_hdf5, only: close_file, get_text, hdf5_file, open_file, start_hdf5
   use pd_output_results_sink, only: sink_type
@@ -55,6 +55,8 @@ contains
     path = existing_results(directory, stem)
     if (path == '' .and. file_exists(checkpoint_path(directory, stem))) &
       & path = checkpoint_path(directory, stem)
+    if (path == '' .and. file_exists(checkpoint_path(directory, stem_of_rank(stem, 0)))) &
+      & path = checkpoint_path(directory, stem_of_rank(stem, 0))
     if (path == '') return
     if (unfinished(directory, stem)) then
       call fail(error, 'results of an unfinished run exist already: '//path// &

@@ -7,17 +7,17 @@ module pd_output_checkpoint_file
   use pd_base_archive, only: archive_type
   use pd_base_checksum, only: checksum_type
   use pd_base_error, only: error_type, fail
-  use pd_base_kinds, only: i1, i8
+  use pd_base_kinds, only: wp, i1, i8
   use pd_base_text, only: newline, to_text
   use pd_output_results_files, only: file_bytes, file_exists
   use pd_output_results_sink, only: sink_type
   implicit none (type, external)
   private
-  public :: meter_type, writer_type, reader_type
+  public :: meter_type, writer_type, reader_type, bytes_of_kind
 
   character(*), parameter :: magic = 'perifort checkpoint'//newline
   integer(i8), parameter :: order = 72623859790382856_i8  !! bytes 8, 7, .. 1, low ones first
-  integer(i8), parameter :: format_version = 1_i8
+  integer(i8), parameter :: format_version = 2_i8
   integer(i8), parameter :: head_bytes = len(magic) + 3*8, tail_bytes = 8
   integer(i8), parameter :: block_bytes = 1048576_i8
   integer, parameter :: longest_name = 64
@@ -51,6 +51,8 @@ module pd_output_checkpoint_file
   contains
     procedure :: open => open_reader
     procedure :: close => close_reader
+    procedure :: find
+    procedure :: skip
     procedure :: describe => read_description
     procedure :: move => read_bytes
   end type reader_type
@@ -155,12 +157,15 @@ contains
 
   !> Open a file and make sure of it: after that, its values can be read one by one. An error says
   !> what is wrong with it: no such file, no checkpoint, of another version, damaged.
-  subroutine open_reader(self, path, error)
+  subroutine open_reader(self, path, error, verified)
     class(reader_type), intent(out) :: self  !! at the first value on return; not open after an
                                              !! error
     character(*), intent(in) :: path         !! of the checkpoint
     type(error_type), allocatable, intent(out) :: error
+    logical, intent(in), optional :: verified
+      !! its checksum has been found right already, by this or another rank; absent: it has not
     character(512) :: reason
+    logical :: sound
     integer :: status
 
     self%reading = .true.
@@ -177,13 +182,17 @@ contains
       self%unit = -1
       return
     end if
-    call check_file(self, error)
+    sound = .false.
+    if (present(verified)) sound = verified
+    call check_file(self, sound, error)
     if (allocated(error)) call self%close()
   end subroutine open_reader
 
-  !> Head, length and checksum; afterwards the file stands at its first value.
-  subroutine check_file(self, error)
+  !> Head, length and, unless it is known to be `sound`, checksum; afterwards the file stands at its
+  !> first value.
+  subroutine check_file(self, sound, error)
     class(reader_type), intent(inout) :: self
+    logical, intent(in) :: sound
     type(error_type), allocatable, intent(out) :: error
     character(len(magic)) :: begins
     integer(i8) :: numbers(3), bytes, at, checksum
@@ -211,6 +220,8 @@ contains
         & to_text(numbers(3))))
     end if
     if (allocated(error)) return
+    self%left = bytes - head_bytes - tail_bytes
+    if (sound) return
 
     allocate (block(block_bytes))
     at = 0
@@ -230,7 +241,6 @@ contains
     end if
     if (allocated(error)) return
     read (self%unit, pos=1) begins, numbers
-    self%left = bytes - head_bytes - tail_bytes
   end subroutine check_file
 
   pure function damaged(path, why) result(text)
@@ -266,8 +276,7 @@ contains
     end if
     self%left = self%left - 8*rank
     ! a file of unknown origin may request any size
-    bytes = 1
-    if (kind_name(len(kind_name):) == '8') bytes = 8
+    bytes = bytes_of_kind(kind_name)
     do i = 1, size(extents)
       if (extents(i) <= 0) exit
       if (extents(i) > self%left/bytes) then
@@ -293,6 +302,67 @@ contains
     self%left = self%left - bytes
     if (status /= 0) call fail(self%error, 'the checkpoint '//self%path//' cannot be read')
   end subroutine read_bytes
+
+  !> Bytes of an element of a kind.
+  pure integer(i8) function bytes_of_kind(kind_name) result(bytes)
+    character(*), intent(in) :: kind_name  !! `real8`, `integer1`, `integer8`
+    bytes = 1_i8
+    if (kind_name(len(kind_name):) == '8') bytes = 8_i8
+  end function bytes_of_kind
+
+  !> Go forward to a value, past those before it.
+  subroutine find(self, name)
+    class(reader_type), intent(inout) :: self  !! at the value on return; its `error` is set if
+                                               !! there is none of this name further on
+    character(*), intent(in) :: name           !! of the value
+    integer(i8), parameter :: most_extents = 3_i8
+    character(longest_name) :: found
+    integer(i8) :: rank, at, extents(most_extents)
+    integer :: status, colon
+
+    if (allocated(self%error)) return
+    do
+      inquire (unit=self%unit, pos=at)
+      if (self%left < longest_name + 8) exit
+      read (self%unit, iostat=status) found, rank
+      if (status /= 0) exit
+      colon = index(found, ': ', back=.true.)
+      if (colon < 1 .or. rank < 1_i8 .or. rank > most_extents) exit
+      if (found(:colon - 1) == name) then
+        ! back to where its name stands
+        read (self%unit, pos=at, iostat=status)
+        if (status /= 0) exit
+        return
+      end if
+      read (self%unit, iostat=status) extents(:rank)
+      if (status /= 0) exit
+      self%left = self%left - longest_name - 8*(1 + rank)
+      if (any(extents(:rank) <= 0_i8)) cycle
+      if (any(extents(:rank) > self%left) .or. product(real(extents(:rank), wp)) &
+        & > real(self%left, wp)) exit
+      call self%skip(bytes_of_kind(trim(found(:longest_name - 1)))*product(extents(:rank)))
+      if (allocated(self%error)) return
+    end do
+    call fail(self%error, 'the checkpoint '//self%path//' does not hold '''//name//'''')
+  end subroutine find
+
+  !> Pass over the elements of a value.
+  subroutine skip(self, bytes)
+    class(reader_type), intent(inout) :: self  !! behind them on return; its `error` is set if the
+                                               !! file ends before
+    integer(i8), intent(in) :: bytes           !! length of the value [bytes]
+    integer(i8) :: at
+    integer :: status
+
+    if (allocated(self%error) .or. bytes == 0_i8) return
+    status = -1
+    if (bytes > 0_i8 .and. bytes <= self%left) then
+      inquire (unit=self%unit, pos=at)
+      read (self%unit, pos=at + bytes, iostat=status)
+      self%left = self%left - bytes
+    end if
+    if (status /= 0) call fail(self%error, 'the checkpoint '//self%path//' cannot be read')
+  end subroutine skip
 
   !> Close the file.
   subroutine close_reader(self)

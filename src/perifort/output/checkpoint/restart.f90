@@ -2,17 +2,20 @@
 !> back to where it was.
 module pd_output_checkpoint_restart
   use pd_base_error, only: error_type, fail, internal_fault
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: i8
   use pd_base_text, only: newline, to_text, with_unit
   use pd_comm_world, only: world_type
   use pd_base_version, only: compiler_flags, compiler_name, program_version
   use pd_motion_keep, only: checksum_of_start, keep_system
   use pd_set_up_plan, only: plan_type, steps_of
   use pd_motion_system, only: system_type
-  use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_path, keep_about, older_path
+  use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_path, older_path, open_about, &
+    & stem_of_part
   use pd_output_checkpoint_file, only: reader_type
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, refuse_existing, &
     & scene_of_results, unfinished
+  use pd_output_checkpoint_merger, only: merger_type, part_path_type
+  use pd_output_checkpoint_sets, only: find_set, set_type
   use pd_output_measures_measure, only: measure_list_type
   use pd_output_results_files, only: file_exists, in_directory
   use pd_scene_content_compare, only: difference_type, scene_differences
@@ -24,15 +27,19 @@ module pd_output_checkpoint_restart
     & change_refused
   implicit none (type, external)
   private
-  public :: restart_type, find_restart, put_back, common_checkpoint
+  public :: restart_type, find_restart, put_back
 
   !> The state from which a run continues.
   type :: restart_type
     logical :: found = .false.         !! there is a checkpoint to start from
     logical :: complete = .false.      !! the run is complete: there is nothing to do
-    logical :: newest = .true.         !! it is the newest of its run
-    type(about_type) :: about
+    logical :: newest = .true.         !! the newest file of this rank belongs to it
+    integer :: rank = 0                !! this one
+    integer :: ranks = 1               !! of the run
+    type(about_type) :: about          !! of the first rank, if it comes from another number of them
     type(reader_type) :: reader        !! open, at the system
+    type(part_path_type), allocatable :: parts(:)
+      !! files of another number of ranks; not allocated: `reader` has all of this rank
     character(:), allocatable :: note  !! message to the user
     logical :: longer = .false.        !! the end of the run may have changed
   end type restart_type
@@ -43,43 +50,74 @@ contains
   !> scene with the present one.
   !>
   !> Where there is no checkpoint, the run starts from the beginning (`found` is false), unless its
-  !> results are complete.
+  !> results are complete. On several ranks all must call it together; the checkpoints may be those
+  !> of another number of them.
   !>
   !> An error if the checkpoint cannot be read or is damaged, if the scene has changed in what may
   !> not change, or if there are results of another scene.
-  subroutine find_restart(directory, stem, named, scene, command, restart, error, kept_stem)
+  subroutine find_restart(directory, stem, named, scene, command, world, restart, error)
     character(*), intent(in) :: directory       !! folder of the results; '' for the current one
     character(*), intent(in) :: stem            !! name of the results' files without their endings
     character(*), intent(in) :: named  !! path of a checkpoint, '' = the run's newest
     type(scene_type), intent(in) :: scene       !! the present one
     character(*), intent(in) :: command  !! starts the run again with `--restart`, for messages
+    type(world_type), intent(inout) :: world    !! the ranks of the run
     type(restart_type), intent(out) :: restart  !! where to start, with its file open at the system
                                                 !! if one is found
     type(error_type), allocatable, intent(out) :: error
-    character(*), intent(in), optional :: kept_stem  !! of the checkpoints' names; `stem` if absent
+    type(set_type) :: set
     character(:), allocatable :: path, newest
+    integer :: r
 
     restart%note = ''
-    newest = checkpoint_path(directory, stem)
-    if (present(kept_stem)) newest = checkpoint_path(directory, kept_stem)
-    path = named
-    if (path == '') then
-      path = newest
-      if (.not. file_exists(newest)) path = older_path(newest)
-      if (.not. file_exists(path)) then
+    restart%rank = world%rank
+    restart%ranks = world%ranks
+    newest = checkpoint_path(directory, stem_of_part(stem, world%rank, world%ranks))
+    if (named /= '' .and. world%ranks > 1) then
+      call fail(error, 'a run on several ranks finds its checkpoints by itself: give --restart '// &
+        & 'without a path')
+      return
+    else if (named /= '') then
+      path = named
+      restart%newest = path == newest
+    else
+      call find_set(directory, stem, world, set, error)
+      if (allocated(error)) return
+      if (set%ranks == 0) then
         call find_nothing(directory, stem, scene, restart, error)
         return
       end if
+      ! of another number of ranks the first one's file tells of the run
+      r = merge(world%rank, 0, set%ranks == world%ranks)
+      path = set%path_of(directory, stem, r)
+      restart%newest = .false.
+      if (world%rank < set%ranks) &
+        & restart%newest = set%path_of(directory, stem, world%rank) == newest
+      if (set%ranks /= world%ranks) then
+        allocate (restart%parts(set%ranks))
+        do r = 0, set%ranks - 1
+          restart%parts(r + 1)%path = set%path_of(directory, stem, r)
+        end do
+      end if
     end if
-    restart%newest = path == newest
-    call open_checkpoint(path, restart, error)
+    call open_about(path, restart%reader, restart%about, error, set%verified)
     if (allocated(error)) then
       if (path == newest) call offer_older(older_path(newest), command, error)
       return
     end if
+    if (restart%about%ranks > 1 .and. .not. set%verified) then
+      call fail(error, path//' is one of the checkpoints of '//to_text(restart%about%ranks)// &
+        & ' ranks, and has a part of the points only: give --restart without a path')
+      call restart%reader%close()
+      return
+    end if
+    if (allocated(restart%parts)) call restart%reader%close()
     restart%found = .true.
+    if (allocated(restart%parts)) path = path//', of '//to_text(set%ranks)// &
+      & trim(merge(' rank ', ' ranks', set%ranks == 1))
     restart%note = '  restart         from step '//to_text(restart%about%step)//', t = '// &
       & with_unit(restart%about%time, 's', 6)//' ('//path//')'
+    if (allocated(set%note)) restart%note = restart%note//set%note
     call check_build(restart)
     call compare(directory, stem, scene, restart, error)
     if (allocated(error)) return
@@ -89,63 +127,6 @@ contains
     restart%note = restart%note//newline//'  complete        the run is finished; '// &
       & 'increase &time steps or duration to continue it'
   end subroutine find_restart
-
-  !> The checkpoint of this rank from which all ranks can go on: that of the last step of which all
-  !> have one. An error if the ranks have none in common, though some have one, or if one is named:
-  !> each rank has its own.
-  subroutine common_checkpoint(directory, stem, world, named, error)
-    character(*), intent(in) :: directory        !! of the checkpoints
-    character(*), intent(in) :: stem             !! of this rank's names
-    type(world_type), intent(inout) :: world     !! the ranks
-    character(:), allocatable, intent(inout) :: named
-      !! path that the user names, which must be empty; that of the checkpoint on return, empty
-      !! where no rank has any
-    type(error_type), allocatable, intent(out) :: error
-    real(wp) :: steps(2), newest(1), most(1), missing(1)
-    integer :: step
-
-    if (named /= '') then
-      call fail(error, 'a run on several ranks finds its checkpoints by itself: give --restart '// &
-        & 'without a path')
-      return
-    end if
-    steps = [step_of(checkpoint_path(directory, stem)), &
-      & step_of(older_path(checkpoint_path(directory, stem)))]
-    ! the newest that each rank has, of which the oldest counts
-    newest = -max(steps(1), steps(2))
-    most = -newest
-    call world%take_largest(newest)
-    call world%take_largest(most)
-    step = -nint(newest(1))
-    if (nint(most(1)) < 0) return
-    missing = 0.0_wp
-    if (all(nint(steps) /= step) .or. step < 0) missing = 1.0_wp
-    call world%take_largest(missing)
-    if (missing(1) > 0.5_wp) then
-      call fail(error, 'the checkpoints in '//directory//' do not belong together: has the run '// &
-        & 'another number of ranks than '//to_text(world%ranks)//', or is one damaged?'//newline// &
-        & '  --overwrite without --restart starts again')
-      error%everywhere = .true.
-      error%elsewhere = world%rank > 0
-      return
-    end if
-    named = checkpoint_path(directory, stem)
-    if (nint(steps(1)) /= step) named = older_path(named)
-  end subroutine common_checkpoint
-
-  !> The step of a checkpoint; -1 if there is none that can be read.
-  real(wp) function step_of(path) result(step)
-    character(*), intent(in) :: path
-    type(restart_type) :: restart
-    type(error_type), allocatable :: ignored
-
-    step = -1.0_wp
-    if (.not. file_exists(path)) return
-    call open_checkpoint(path, restart, ignored)
-    if (allocated(ignored)) return
-    step = restart%about%step
-    call restart%reader%close()
-  end function step_of
 
   !> No checkpoint: from the beginning, or nothing to do, or results that must not go.
   subroutine find_nothing(directory, stem, scene, restart, error)
@@ -168,25 +149,12 @@ contains
     if (.not. restart%complete) call refuse_existing(directory, stem, .false., error)
   end subroutine find_nothing
 
-  !> Open a checkpoint and read its description.
-  subroutine open_checkpoint(path, restart, error)
-    character(*), intent(in) :: path
-    type(restart_type), intent(inout) :: restart
-    type(error_type), allocatable, intent(out) :: error
-
-    call restart%reader%open(path, error)
-    if (allocated(error)) return
-    call keep_about(restart%reader, restart%about)
-    if (.not. allocated(restart%reader%error)) return
-    call move_alloc(restart%reader%error, error)
-    call restart%reader%close()
-  end subroutine open_checkpoint
-
   !> Add to the error of the newest checkpoint how to continue from the one before it.
   subroutine offer_older(path, command, error)
     character(*), intent(in) :: path, command
     type(error_type), allocatable, intent(inout) :: error
-    type(restart_type) :: older
+    type(reader_type) :: reader
+    type(about_type) :: about
     type(error_type), allocatable :: fault
 
     if (.not. file_exists(path)) then
@@ -194,14 +162,14 @@ contains
         & '--restart starts again'
       return
     end if
-    call open_checkpoint(path, older, fault)
+    call open_about(path, reader, about, fault)
     if (allocated(fault)) then
       error%message = error%message//newline//'  the one before it is damaged, too ('// &
         & fault%message//'): --overwrite without --restart starts again'
     else
-      call older%reader%close()
+      call reader%close()
       error%message = error%message//newline//'  the one before it, of step '// &
-        & to_text(older%about%step)//', is intact; to continue from there: '//command//' '//path
+        & to_text(about%step)//', is intact; to continue from there: '//command//' '//path
     end if
   end subroutine offer_older
 
@@ -308,10 +276,11 @@ contains
   !> Set a system made from the scene to the state of the checkpoint, and the plan to its time step.
   !> An error if the points or the initial state are others, if the checkpoint is beyond the end of
   !> the run, or if it does not hold what the system needs.
-  subroutine put_back(restart, scene, system, plan, measures, error)
+  subroutine put_back(restart, scene, points, system, plan, measures, error)
     type(restart_type), intent(inout) :: restart  !! with the checkpoint's file open; closed on
                                                   !! return
     type(scene_type), intent(in) :: scene         !! the present one, for its duration
+    integer(i8), intent(in) :: points             !! checksum of the system's points of all ranks
     type(system_type), intent(inout) :: system    !! as it was made from the scene; as in the
                                                   !! checkpoint on return
     type(plan_type), intent(inout) :: plan        !! gets time step and number of steps, unless it
@@ -319,8 +288,13 @@ contains
     type(measure_list_type), intent(inout) :: measures  !! of the history, begun; as in the
                                                         !! checkpoint on return
     type(error_type), allocatable, intent(out) :: error
+    type(merger_type) :: merger
+    logical :: others
 
-    if (checksum_of_start(system) /= restart%about%start) then
+    others = points /= restart%about%points
+    if (.not. (others .or. allocated(restart%parts))) &
+      & others = checksum_of_start(system) /= restart%about%start
+    if (others) then
       call fail(error, 'the points or the initial state are not those of the checkpoint: has a '// &
         & 'file that the scene names changed, or was it written by another version?')
     else if (.not. plan%relaxes) then
@@ -331,7 +305,13 @@ contains
         & to_text(restart%about%step)//', beyond the '//to_text(plan%steps)//' of the scene')
       restart%complete = plan%steps == restart%about%step .and. restart%about%finished
     end if
-    if (.not. allocated(error)) then
+    if (.not. allocated(error) .and. allocated(restart%parts)) then
+      call merger%open(restart%parts)
+      call keep_system(merger, system)
+      call measures%keep(merger)
+      call merger%close()
+      if (allocated(merger%error)) call move_alloc(merger%error, error)
+    else if (.not. allocated(error)) then
       call keep_system(restart%reader, system)
       call measures%keep(restart%reader)
       if (allocated(restart%reader%error)) call move_alloc(restart%reader%error, error)

@@ -14,7 +14,8 @@ module pd_output_report_begin
   use pd_set_up_plan, only: plan_type
   use pd_force_generic_points, only: has_plasticity
   use pd_motion_system, only: system_type
-  use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about
+  use pd_output_checkpoint_checkpoint, only: checkpoint_path, new_about, &
+    & stem_of_part
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_measures_line, only: profiles_of
   use pd_output_results_cells, only: cells_of, cells_type
@@ -132,26 +133,29 @@ contains
 
   !> Let the recorder write checkpoints and stop in time; after a restart it has the data that it
   !> had then.
-  subroutine keep_checkpoints(scene, options, plan, start, directory, stem, restart, recorder)
+  subroutine keep_checkpoints(scene, options, plan, start, points, directory, restart, recorder)
     type(scene_type), intent(in) :: scene
     type(run_options_type), intent(in) :: options
     type(plan_type), intent(in) :: plan
     integer(i8), intent(in) :: start  !! checksum of the system before its first step
-    character(*), intent(in) :: directory, stem
+    integer(i8), intent(in) :: points !! the same of all ranks
+    character(*), intent(in) :: directory
     type(restart_type), intent(in) :: restart
     type(recorder_type), intent(inout) :: recorder
     character(:), allocatable :: path
 
-    recorder%about = new_about(scene_text(scene), start, plan%steps, plan%step)
+    recorder%about = new_about(scene_text(scene), start, plan%steps, plan%step, restart%ranks, &
+      & points)
     recorder%command = ''
     if (directory /= '') recorder%command = command_of(options)
     recorder%quiet = options%quiet
     recorder%most_seconds = 60*options%max_minutes
     path = ''
-    if (directory /= '') path = checkpoint_path(directory, stem)
-    call recorder%checkpoint%start(path, &
+    if (directory /= '') path = checkpoint_path(directory, stem_of_part(stem_of(scene), &
+      & restart%rank, restart%ranks))
+    call recorder%checkpoint%start(directory, stem_of(scene), path, &
       & scene%output%checkpoint_every, scene%output%checkpoint_minutes, resumed=restart%found, &
-      & keep_newest=restart%newest)
+      & keep_newest=restart%newest, removes=restart%rank == 0)
     if (.not. restart%found) return
     recorder%first_step = restart%about%step
     recorder%steps_done = restart%about%step

@@ -261,8 +261,7 @@ contains
       about%strain = recorder%balance%energies%strain
       about%warnings = recorder%warnings
       call recorder%results%sync(error)
-      if (.not. allocated(error)) call recorder%checkpoint%write(about, system, &
-        & recorder%measures, error)
+      call recorder%checkpoint%write(about, system, recorder%measures, error)
     end associate
     call recorder%timer%stop('checkpoints')
     if (.not. allocated(error)) return
