@@ -77,17 +77,25 @@ contains
     type(term_view_type), intent(in) :: view                 !! the instant
     integer(i4), intent(in) :: slots(:)                      !! of the points, in their order
     real(wp), allocatable, intent(out) :: normals(:, :)      !! (3, points)
-    type(surface_type) :: surface
-    type(frame_type) :: frame
     real(wp), allocatable :: of_slot(:, :)
+    integer(i4), allocatable :: place(:)
     integer :: first, last, i
 
     allocate (normals(3, size(slots)), of_slot(3, view%body%n_slots), source=0.0_wp)
+    allocate (place(view%body%n_slots), source=0_i4)
     do first = 1, size(slots), at_a_time
       last = min(first + at_a_time - 1, size(slots))
-      call take_surface(view, slots(first:last), [(1.0_wp, i=first, last)], surface)
-      call find_normals(surface, view, [(.true., i=first, last)], frame)
-      of_slot(:, slots(first:last)) = frame%normals
+      some: block
+        type(surface_type) :: surface
+        type(frame_type) :: frame
+
+        surface%slots = slots(first:last)
+        surface%weight = [(1.0_wp, i=first, last)]
+        call take_bonds(view, surface)
+        call take_places(view, place, surface)
+        call find_normals(surface, view, [(.true., i=first, last)], frame)
+        of_slot(:, slots(first:last)) = frame%normals
+      end block some
     end do
     do i = 1, size(slots)
       normals(:, i) = of_slot(:, slots(i))
@@ -135,11 +143,13 @@ contains
     integer(i4), intent(in) :: slots(:)              !! of the points, in their order
     real(wp), intent(in) :: weight(:)                !! of their normals; 0: they get none [-]
     type(surface_type), intent(out) :: surface
+    integer(i4), allocatable :: place(:)
 
     surface%slots = slots
     surface%weight = weight
     call take_bonds(view, surface)
-    call take_places(view, surface)
+    allocate (place(view%body%n_slots), source=0_i4)
+    call take_places(view, place, surface)
     call turn_round(surface)
   end subroutine take_surface
 
@@ -189,13 +199,13 @@ contains
   end subroutine take_bonds
 
   !> The places of points and members, which replace the slots of these.
-  subroutine take_places(view, surface)
+  subroutine take_places(view, place, surface)
     type(term_view_type), intent(in) :: view
+    integer(i4), intent(inout) :: place(:)    !! (n_slots) 0, on return again
     type(surface_type), intent(inout) :: surface
-    integer(i4), allocatable :: place(:), around(:)
+    integer(i4), allocatable :: around(:)
     integer :: n, i, b
 
-    allocate (place(view%body%n_slots), source=0_i4)
     allocate (around(size(surface%slots) + size(surface%member)))
     n = 0
     do i = 1, size(surface%slots)
@@ -216,6 +226,7 @@ contains
     do i = 1, size(surface%slots)
       surface%own(surface%place(i)) = int(i, i4)
     end do
+    place(surface%around) = 0_i4
 
   contains
 
@@ -394,11 +405,11 @@ contains
         b = surface%bond(e)
         i = surface%owner(b)
         if (.not. turns(i)) cycle
+        if (.not. frame%inverse(b) > 0.0_wp) cycle
         c = couples(:, i)
         c = c - (c(1)*frame%unit(1, b) + c(2)*frame%unit(2, b) + c(3)*frame%unit(3, b)) &
           & *frame%unit(:, b)
-        if (frame%inverse(b) > 0.0_wp) &
-          & total = total - surface%volume(surface%place(i))*frame%inverse(b)*c
+        total = total - surface%volume(surface%place(i))*frame%inverse(b)*c
       end do
       i = surface%own(a)
       if (i > 0) then
