@@ -1,16 +1,17 @@
-!> Scenes of texts that tests run in time.
+!> Scenes of texts that tests set up, or run in time.
 module runs
   use omp_lib, only: omp_set_num_threads
   use pd_base_error, only: fault_type => error_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_scene_content_types, only: scene_type
-  use pd_set_up_prepare, only: set_up_type
+  use pd_set_up_prepare, only: prepare, set_up_type
+  use perifort, only: read_scene_text
   use bodies, only: diary_type, ready, ready_alone
-  use test_scene_expect, only: expect_scene
+  use test_scene_expect, only: expect_parts, expect_scene
   use testdrive, only: error_type, test_failed
   implicit none (type, external)
   private
-  public :: run
+  public :: run, ready_text, refuse
 
 contains
 
@@ -40,5 +41,38 @@ contains
     if (allocated(fault)) call test_failed(error, fault%message)
     if (present(diary)) diary = own
   end subroutine run
+
+  !> Set up the scene of a text; what is wrong with it fails the test.
+  subroutine ready_text(text, set_up, error, alone)
+    character(*), intent(in) :: text             !! of the scene
+    type(set_up_type), intent(out) :: set_up
+    type(error_type), allocatable, intent(inout) :: error
+    logical, intent(in), optional :: alone       !! on one thread to the end of the test
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    if (allocated(error)) return
+    if (present(alone)) then
+      if (alone) call omp_set_num_threads(1)
+    end if
+    call read_scene_text(text, '', scene, fault)
+    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+  end subroutine ready_text
+
+  !> Reading the scene of a text or setting it up must fail with these parts in the message.
+  subroutine refuse(error, text, parts)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: text   !! of the scene
+    character(*), intent(in) :: parts  !! between bars
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+
+    if (allocated(error)) return
+    call read_scene_text(text, '', scene, fault)
+    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
+    call expect_parts(error, fault, parts)
+  end subroutine refuse
 
 end module runs

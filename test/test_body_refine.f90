@@ -11,11 +11,12 @@ module test_body_refine
   use pd_force_forces, only: internal_force
   use pd_force_model, only: options_of
   use pd_motion_system, only: system_type
-  use pd_set_up_prepare, only: prepare, set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use perifort, only: answer_type, fault_type => error_type, read_scene_text, run_options_type, &
     & run_scene, scene_type
+  use runs, only: ready_text, refuse
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
-  use test_scene_expect, only: expect_fault, expect_parts, line
+  use test_scene_expect, only: expect_fault, line
   implicit none (type, external)
   private
   public :: collect_body_refine
@@ -42,19 +43,6 @@ contains
       & new_unittest('a pulse is hardly reflected', test_reflection), &
       & new_unittest('what is refused', test_refusals)]
   end subroutine collect_body_refine
-
-  subroutine ready_text(text, set_up, error)
-    character(*), intent(in) :: text
-    type(set_up_type), intent(out) :: set_up
-    type(error_type), allocatable, intent(inout) :: error
-    type(scene_type) :: scene
-    type(fault_type), allocatable :: fault
-
-    if (allocated(error)) return
-    call read_scene_text(text, '', scene, fault)
-    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
-    if (allocated(fault)) call test_failed(error, fault%message)
-  end subroutine ready_text
 
   !> A bar, a plate or a block from 0 to 1.2 m with cells of 0.1 m, refined twice in a ball.
   function box(dim, levels) result(text)
@@ -478,19 +466,5 @@ contains
       & '&body lower = 3*0 upper = 3*1 points = 3*20 /'//line//"&refine where = '1' levels = 6 /", &
       & 'refined cells make more than 1000000000 points')
   end subroutine test_refusals
-
-  !> The scene is read, but cannot be set up.
-  subroutine refuse(error, text, parts)
-    type(error_type), allocatable, intent(inout) :: error
-    character(*), intent(in) :: text, parts
-    type(scene_type) :: scene
-    type(set_up_type) :: set_up
-    type(fault_type), allocatable :: fault
-
-    if (allocated(error)) return
-    call read_scene_text(text, '', scene, fault)
-    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
-    call expect_parts(error, fault, parts)
-  end subroutine refuse
 
 end module test_body_refine

@@ -13,14 +13,14 @@ module test_motion_substeps
   use pd_output_results_files, only: make_directory
   use pd_output_results_sink, only: sink_type
   use pd_scene_content_types, only: scene_type, unset
-  use pd_set_up_prepare, only: prepare, set_up_type
-  use perifort, only: public_fault => error_type, read_scene_text
+  use pd_set_up_prepare, only: set_up_type
   use bodies, only: box_scene, diary_type, expect_true, noise, ready, ready_alone, shake
   use comparisons, only: expect_close, max_abs
   use force_subjects, only: some_gradient
   use restarts, only: accept, expect_broken, expect_same_results, plate, &
     & run_pieces => run_in_pieces, run_whole => run, spacing
-  use test_scene_expect, only: expect_fault, expect_parts, line
+  use test_scene_expect, only: expect_fault, line
+  use runs, only: ready_text, refuse
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   implicit none (type, external)
   private
@@ -65,23 +65,6 @@ contains
       & to_text(levels)//' /'//line//'&time '//time//' /'//line
   end function refined
 
-  !> Build a scene of a text.
-  subroutine ready_text(text, set_up, error)
-    character(*), intent(in) :: text
-    type(set_up_type), intent(out) :: set_up
-    type(error_type), allocatable, intent(inout) :: error
-    type(scene_type) :: scene
-    type(public_fault), allocatable :: fault
-
-    if (allocated(error)) return
-    call read_scene_text(text, '', scene, fault)
-    if (allocated(fault)) then
-      call test_failed(error, fault%message)
-      return
-    end if
-    call ready_alone(scene, set_up, error)
-  end subroutine ready_text
-
   !> Of 8 substeps the finest level has all, the next one every other, and so on.
   subroutine test_due(error)
     type(error_type), allocatable, intent(out) :: error
@@ -104,7 +87,7 @@ contains
 
     do trial = 1, size(dims)
       call ready_text(refined(dims(trial), levels(trial), ratios(trial), fast//'steps = 1'), &
-        & set_up, error)
+        & set_up, error, alone=.true.)
       if (allocated(error)) return
       call expect_split(error, set_up%system)
     end do
@@ -224,7 +207,7 @@ contains
 
     do trial = 1, size(dims)
       do late = 0, 1
-        call ready_text(breaking_text(trial, late == 1), set_up, error)
+        call ready_text(breaking_text(trial, late == 1), set_up, error, alone=.true.)
         if (allocated(error)) return
         associate (system => set_up%system)
           call stir(system, 0.1_wp)
@@ -318,7 +301,8 @@ contains
       type(set_up_type) :: set_up
 
       call ready_text(refined(2, levels(trial), ratios(trial), keys//'step = '// &
-        & to_text(12.0_wp/number, 16)//' steps = '//to_text(number))//conditions, set_up, error)
+        & to_text(12.0_wp/number, 16)//' steps = '//to_text(number))//conditions, set_up, &
+        & error, alone=.true.)
       call go(set_up, error)
       if (.not. allocated(error)) u = set_up%system%state%u(set_up%system%body%slot, :)
     end subroutine motion
@@ -337,7 +321,8 @@ contains
     do trial = 1, 2
       text = refined(2, 2, merge(1.0_wp/3, 0.2_wp, trial == 1), fast//'steps = 1')
       i = index(text, 'poissons_ratio')
-      call ready_text(text(:i - 1)//'critical_stretch = 0.05 '//text(i:), set_up, error)
+      call ready_text(text(:i - 1)//'critical_stretch = 0.05 '//text(i:), set_up, error, &
+        & alone=.true.)
       if (allocated(error)) return
       associate (system => set_up%system)
         system%state%u = 0.1_wp*system%body%x
@@ -452,8 +437,8 @@ contains
     integer :: l
 
     do l = 1, 2
-      call ready_text(refined(2, l, 0.2_wp, fast//'steps = 5'), with, error)
-      call ready_text(refined(2, l, 0.2_wp, 'steps = 5'), without, error)
+      call ready_text(refined(2, l, 0.2_wp, fast//'steps = 5'), with, error, alone=.true.)
+      call ready_text(refined(2, l, 0.2_wp, 'steps = 5'), without, error, alone=.true.)
       if (allocated(error)) return
       call expect_true(error, with%plan%limit <= 2**l*without%plan%limit*(1 + 1.0e-12_wp), &
         & 'the limit is too long')
@@ -467,20 +452,6 @@ contains
     call refuse(error, refined(2, 1, 0.2_wp, fast//'steps = 5 step = 5.0'), &
       & 'with substeps the step may be 0.8 of the stable one|may resonate')
   end subroutine test_limit
-
-  !> Setting up the scene of a text must fail with these parts in the message.
-  subroutine refuse(error, text, parts)
-    type(error_type), allocatable, intent(inout) :: error
-    character(*), intent(in) :: text, parts
-    type(scene_type) :: scene
-    type(set_up_type) :: set_up
-    type(fault_type), allocatable :: fault
-
-    if (allocated(error)) return
-    call read_scene_text(text, '', scene, fault)
-    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
-    call expect_parts(error, fault, parts)
-  end subroutine refuse
 
   subroutine test_refusals(error)
     type(error_type), allocatable, intent(out) :: error
@@ -546,7 +517,7 @@ contains
 
     do trial = 1, size(levels)
       call ready_text(refined(2, levels(trial), ratios(trial), fast//'steps = '// &
-        & to_text(steps)), set_up, error)
+        & to_text(steps)), set_up, error, alone=.true.)
       if (allocated(error)) return
       call stir(set_up%system, 1.0e-5_wp)
       diary = diary_type(every=7)

@@ -22,6 +22,7 @@ module test_set_up_horizons
   use pd_set_up_prepare, only: prepare, set_up_type
   use perifort, only: answer_type, fault_type => error_type, read_scene_text, run_options_type, &
     & run_scene, scene_type
+  use runs, only: ready_text
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   use test_scene_expect, only: expect_fault, expect_parts, line
   implicit none (type, external)
@@ -145,19 +146,6 @@ contains
     of_local = grids(8, 'poissons_ratio = 0.2', '', '')
     text = of_local(:index(of_local, local) - 1)//more
   end function own_grids
-
-  subroutine ready_text(text, set_up, error)
-    character(*), intent(in) :: text
-    type(set_up_type), intent(out) :: set_up
-    type(error_type), allocatable, intent(inout) :: error
-    type(scene_type) :: scene
-    type(fault_type), allocatable :: fault
-
-    if (allocated(error)) return
-    call read_scene_text(text, '', scene, fault)
-    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
-    if (allocated(fault)) call test_failed(error, fault%message)
-  end subroutine ready_text
 
   subroutine force_at(system, u, force)
     type(system_type), intent(inout) :: system

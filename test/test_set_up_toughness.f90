@@ -7,11 +7,12 @@ module test_set_up_toughness
   use pd_family_volume, only: volume_linear, volume_rule_type
   use pd_law_material, only: critical_stretch_from_energy
   use pd_law_weighted, only: state_based_law, weighted_law_type
-  use pd_set_up_prepare, only: prepare, set_up_type
+  use pd_set_up_prepare, only: set_up_type
   use pd_set_up_toughness_grow, only: grow_crack, subject_type, toughness_type
   use pd_set_up_toughness_table, only: row_type, rows
   use perifort, only: answer_type, fault_type => error_type, read_scene_text, run_options_type, &
     & run_scene, scene_type
+  use runs, only: ready_text
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
   use test_scene_expect, only: expect_fault, line
   implicit none (type, external)
@@ -264,19 +265,5 @@ contains
         & text_of(broken(size(broken)))//' bonds break')
     end subroutine expect_broken
   end subroutine test_growth
-
-  !> Prepare a scene.
-  subroutine ready_text(text, set_up, error)
-    character(*), intent(in) :: text
-    type(set_up_type), intent(out) :: set_up
-    type(error_type), allocatable, intent(inout) :: error
-    type(scene_type) :: scene
-    type(fault_type), allocatable :: fault
-
-    if (allocated(error)) return
-    call read_scene_text(text, '', scene, fault)
-    if (.not. allocated(fault)) call prepare(scene, set_up, fault)
-    if (allocated(fault)) call test_failed(error, fault%message)
-  end subroutine ready_text
 
 end module test_set_up_toughness
