@@ -77,7 +77,7 @@ contains
     contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
     contact%side = rule%side(body%body(contact%slots))
     contact%law%smoothed = rule%smoothed .and. body%dim > 1 .and. count(rule%side > 0) > 1
-    ! without losses no account of work is needed, which would look at all points in every step
+    ! without losses no account of work is needed
     contact%conservative = part == of_normal_force .and. rule%returned >= 1.0_wp .and. &
       & rule%damping <= 0.0_wp
     contact%tangent = no_tangent

@@ -29,7 +29,8 @@ module pd_force_terms
     type(item_type), allocatable :: items(:)   !! not allocated: none
     integer :: inside = 0                      !! terms that are not external
     integer :: outside = 0                     !! external ones
-    real(wp), allocatable :: force(:, :)       !! room for forces and energies of these, 0
+    real(wp), allocatable :: force(:, :)       !! room for forces and energies of terms that act
+                                               !! on few points, 0 between calls
     real(wp), allocatable :: density(:)
   contains
     procedure :: add
