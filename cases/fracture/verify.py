@@ -28,10 +28,13 @@ PARTS = {
     "strip": dynamics.strip,
     "kalthoff": dynamics.kalthoff,
     "ring": dynamics.ring,
+    "compact_materials": specimens.materials("compact"),
+    "bent_materials": specimens.materials("bent"),
+    "cantilever_materials": specimens.materials("cantilever"),
     "sweep": sweep.sweep,
 }
 # Parts that only --full and --only run
-LONG = ("sweep",)
+LONG = ("compact_materials", "bent_materials", "cantilever_materials", "sweep")
 
 
 def pictures(case, shown):
