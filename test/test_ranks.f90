@@ -30,7 +30,7 @@ module test_ranks
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   implicit none (type, external)
   private
-  public :: collect_ranks
+  public :: collect_ranks, fake_type, hub_type
 
   real(wp), parameter :: spacing = 1.0e-2_wp
 

@@ -62,6 +62,8 @@ module pd_body_body
                                             !! allocated: its number here
     type(grid_type), allocatable :: grids(:)
     real(wp) :: delta = 0.0_wp              !! the horizon, the largest one of all points [m]
+    real(wp) :: least_spacing = 0.0_wp      !! of the points of all processes; 0 where these have
+    real(wp) :: largest_spacing = 0.0_wp    !! not been counted [m]
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
     type(skin_type), allocatable :: skins(:)  !! bodies that fill surfaces
     type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)
