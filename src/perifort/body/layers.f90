@@ -144,8 +144,10 @@ contains
     else
       why = 'all its cells belong to the layers of earlier &boundary groups'
     end if
-    call scene_fault(error, scene, 'boundary', layer%tally%boundary, 'side', 'the layer at side '''// &
-      & trim(scene%boundaries(layer%tally%boundary)%side)//''' joins no point', why)
+    associate (number => layer%tally%boundary)
+      call scene_fault(error, scene, 'boundary', number, 'side', 'the layer at side '''// &
+        & trim(scene%boundaries(number)%side)//''' joins no point', why)
+    end associate
   end subroutine check_layer
 
   !> The points of a layer in the cells first..last of one of its sides, x fastest. Where the corner
@@ -207,7 +209,7 @@ contains
       do s = 1, size(layers(l)%sides)
         associate (other => layers(l)%sides(s))
           if (other%number /= side%number) cycle
-          ! the numbers of cells count from the body's corner, bodies of one grid from different ones
+          ! cells are counted from the body's corner, and bodies of one grid have different ones
           at = cell
           at(:dim) = at(:dim) + nint(place_in(grid, side%grid%origin(:dim))) &
             & - nint(place_in(grid, other%grid%origin(:dim)))

@@ -22,7 +22,7 @@ module pd_body_windows
   private
   public :: survey_type, work_of_windows, has_windows, survey_points, begin_work, make_part
 
-  integer, parameter :: most_cells = 131072  !! of a window
+  integer, parameter :: most_cells = 32768  !! of a window
 
   !> Cells whose points are made at once, of one body or of one side of a layer.
   type :: window_type
@@ -87,8 +87,9 @@ contains
   !> or if a layer joins none; whether bodies overlap is not seen.
   subroutine survey_points(scene, survey, error, together, rank, ranks, cells)
     type(scene_type), intent(in) :: scene    !! a checked scene that `has_windows`
-    type(survey_type), intent(out) :: survey
-    type(error_type), allocatable, intent(out) :: error
+    type(survey_type), intent(out) :: survey             !! what is known of the points
+    type(error_type), allocatable, intent(out) :: error  !! the same on all ranks but for
+                                             !! expressions that are not finite somewhere
     class(ranks_type), intent(inout), target, optional :: together
       !! the ranks that count together; must stay where it is as long as the survey; absent: one
     integer, intent(in), optional :: rank    !! of this process, from 0
@@ -148,8 +149,8 @@ contains
     end associate
   end subroutine survey_points
 
-  !> Add the windows of a box of cells, in the order of its cells: planes, parts of a plane that have
-  !> whole rows, or parts of a row.
+  !> Add the windows of a box of cells, in the order of its cells: planes, parts of a plane that
+  !> have whole rows, or parts of a row.
   pure subroutine add_boxes(like, first, last, most, windows)
     type(window_type), intent(in) :: like           !! what all of them have
     integer, intent(in) :: first(3), last(3)        !! of the box
@@ -181,9 +182,9 @@ contains
     call move_alloc(more, windows)
   end subroutine add_boxes
 
-  !> Count the points of the bodies, and let the layers see them. Whether a point on a surface is cut
-  !> depends on the least spacing of the points that are there, which is known for certain when they
-  !> have been counted.
+  !> Count the points of the bodies, and let the layers see them. Whether a point on a surface is
+  !> cut depends on the least spacing of the points that are there, which is known for certain when
+  !> they have been counted.
   subroutine count_bodies(scene, survey, left, error)
     type(scene_type), intent(in) :: scene
     type(survey_type), intent(inout) :: survey
@@ -205,8 +206,8 @@ contains
       survey%highest = -huge(1.0_wp)
       call begin_layers(scene, survey%layers)
       do w = 1 + survey%rank, size(survey%windows), survey%ranks
-        call make_points(scene, survey, w, survey%windows(w)%first, survey%windows(w)%last, points, &
-          & error, left)
+        call make_points(scene, survey, w, survey%windows(w)%first, survey%windows(w)%last, &
+          & points, error, left)
         if (allocated(error)) return
         call note_points(survey, w, points)
         do l = 1, size(survey%layers)
@@ -218,8 +219,8 @@ contains
         if (sum(left(s, :)) > 0_i8) then
           continue
         else if (s == 0) then
-          call scene_fault(error, scene, 'body', 1, 'shape', 'the scene has no points: no cell of '// &
-            & 'a lattice has its centre in the shape of its body', '')
+          call scene_fault(error, scene, 'body', 1, 'shape', 'the scene has no points: no cell '// &
+            & 'of a lattice has its centre in the shape of its body', '')
         else
           call nothing_left(scene, s, error)
         end if
@@ -425,11 +426,11 @@ contains
 
   !> The work of the points that have been counted.
   subroutine begin_work(scene, survey, blocks, work)
-    type(scene_type), intent(in), target :: scene    !! must stay where they are as long as the work
-    type(survey_type), intent(in), target :: survey
+    type(scene_type), intent(in), target :: scene    !! must stay where it is as long as the work,
+    type(survey_type), intent(in), target :: survey  !! and so must what is known of its points
     integer, intent(in) :: blocks                    !! cuts across x lie between so many points of
                                                      !! a row; 1: between any
-    type(work_of_windows), intent(out) :: work
+    type(work_of_windows), intent(out) :: work       !! ready for `divide_space`
     integer :: c
 
     work%scene => scene
@@ -474,9 +475,9 @@ contains
 
   !> Make the points of a rank and copies of others that its bonds can reach.
   subroutine make_part(scene, survey, division, rank, distance, body, owner)
-    type(scene_type), intent(in) :: scene
+    type(scene_type), intent(in) :: scene        !! the one that was surveyed
     type(survey_type), intent(in) :: survey      !! of its points
-    type(division_type), intent(in) :: division
+    type(division_type), intent(in) :: division  !! the boxes of the ranks
     integer, intent(in) :: rank                  !! from 0
     real(wp), intent(in) :: distance             !! how far bonds reach [m]
     type(body_type), intent(out) :: body         !! as `take_part` leaves it

@@ -111,6 +111,7 @@ contains
       call timer%start('points')
       if (in_windows) then
         call survey_points(scene, survey, error, world, world%rank, world%ranks)
+        if (.not. allocated(error)) call check_number(scene, survey%none%order%n_global, error)
         if (allocated(error)) return
         system%body = survey%none
         delta = survey%none%delta
@@ -155,8 +156,8 @@ contains
         system%body%order%reproducible = world%reproducible
       end if
       if (allocated(error)) return
-      if (divided .and. .not. in_windows) call divide_body(scene, rule, blocks, world, system%body, &
-        & owner, error)
+      if (divided .and. .not. in_windows) call divide_body(scene, rule, blocks, world, &
+        & system%body, owner, error)
       if (allocated(error)) return
       call make_family(scene, rule, choice, system, error)
       if (allocated(error)) return
@@ -279,6 +280,18 @@ contains
       call timer%stop('time step')
     end associate
   end subroutine prepare
+
+  !> An error is set if ranks have more points together than the first one can write.
+  subroutine check_number(scene, points, error)
+    type(scene_type), intent(in) :: scene
+    integer(i8), intent(in) :: points  !! of all ranks
+    type(error_type), allocatable, intent(out) :: error
+
+    if (points <= huge(0)) return
+    call scene_fault(error, scene, 'body', 1, 'points', 'the scene has '//to_text(points)// &
+      & ' points; results can have at most '//to_text(huge(0)), &
+      & 'the first rank, which writes them, numbers them with 32 bits')
+  end subroutine check_number
 
   !> An error is set if the generic pass cannot serve what a scene asks for.
   subroutine check_laws(scene, system, error)
