@@ -43,6 +43,7 @@ module pd_family_lattice
                                                !! other ranks' points, or points with bonds in the
                                                !! list of a composite family
     integer(i8) :: last_owned = huge(0_i8)     !! the last slot that is no copy
+    integer(i4), allocatable :: copies(:)      !! slots of copies of other ranks' points, if any
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
@@ -236,8 +237,10 @@ contains
     family%words = (family%most_bonds + word_bits - 1)/word_bits
     call place_points(body, family, error)
     if (allocated(error)) return
-    if (body%n_points > body%order%n_owned) &
-      & family%last_owned = maxval(body%slot(:body%order%n_owned))
+    if (body%n_points > body%order%n_owned) then
+      family%last_owned = maxval(body%slot(:body%order%n_owned))
+      family%copies = body%slot(body%order%n_owned + 1:)
+    end if
     allocate (apart(body%n_slots), source=.false.)
     if (present(listed)) then
       do k = 1, body%n_slots
@@ -439,8 +442,38 @@ contains
       if (pass == 1) allocate (family%block(n))
     end do
     call find_slabs(family%grids, family%dim, both_ends(family%dim, family%mixed), &
-      & family%block_length, family%block, family%slabs)
+      & family%block_length, family%block, family%slabs, touch_copies(family))
   end subroutine find_blocks
+
+  !> Which blocks have bonds of copies of other ranks' points among those that loops compute for
+  !> them.
+  pure function touch_copies(family) result(touched)
+    type(lattice_family_type), intent(in) :: family  !! with its blocks
+    logical, allocatable :: touched(:)
+    integer(i1), allocatable :: copy(:)
+    integer(i8) :: first, last
+    integer :: b, o
+    logical :: both
+
+    allocate (touched(size(family%block)), source=.false.)
+    if (.not. allocated(family%copies)) return
+    both = both_ends(family%dim, family%mixed)
+    allocate (copy(family%n_slots), source=0_i1)
+    copy(family%copies) = 1_i1
+    do b = 1, size(family%block)
+      first = family%block(b)
+      last = first + family%block_length - 1
+      touched(b) = any(copy(first:last) == 1_i1)
+      if (touched(b)) cycle
+      associate (grid => family%grids(grid_at(family, first)))
+        do o = 1, grid%n
+          if (both .and. grid%shift(o) < 0_i8) cycle
+          touched(b) = any(copy(first + grid%shift(o):last + grid%shift(o)) == 1_i1)
+          if (touched(b)) exit
+        end do
+      end associate
+    end do
+  end function touch_copies
 
   !> The first slot of the class of slot `k`; `k` itself if it is dead.
   pure integer function alike(family, k)
