@@ -71,6 +71,13 @@ BAR = """&scene dimension = 3 /
 &output every = 2 history_every = 2 fields = 'displacement' /
 """
 MEMORY_RANKS = 12
+# Bodies that overlap on more than one rank.
+OVERLAP = """&scene dimension = 2 /
+&material youngs_modulus = 2e11 density = 8e3 poissons_ratio = 0.3333 model = 'bond_based' /
+&body lower = 0, 0 upper = 1, 1 points = 40, 40 /
+&body lower = 0.97, 0.2 upper = 1.57, 0.8 points = 21, 21 /
+&time steps = 2 /
+"""
 MOST_PIECES = 5
 PIECE = 0.12  # of the time that the run in one piece takes
 
@@ -201,6 +208,13 @@ def check_ends(case):
     errors = process.communicate()[1]
     case.equal("too few points: status", process.returncode, 1)
     case.equal("too few points: errors", len(re.findall(r"^error:", errors, re.M)), 1)
+    # ranks look for overlaps among their own points: one of them reports
+    overlap = crack.with_name("overlap.nml")
+    overlap.write_text(OVERLAP, encoding="utf-8")
+    _, process = case.start(overlap, 3)
+    errors = process.communicate()[1]
+    case.equal("overlap: status", process.returncode, 1)
+    case.equal("overlap: errors", len(re.findall(r"^error: body 1 and body 2 overlap", errors, re.M)), 1)
     # unstable: the history up to there is kept
     folder, process = case.start(crack, 3, "--set", "time%step=1.0e-6")
     errors = process.communicate()[1]

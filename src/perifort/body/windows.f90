@@ -4,7 +4,7 @@
 !>
 !> Ranks share the windows among them while they count, and then add up what they have found.
 module pd_body_windows
-  use pd_base_error, only: error_type, internal_fault
+  use pd_base_error, only: error_type, fail, internal_fault
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_order, only: ranks_type
   use pd_body_body, only: allocate_points, body_type, grid_type, keep_points, own_points
@@ -20,7 +20,8 @@ module pd_body_windows
   use pd_scene_content_types, only: has_own_horizons, has_refinement, is_lattice, scene_type
   implicit none (type, external)
   private
-  public :: survey_type, work_of_windows, has_windows, survey_points, begin_work, make_part
+  public :: survey_type, work_of_windows, has_windows, survey_points, begin_work, make_part, &
+    & agree_on_error
 
   integer, parameter :: most_cells = 32768  !! of a window
 
@@ -88,8 +89,7 @@ contains
   subroutine survey_points(scene, survey, error, together, rank, ranks, cells)
     type(scene_type), intent(in) :: scene    !! a checked scene that `has_windows`
     type(survey_type), intent(out) :: survey             !! what is known of the points
-    type(error_type), allocatable, intent(out) :: error  !! the same on all ranks but for
-                                             !! expressions that are not finite somewhere
+    type(error_type), allocatable, intent(out) :: error  !! on all ranks, if on one
     class(ranks_type), intent(inout), target, optional :: together
       !! the ranks that count together; must stay where it is as long as the survey; absent: one
     integer, intent(in), optional :: rank    !! of this process, from 0
@@ -208,12 +208,14 @@ contains
       do w = 1 + survey%rank, size(survey%windows), survey%ranks
         call make_points(scene, survey, w, survey%windows(w)%first, survey%windows(w)%last, &
           & points, error, left)
-        if (allocated(error)) return
+        if (allocated(error)) exit
         call note_points(survey, w, points)
         do l = 1, size(survey%layers)
           call see_points(scene, points, points%n_points, survey%layers(l))
         end do
       end do
+      if (associated(survey%together)) call agree_on_error(survey%together, w, error)
+      if (allocated(error)) return
       call add_counts(survey, left)
       do s = 0, cuts
         if (sum(left(s, :)) > 0_i8) then
@@ -275,6 +277,28 @@ contains
       if (allocated(error)) return
     end do
   end subroutine count_layers
+
+  !> What one rank has found, or several, all of them have: the one with the first place reports it.
+  subroutine agree_on_error(together, place, error)
+    class(ranks_type), intent(inout) :: together  !! all ranks, which all call this
+    integer, intent(in) :: place                  !! where this rank has found it, if it has: no
+                                                  !! other one has found any there
+    type(error_type), allocatable, intent(inout) :: error  !! allocated on all ranks on return, if
+                                                           !! it is on one
+    real(wp) :: first(1)
+
+    first = -huge(1.0_wp)
+    if (allocated(error)) first = -real(place, wp)
+    call together%take_largest(first)
+    if (.not. first(1) > -huge(1.0_wp)) return
+    if (allocated(error)) then
+      error%elsewhere = first(1) > -place
+    else
+      call fail(error, 'another rank has found an error')
+      error%elsewhere = .true.
+    end if
+    error%everywhere = .true.
+  end subroutine agree_on_error
 
   !> Note how many points a window has and how far they reach.
   subroutine note_points(survey, w, points)

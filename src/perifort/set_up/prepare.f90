@@ -14,7 +14,7 @@ module pd_set_up_prepare
   use pd_body_overlap, only: check_lattices
   use pd_body_surface_stl, only: read_stl
   use pd_body_surface_surface, only: surface_type
-  use pd_body_windows, only: has_windows, survey_points, survey_type
+  use pd_body_windows, only: agree_on_error, has_windows, survey_points, survey_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_family_crack_surface, only: cut_by_facets
@@ -141,7 +141,9 @@ contains
       end if
       if (in_windows) then
         call divide_survey(scene, rule, blocks, world, survey, system%body, owner, error)
-        if (.not. allocated(error)) call check_lattices(scene, system%body, error)
+        if (allocated(error)) return
+        call check_lattices(scene, system%body, error)
+        call agree_on_error(world, world%rank, error)
         if (allocated(error)) return
         call choose_family(scene, rule, system%body, laws, divided, choice, error, survey)
       else
