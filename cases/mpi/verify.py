@@ -381,6 +381,7 @@ def check_memory(case):
     used = {}
     for points in (30, 900):
         path = case.out / f"bar_{points}.nml"
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(BAR.format(points=points, length=points / 30), encoding="utf-8")
         _, process = case.start(path, 1)
         _, status, usage = os.wait4(process.pid, 0)
