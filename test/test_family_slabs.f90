@@ -3,8 +3,14 @@ module test_family_slabs
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
+  use pd_base_error, only: fault_type => error_type
+  use pd_body_body, only: body_type, owned
+  use pd_body_division, only: divide_space, division_type
+  use pd_body_windows, only: begin_work, make_part, survey_points, survey_type, work_of_windows
   use pd_set_up_prepare, only: set_up_type
-  use pd_family_lattice, only: grid_at, lattice_family_type
+  use pd_family_family, only: allocate_bonds, bonds_type
+  use pd_family_lattice, only: grid_at, lattice_family_type, new_lattice_family
+  use pd_family_volume, only: reach, volume_rule_number, volume_rule_type
   use pd_force_forces, only: internal_force
   use pd_force_model, only: options_of
   use pd_force_reference, only: reference_force
@@ -30,6 +36,7 @@ contains
     testsuite = [ &
       & new_unittest('slabs of one colour never add to the same slot', test_apart), &
       & new_unittest('every block lies in one slab', test_whole), &
+      & new_unittest('blocks that need copies of other points come late', test_late), &
       & new_unittest('loops that add to both ends give the same bits on any number of threads', &
       & test_threads), &
       & new_unittest('bonds on either side of the fast formula are added once', test_once)]
@@ -60,8 +67,7 @@ contains
   subroutine test_apart(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
-    integer, allocatable :: owner(:)
-    integer :: shape, colour, s, b, o
+    integer :: shape, colour
 
     do shape = 1, size(shapes, 2)
       call box(shapes(:, shape), .false., shape == 1, set_up, error)
@@ -73,26 +79,37 @@ contains
             call expect_true(error, first(colour + 1) - first(colour) > 1, &
               & 'only one slab of a colour in shape '//text_of(real(shape, wp)))
           end associate
-          owner = [(0, s=1, family%n_slots)]
-          do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
-            do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
-              call claim(family%block(b))
-              associate (grid => family%grids(grid_at(family, family%block(b))))
-                do o = 1, grid%n
-                  ! the loops leave out offsets that none of the block's slots has
-                  if (grid%shift(o) > 0 .and. any(family%alive(family%block(b):family%block(b) &
-                    & + lanes - 1) == 1_i1 .and. family%alive(family%block(b) + grid%shift(o): &
-                    & family%block(b) + grid%shift(o) + lanes - 1) == 1_i1)) &
-                    & call claim(family%block(b) + grid%shift(o))
-                end do
-              end associate
-              if (allocated(error)) return
-            end do
-          end do
+          call keep_apart(family, colour, error)
         end do
       class default
         call test_failed(error, 'not a lattice')
       end select
+    end do
+  end subroutine test_apart
+
+  !> Each slot gets something from one slab of a colour at most.
+  subroutine keep_apart(family, colour, error)
+    type(lattice_family_type), intent(in) :: family
+    integer, intent(in) :: colour
+    type(error_type), allocatable, intent(inout) :: error
+    integer, allocatable :: owner(:)
+    integer :: s, b, o
+
+    owner = [(0, s=1, family%n_slots)]
+    do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
+      do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
+        call claim(family%block(b))
+        associate (grid => family%grids(grid_at(family, family%block(b))))
+          do o = 1, grid%n
+            ! the loops leave out offsets that none of the block's slots has
+            if (grid%shift(o) > 0 .and. any(family%alive(family%block(b):family%block(b) &
+              & + lanes - 1) == 1_i1 .and. family%alive(family%block(b) + grid%shift(o): &
+              & family%block(b) + grid%shift(o) + lanes - 1) == 1_i1)) &
+              & call claim(family%block(b) + grid%shift(o))
+          end do
+        end associate
+        if (allocated(error)) return
+      end do
     end do
 
   contains
@@ -103,7 +120,104 @@ contains
         & call expect_true(error, .false., 'two slabs of one colour add to one slot')
       owner(first:first + lanes - 1) = s
     end subroutine claim
-  end subroutine test_apart
+  end subroutine keep_apart
+
+  !> Ranks that divide a box: early blocks belong to the rank and compute no bond to a copy, the
+  !> late ones are the others, and where forces must not depend on the ranks some more. Slabs of one
+  !> colour are apart, early or late.
+  subroutine test_late(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type), target :: scene
+    type(survey_type), target :: survey
+    type(work_of_windows) :: work
+    type(division_type) :: division
+    type(body_type) :: body
+    type(lattice_family_type) :: family
+    type(fault_type), allocatable :: fault
+    type(volume_rule_type) :: rule
+    integer, allocatable :: owner(:)
+    integer :: early, late, shape, r, colour, fixed
+    integer, parameter :: ranks = 3
+
+    early = 0
+    late = 0
+    do shape = 1, size(shapes, 2)
+      call box_scene(shapes(:, shape), spacing, 0.3_wp, scene)
+      call survey_points(scene, survey, fault)
+      if (allocated(fault)) call test_failed(error, fault%message)
+      if (allocated(error)) return
+      rule%delta = survey%none%delta
+      rule%kind = volume_rule_number('linear')
+      do fixed = 0, 1
+        call begin_work(scene, survey, merge(lanes, 1, fixed == 1), work)
+        call divide_space(work, ranks, division)
+        do r = 0, ranks - 1
+          call make_part(scene, survey, division, r, reach(rule, spacing, 3), body, owner)
+          if (fixed == 1) body%grids(1)%lowest = survey%lowest(:, 1)
+          call new_lattice_family(body, rule, .false., .false., family, fault)
+          if (allocated(fault)) call test_failed(error, fault%message)
+          if (allocated(error)) return
+          do colour = 1, 4
+            call keep_apart(family, colour, error)
+          end do
+          call judge(body, family, fixed == 1, early, late, error)
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+    call expect_true(error, early > 100 .and. late > 100, 'all blocks come early, or late')
+  end subroutine test_late
+
+  !> Count the early and the late blocks of a rank, and see that they are what they should be.
+  subroutine judge(body, family, fixed, early, late, error)
+    type(body_type), intent(in) :: body
+    type(lattice_family_type), intent(in) :: family
+    logical, intent(in) :: fixed
+    integer, intent(inout) :: early, late
+    type(error_type), allocatable, intent(inout) :: error
+    type(bonds_type) :: bonds
+    logical :: needs
+    integer :: b, k, last
+
+    call allocate_bonds(family, bonds)
+    associate (slabs => family%slabs)
+      last = slabs%first(slabs%colour(3)) - 1
+      call expect_true(error, slabs%first(slabs%colour(5)) - 1 == size(family%block), 'all blocks')
+      do b = 1, size(family%block)
+        needs = .false.
+        do k = int(family%block(b)), int(family%block(b)) + lanes - 1
+          if (body%point(k) == 0) cycle
+          call family%bonds_of(k, bonds)
+          needs = needs .or. .not. owned(body, k) .or. any(bonds%j(:bonds%n) > k .and. .not. &
+            & owned(body, int(bonds%j(:bonds%n))))
+        end do
+        if (b <= last) then
+          early = early + 1
+          call expect_true(error, .not. needs, 'an early block needs a copy')
+        else
+          late = late + 1
+          ! dead lanes count as others do
+          if (.not. fixed) call expect_true(error, needs .or. any(body%point(family%block(b): &
+            & family%block(b) + lanes - 1) == 0) .or. near_dead(b), 'a late block needs no copy')
+        end if
+      end do
+    end associate
+
+  contains
+
+    !> Whether a forward offset of some lane leads to a dead slot.
+    logical function near_dead(b)
+      integer, intent(in) :: b
+      integer :: o
+      near_dead = .false.
+      associate (grid => family%grids(1), first => family%block(b))
+        do o = 1, grid%n
+          if (grid%shift(o) > 0) near_dead = near_dead .or. any(body%point(first + grid%shift(o): &
+            & first + grid%shift(o) + lanes - 1) == 0)
+        end do
+      end associate
+    end function near_dead
+  end subroutine judge
 
   !> Slabs hold all blocks in ascending order within each slab, and every live slot has its block.
   subroutine test_whole(error)
@@ -119,7 +233,7 @@ contains
       type is (lattice_family_type)
         associate (slabs => family%slabs)
           covered = [(0, s=1, family%n_slots)]
-          call expect_true(error, slabs%colour(3) == size(slabs%first), 'slabs without colour')
+          call expect_true(error, slabs%colour(5) == size(slabs%first), 'slabs without colour')
           call expect_true(error, slabs%first(1) == 1 .and. slabs%first(size(slabs%first)) &
             & == size(family%block) + 1, 'blocks outside all slabs')
           do s = 1, size(slabs%first) - 1

@@ -6,7 +6,7 @@ module test_ranks
   use omp_lib, only: omp_get_num_threads, omp_get_thread_num
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_error, only: fault_type => error_type
-  use pd_base_order, only: ascending_order, number_points, order_type, ranks_type
+  use pd_base_order, only: ascending_order, exchange, number_points, order_type, ranks_type
   use pd_base_reduce, only: add_point, bring_noise, first_largest, first_where, inner, &
     & largest_over, least_over, new_running, noise, noise_after, running_type, sum_listed, &
     & sum_over, total_of_running
@@ -30,13 +30,14 @@ module test_ranks
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   implicit none (type, external)
   private
-  public :: collect_ranks
+  public :: collect_ranks, fake_type, hub_type
 
   real(wp), parameter :: spacing = 1.0e-2_wp
 
   type :: values_type
     real(wp), allocatable :: values(:)
     real(wp), allocatable :: field(:, :)
+    real(wp), allocatable :: side_field(:, :)
   end type values_type
 
   !> What all ranks see.
@@ -50,10 +51,12 @@ module test_ranks
     integer, allocatable :: slot(:)     !! of the halo's points here
     integer, allocatable :: owner(:)    !! which rank owns each
     integer, allocatable :: there(:)    !! its slot there
+    logical :: on_the_way(2) = .false.
   contains
     procedure :: add_all
     procedure :: take_largest
-    procedure :: share
+    procedure :: start_sharing
+    procedure :: finish_sharing
     procedure :: collect
     procedure :: number_before
   end type fake_type
@@ -113,18 +116,41 @@ contains
     !$omp barrier
   end subroutine take_largest
 
-  subroutine share(self, values)
+  subroutine start_sharing(self, values, which)
     class(fake_type), intent(inout) :: self
-    real(wp), intent(inout) :: values(:, :)
+    real(wp), intent(in), contiguous :: values(:, :)
+    integer, intent(in) :: which
+
+    if (self%on_the_way(which)) error stop 'messages that nobody waits for'
+    self%on_the_way(which) = .true.
+    if (which == exchange) then
+      self%hub%of_rank(self%rank)%field = values
+    else
+      self%hub%of_rank(self%rank)%side_field = values
+    end if
+  end subroutine start_sharing
+
+  !> Copies are taken now, and not before, so that what has used them by mistake differs.
+  subroutine finish_sharing(self, values, which)
+    class(fake_type), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: values(:, :)
+    integer, intent(in) :: which
     integer :: i
 
-    self%hub%of_rank(self%rank)%field = values
+    if (.not. self%on_the_way(which)) error stop 'messages that nobody has sent'
+    self%on_the_way(which) = .false.
     !$omp barrier
     do i = 1, size(self%slot)
-      values(self%slot(i), :) = self%hub%of_rank(self%owner(i))%field(self%there(i), :)
+      associate (there => self%hub%of_rank(self%owner(i)))
+        if (which == exchange) then
+          values(self%slot(i), :) = there%field(self%there(i), :)
+        else
+          values(self%slot(i), :) = there%side_field(self%there(i), :)
+        end if
+      end associate
     end do
     !$omp barrier
-  end subroutine share
+  end subroutine finish_sharing
 
   subroutine collect(self, values, all_values)
     class(fake_type), intent(inout) :: self
@@ -419,8 +445,9 @@ contains
     scene%boundaries(1)%velocity(2) = -1.0_wp
     scene%boundaries(2)%velocity(2) = 2.0_wp
     scene%time%steps = 60
-    call compare(scene, 2, 'velocity_verlet', error)
+    call compare(scene, 2, 'velocity_verlet', error, overlaps=.true.)
     scene%header%precision = 'double'
+    call compare(scene, 2, 'forward_backward', error, overlaps=.true.)
     call compare(scene, 4, 'forward_backward', error)
     scene%time%integrator = 'adams_bashforth'
     call compare(scene, 3, 'adams_bashforth', error)
@@ -509,12 +536,13 @@ contains
   end subroutine test_bar
 
   !> Run a scene on one rank, and on some.
-  subroutine compare(scene, ranks, method, error, breaks)
+  subroutine compare(scene, ranks, method, error, breaks, overlaps)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: ranks
     character(*), intent(in) :: method
     type(error_type), allocatable, intent(inout) :: error
-    logical, intent(in), optional :: breaks
+    logical, intent(in), optional :: breaks    !! bonds must break
+    logical, intent(in), optional :: overlaps  !! blocks must be computed while copies arrive
     type(set_up_type) :: set_up
     type(part_type) :: one
     type(part_type), target :: parts(ranks)
@@ -572,6 +600,7 @@ contains
       & 'nothing happened')
     if (present(breaks)) call expect_true(error, one%system%broken > 20_i8, 'the crack stands')
     do r = 1, ranks
+      if (present(overlaps)) call expect_overlap(parts(r)%system, error)
       if (allocated(parts(r)%fault)) then
         call test_failed(error, parts(r)%fault%message)
         return
@@ -589,6 +618,21 @@ contains
       call expect_close(error, parts(r)%diary%strain, one%diary%strain, 0.0_wp, 'strain energy')
     end do
   end subroutine compare
+
+  !> Some blocks need no copies, and others do.
+  subroutine expect_overlap(system, error)
+    type(system_type), intent(in) :: system
+    type(error_type), allocatable, intent(inout) :: error
+
+    select type (family => system%family)
+    type is (lattice_family_type)
+      associate (colour => family%slabs%colour)
+        call expect_true(error, colour(1) < colour(3) .and. colour(3) < colour(5), 'no overlap')
+      end associate
+    class default
+      call test_failed(error, 'the part has no lattice family')
+    end select
+  end subroutine expect_overlap
 
   subroutine run(system, relaxation, method, step, steps, diary, fault)
     type(system_type), intent(inout) :: system

@@ -22,6 +22,7 @@ PARALLEL = os.environ.get("PERIFORT_MPI", "")
 RATIO = 3.015
 REACH = 3                # cells that a halo is thick, at this ratio
 STEPS = 40
+UNITS = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 CORES_OF_A_NODE = 64     # that share the connection of a node, in the extrapolation
 # Latency of a message [s] and bandwidth of a node [bytes/s]
 NETWORKS = [
@@ -69,8 +70,7 @@ def run(path, ranks, threads):
         sys.exit(f"error: {path} on {ranks} ranks ended with status {done.returncode}:\n{done.stderr}")
     speed = re.search(r"speed .* ([\d.e+-]+) steps/s", done.stdout)
     sent = re.search(r"messages +([\d.e+-]+) (\w?)B in ([\d.e+-]+) messages a step", done.stdout)
-    unit = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
-    return (1 / float(speed.group(1)), float(sent.group(1)) * unit[sent.group(2)] if sent else 0.0,
+    return (1 / float(speed.group(1)), float(sent.group(1)) * UNITS[sent.group(2)] if sent else 0.0,
             float(sent.group(3)) if sent else 0.0)
 
 

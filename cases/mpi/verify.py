@@ -62,6 +62,22 @@ REGROUPED = [
     ("failure", (), True),
 ]
 REGROUPED_SHORT = ("crack", "failure")
+# A bar, whose halos are small, and a short one for what the program takes without points.
+BAR = """&scene dimension = 3 /
+&material youngs_modulus = 2e11 density = 8e3 poissons_ratio = 0.25 model = 'bond_based' /
+&body lower = 0, 0, 0 upper = 1, 1, {length} points = 30, 30, {points} /
+&horizon ratio = 3.015 family = 'lattice' surface_correction = 'none' /
+&time steps = 2 /
+&output every = 2 history_every = 2 fields = 'displacement' /
+"""
+MEMORY_RANKS = 12
+# Bodies that overlap on more than one rank.
+OVERLAP = """&scene dimension = 2 /
+&material youngs_modulus = 2e11 density = 8e3 poissons_ratio = 0.3333 model = 'bond_based' /
+&body lower = 0, 0 upper = 1, 1 points = 40, 40 /
+&body lower = 0.97, 0.2 upper = 1.57, 0.8 points = 21, 21 /
+&time steps = 2 /
+"""
 MOST_PIECES = 5
 PIECE = 0.12  # of the time that the run in one piece takes
 
@@ -81,12 +97,12 @@ class Mpi(Case):
         path.write_text(text, encoding="utf-8")
         return path
 
-    def start(self, path, ranks, *options, folder=None, anew=True):
+    def start(self, path, ranks, *options, folder=None, anew=True, quiet=True):
         """Start a run, on one rank by the program without MPI; its folder and process."""
         folder = folder or path.with_suffix("").parent / f"{path.stem}.{ranks}"
         if anew:
             shutil.rmtree(folder, ignore_errors=True)
-        words = ["run", str(path), "--output", str(folder), "--quiet", *options]
+        words = ["run", str(path), "--output", str(folder), *(["--quiet"] if quiet else []), *options]
         environment = dict(os.environ, OMP_NUM_THREADS="1", OMP_WAIT_POLICY="passive",
                            OMPI_MCA_rmaps_base_oversubscribe="1",
                            OMPI_MCA_hwloc_base_binding_policy="none",
@@ -192,6 +208,13 @@ def check_ends(case):
     errors = process.communicate()[1]
     case.equal("too few points: status", process.returncode, 1)
     case.equal("too few points: errors", len(re.findall(r"^error:", errors, re.M)), 1)
+    # ranks look for overlaps among their own points: one of them reports
+    overlap = crack.with_name("overlap.nml")
+    overlap.write_text(OVERLAP, encoding="utf-8")
+    _, process = case.start(overlap, 3)
+    errors = process.communicate()[1]
+    case.equal("overlap: status", process.returncode, 1)
+    case.equal("overlap: errors", len(re.findall(r"^error: body 1 and body 2 overlap", errors, re.M)), 1)
     # unstable: the history up to there is kept
     folder, process = case.start(crack, 3, "--set", "time%step=1.0e-6")
     errors = process.communicate()[1]
@@ -351,6 +374,29 @@ def check_messages(case, ranks):
         case.equal(f"{n} ranks: there are messages", messages > 0, True)
 
 
+def check_memory(case):
+    """The most memory of all ranks together is little more than that of one rank alone. Were all
+    points made on each rank, it would be 3.4 times as much.
+    """
+    used = {}
+    for points in (30, 900):
+        path = case.out / f"bar_{points}.nml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(BAR.format(points=points, length=points / 30), encoding="utf-8")
+        _, process = case.start(path, 1)
+        _, status, usage = os.wait4(process.pid, 0)
+        case.equal(f"bar of {points} rows: status", status, 0)
+        used[points, 1] = usage.ru_maxrss * 1024.0
+        _, process = case.start(path, MEMORY_RANKS, quiet=False)
+        text = process.communicate()[0]
+        found = re.search(r"peak memory .* of all ([\d.]+) ([kMG]?)B", text)
+        used[points, MEMORY_RANKS] = float(found.group(1)) * scaling.UNITS[found.group(2)] \
+            if found else np.inf
+    one, all_ranks = (used[900, n] - used[30, n] for n in (1, MEMORY_RANKS))
+    case.below(f"{MEMORY_RANKS} ranks: memory of the points, of that on one rank", all_ranks / one,
+               1.6)
+
+
 def wait_for(path, seconds=60):
     """Until a file is there, and a little longer."""
     limit = time.time() + seconds
@@ -398,6 +444,7 @@ def main():
     ranks = [int(n) for n in (case.options.ranks or ("3" if case.options.short else "2,3,4,7")).split(",")]
     compare_scenes(case, ranks)
     check_messages(case, ranks)
+    check_memory(case)
     check_regrouped(case)
     check_sets(case)
     check_ends(case)

@@ -10,10 +10,14 @@ module pd_base_order
   private
   public :: order_type, ranks_type, block_points, number_of, owned_point, owns, place_in
   public :: number_points, slots_of_block, take_block, put_block, ascending_order
+  public :: exchange, side_exchange
 
   integer, parameter :: block_points = 256  !! points of a block
   !> Runs of points in consecutive slots are used if they have so many points in the mean.
   integer, parameter :: worth_runs = 8
+
+  !> Values of two kinds can be on their way at once.
+  integer, parameter :: exchange = 1, side_exchange = 2
 
   !> What ranks say to each other. Every rank makes the same calls in the same order.
   type, abstract :: ranks_type
@@ -25,7 +29,9 @@ module pd_base_order
   contains
     procedure(all_values), deferred :: add_all       !! each value summed over the ranks
     procedure(all_values), deferred :: take_largest  !! the largest of each value
-    procedure(halo_values), deferred :: share         !! values of other ranks' points
+    procedure :: share                               !! values of other ranks' points
+    procedure(values_to_send), deferred :: start_sharing     !! send them; what is computed
+    procedure(values_to_take), deferred :: finish_sharing    !! between needs none of them
     procedure(all_points), deferred :: collect        !! values of all ranks, on the first one
     procedure(count_before), deferred :: number_before  !! sum over the ranks before this one
   end type ranks_type
@@ -39,13 +45,25 @@ module pd_base_order
       real(wp), intent(inout) :: values(:)  !! as many on every rank
     end subroutine all_values
 
-    !> Copy the values of points that others own from there.
-    subroutine halo_values(self, values)
+    !> Send the values of owned points to those that have copies of them.
+    subroutine values_to_send(self, values, which)
       import :: ranks_type, wp
       implicit none (type, external)
       class(ranks_type), intent(inout) :: self
-      real(wp), intent(inout) :: values(:, :)  !! (n_slots, components)
-    end subroutine halo_values
+      real(wp), intent(in), contiguous :: values(:, :)  !! (n_slots, components); may change when
+                                                        !! the call has returned
+      integer, intent(in) :: which  !! `exchange` or `side_exchange`, which has been finished
+    end subroutine values_to_send
+
+    !> Wait for the values of copies that their owners have sent.
+    subroutine values_to_take(self, values, which)
+      import :: ranks_type, wp
+      implicit none (type, external)
+      class(ranks_type), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: values(:, :)  !! (n_slots, components) those of copies
+                                                           !! are set
+      integer, intent(in) :: which  !! that has been started
+    end subroutine values_to_take
 
     !> The sum of what the ranks before this one have; 0 on the first.
     integer(i8) function count_before(self, number) result(before)
@@ -89,6 +107,15 @@ module pd_base_order
   end interface ascending_order
 
 contains
+
+  !> Copy the values of points that others own from there.
+  subroutine share(self, values)
+    class(ranks_type), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: values(:, :)  !! (n_slots, components)
+
+    call self%start_sharing(values, exchange)
+    call self%finish_sharing(values, exchange)
+  end subroutine share
 
   !> Note where the owned points are, and their numbers among those of all ranks.
   pure subroutine number_points(slot, order, number, n_global)

@@ -3,7 +3,7 @@ module pd_base_system
   use pd_base_kinds, only: wp, i8
   implicit none (type, external)
   private
-  public :: processor_name, available_memory, processor_quota
+  public :: processor_name, available_memory, peak_memory, processor_quota
 
 contains
 
@@ -27,6 +27,11 @@ contains
     used = number_of('/proc/self/status', 'VmSize')
     if (limit >= 0_i8 .and. used >= 0_i8) bytes = min(bytes, max(0_i8, limit - 1024_i8*used))
   end function available_memory
+
+  !> The most memory that this process has had in use [bytes], as reported by Linux; 0 elsewhere.
+  integer(i8) function peak_memory() result(bytes)
+    bytes = 1024_i8*max(0_i8, number_of('/proc/self/status', 'VmHWM'))
+  end function peak_memory
 
   !> Processor cores whose time this program may use, rounded up, as the control groups of Linux
   !> (versions 2 and 1) limit it: containers and queues set such limits, which the number of cores

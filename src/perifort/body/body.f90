@@ -10,14 +10,14 @@
 module pd_body_body
   use pd_base_text, only: to_text
   use pd_base_kinds, only: wp, i2, i4, i8
-  use pd_base_order, only: number_points, order_type, owns
+  use pd_base_order, only: exchange, number_points, order_type, owns
   use pd_body_mesh_part, only: part_type
   use pd_body_surface_surface, only: surface_type
   implicit none (type, external)
   private
   public :: body_type, not_finite_text, grid_type, lattice_type, skin_type, allocate_points, &
     & append_points, keep_points, order_points, arrange, gather, scatter, own_points, owned, &
-    & number_at, share_halo
+    & number_at, share_halo, start_halo, finish_halo
 
   !> A uniform grid: points at origin + axes (i - 1/2) spacing, i integer.
   type :: grid_type
@@ -62,6 +62,8 @@ module pd_body_body
                                             !! allocated: its number here
     type(grid_type), allocatable :: grids(:)
     real(wp) :: delta = 0.0_wp              !! the horizon, the largest one of all points [m]
+    real(wp) :: least_spacing = 0.0_wp      !! of the points of all processes; 0 where these have
+    real(wp) :: largest_spacing = 0.0_wp    !! not been counted [m]
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
     type(skin_type), allocatable :: skins(:)  !! bodies that fill surfaces
     type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)
@@ -85,6 +87,16 @@ module pd_body_body
   interface share_halo
     module procedure :: share_scalars, share_vectors
   end interface share_halo
+
+  !> The same in two calls. What is computed between them must not need values of copies. The first
+  !> sends the values of owned points, which then may change; the second waits for those of copies.
+  interface start_halo
+    module procedure :: start_scalars, start_vectors
+  end interface start_halo
+
+  interface finish_halo
+    module procedure :: finish_scalars, finish_vectors
+  end interface finish_halo
 
 contains
 
@@ -345,21 +357,58 @@ contains
 
   subroutine share_scalars(body, values)
     type(body_type), intent(in) :: body
-    real(wp), intent(inout) :: values(:)      !! (n_slots)
-    real(wp), allocatable :: vectors(:, :)
-
-    if (.not. associated(body%order%ranks)) return
-    allocate (vectors(size(values), 1))
-    vectors(:, 1) = values
-    call body%order%ranks%share(vectors)
-    values = vectors(:, 1)
+    real(wp), intent(inout), contiguous :: values(:)      !! (n_slots)
+    call start_scalars(body, values)
+    call finish_scalars(body, values)
   end subroutine share_scalars
 
   subroutine share_vectors(body, values)
     type(body_type), intent(in) :: body
-    real(wp), intent(inout) :: values(:, :)   !! (n_slots, components)
+    real(wp), intent(inout), contiguous :: values(:, :)   !! (n_slots, components)
     if (associated(body%order%ranks)) call body%order%ranks%share(values)
   end subroutine share_vectors
+
+  subroutine start_scalars(body, values)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in), contiguous, target :: values(:)  !! (n_slots)
+    real(wp), pointer, contiguous :: vectors(:, :)
+
+    if (.not. associated(body%order%ranks)) return
+    vectors(1:size(values), 1:1) => values
+    call body%order%ranks%start_sharing(vectors, exchange)
+  end subroutine start_scalars
+
+  subroutine finish_scalars(body, values)
+    type(body_type), intent(in) :: body
+    real(wp), intent(inout), contiguous, target :: values(:)  !! (n_slots)
+    real(wp), pointer, contiguous :: vectors(:, :)
+
+    if (.not. associated(body%order%ranks)) return
+    vectors(1:size(values), 1:1) => values
+    call body%order%ranks%finish_sharing(vectors, exchange)
+  end subroutine finish_scalars
+
+  subroutine start_vectors(body, values, which)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in), contiguous :: values(:, :)     !! (n_slots, components)
+    integer, intent(in), optional :: which               !! `exchange` if absent
+    integer :: number
+
+    number = exchange
+    if (present(which)) number = which
+    if (associated(body%order%ranks)) call body%order%ranks%start_sharing(values, number)
+  end subroutine start_vectors
+
+  subroutine finish_vectors(body, values, which)
+    type(body_type), intent(in) :: body
+    real(wp), intent(inout), contiguous :: values(:, :)  !! (n_slots, components)
+    integer, intent(in), optional :: which               !! `exchange` if absent
+    integer :: number
+
+    number = exchange
+    if (present(which)) number = which
+    if (associated(body%order%ranks)) call body%order%ranks%finish_sharing(values, number)
+  end subroutine finish_vectors
 
   !> Where and when a value is not finite.
   function not_finite_text(body, slot, t) result(text)

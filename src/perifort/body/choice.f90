@@ -55,14 +55,17 @@ contains
     logical, allocatable, intent(out) :: chosen(:)
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: values(:)
+    real(wp) :: spacing
     integer(i4), allocatable :: points(:)
     integer :: k
 
+    spacing = body%least_spacing
+    if (.not. spacing > 0.0_wp) spacing = minval(body%spacing)
     if (is_of_file(group)) then
-      call inside_file(scene, group, body%x, minval(body%spacing), name, number, chosen, error)
+      call inside_file(scene, group, body%x, spacing, name, number, chosen, error)
       if (allocated(error)) return
     else if (group%shape /= '') then
-      chosen = inside(group, body%x, touch*minval(body%spacing))
+      chosen = inside(group, body%x, touch*spacing)
     else
       allocate (chosen(body%n_points), source=.true.)
     end if

@@ -202,10 +202,10 @@ contains
     if (.not. allocated(self%part)) allocate (self%part(size(self%x, 1)), source=1)
     do i = 1, size(self%part)
       p = self%part(i)
-      if (division%axis(p) > 0) then
+      do while (division%axis(p) > 0)
         p = division%half(p) + merge(0, 1, self%x(i, division%axis(p)) < division%at(p))
-        self%part(i) = p
-      end if
+      end do
+      self%part(i) = p
       if (p < first) cycle  ! a rank's for some levels already
       a = axis(p - first + 1)
       layers = layers_of(self, division, p, a)

@@ -17,7 +17,7 @@ module pd_body_generate
     & append_points, keep_points
   use pd_body_meshes, only: keep_part, material_number, mesh_body
   use pd_body_mesh_part, only: part_type
-  use pd_body_lattices, only: lattice_points, lattice_of, place_in
+  use pd_body_lattices, only: box_of_cells, lattice_grid, lattice_of, place_in
   use pd_body_layers, only: add_layers, layer_count_type
   use pd_body_overlap, only: check_lattices
   use pd_body_refine, only: finer, refine_lattice
@@ -26,7 +26,8 @@ module pd_body_generate
   use pd_body_surfaces, only: keep_skin, surface_body
   implicit none (type, external)
   private
-  public :: generate_body, horizon_of
+  public :: generate_body, horizon_of, body_cells, check_family_size, number_of_grid
+  public :: number_of_cuts, find_taken, nothing_left
 
   real(wp), parameter :: same_grid = 1.0e-6_wp  !! how far two grids may differ [spacings]
   real(wp), parameter :: same_axes = 1.0e-9_wp  !! how far those of one grid may differ
@@ -78,9 +79,8 @@ contains
         call keep_skin(body, skin)
         if (.not. has_cut_cells(scene%bodies(i))) one%grid = number_of_grid(body, lattices(i)%grid)
       else
-        call lattice_points(body%dim, scene%bodies(i), depth, one)
-        if (scene%bodies(i)%shape /= '') call keep_shape(scene%bodies(i), depth, one)
         lattices(i) = lattice_of(scene%bodies(i), body%dim)
+        call body_cells(body%dim, scene%bodies(i), [1, 1, 1], lattices(i)%cells, depth, one)
         one%grid = number_of_grid(body, lattices(i)%grid)
         if (has_refinement(scene)) call refine(scene, lattices(i), depth, used, body, one, error)
         if (allocated(error)) return
@@ -114,6 +114,8 @@ contains
     if (has_own_horizons(scene)) spacing = minval(body%spacing)
     call check_family_size(scene, body, horizon_of(scene, spacing), minval(body%spacing), error)
     if (allocated(error)) return
+    body%least_spacing = minval(body%spacing)
+    body%largest_spacing = maxval(body%spacing)
     call add_layers(scene, delta, depth, body, counted, error)
     if (allocated(error)) return
     if (present(counts)) call move_alloc(counted, counts)
@@ -143,19 +145,24 @@ contains
     end do
   end subroutine refine
 
-  !> Leave out the points of a lattice that do not lie in its shape, which is turned with it.
-  pure subroutine keep_shape(group, depth, body)
-    type(body_group), intent(in) :: group
-    real(wp), intent(in) :: depth
-    type(body_type), intent(inout) :: body
+  !> The points of a lattice body in its cells first..last, x fastest: those that lie in its shape,
+  !> which is turned with it.
+  pure subroutine body_cells(dim, group, first, last, depth, body)
+    integer, intent(in) :: dim                !! of the scene: 1, 2 or 3
+    type(body_group), intent(in) :: group     !! with lower, upper and points
+    integer, intent(in) :: first(3), last(3)  !! cells of the body's lattice, from 1
+    real(wp), intent(in) :: depth             !! what makes dx^dim a volume: thickness, area or 1
+    type(body_type), intent(out) :: body      !! points with positions, volumes and spacings
     type(body_group) :: straight
     type(body_type) :: points
 
+    call box_of_cells(dim, lattice_grid(group, dim), first, last, depth, body)
+    if (group%shape == '') return
     straight = group
     straight%axis_1 = unset
-    call lattice_points(body%dim, straight, depth, points)
+    call box_of_cells(dim, lattice_grid(straight, dim), first, last, depth, points)
     call keep_points(body, inside_body(group, points%x, touch*minval(points%spacing)))
-  end subroutine keep_shape
+  end subroutine body_cells
 
   !> Leave out the points that no `&keep` keeps, then those that a `&remove` takes. An error if that
   !> takes points of a mesh, or all.
@@ -163,45 +170,83 @@ contains
     type(scene_type), intent(in) :: scene
     type(body_type), intent(inout) :: body
     type(error_type), allocatable, intent(out) :: error
-    logical, allocatable :: taken(:), chosen(:)
-    integer :: i, n
+    logical, allocatable :: taken(:)
+    character(:), allocatable :: group
+    integer :: s
 
-    n = size(scene%kept)
-    if (n > 0) then
-      allocate (taken(body%n_points), source=.true.)
-      do i = 1, n
-        call choose_points(scene, body, scene%kept(i), 'keep', i, chosen, error)
-        if (allocated(error)) return
-        taken = taken .and. .not. chosen
-      end do
-      call take('keep', 1)
+    do s = 1, number_of_cuts(scene)
+      call find_taken(scene, body, s, taken, error)
       if (allocated(error)) return
-    end if
-    do i = 1, size(scene%removed)
-      call choose_points(scene, body, scene%removed(i), 'remove', i, taken, error)
-      if (.not. allocated(error)) call take('remove', i)
-      if (allocated(error)) return
-    end do
-
-  contains
-
-    !> Leave out the points that are taken.
-    subroutine take(group, number)
-      character(*), intent(in) :: group
-      integer, intent(in) :: number
-
       if (any(taken .and. of_mesh(scene, body))) then
-        call scene_fault(error, scene, group, number, 'shape', '&'//group//' takes points of a '// &
-          & 'mesh', 'cut the shape out of the geometry before it is meshed')
+        group = name_of_cut(scene, s)
+        call scene_fault(error, scene, group, group_of_cut(scene, s), 'shape', '&'//group// &
+          & ' takes points of a mesh', 'cut the shape out of the geometry before it is meshed')
         return
       end if
       call keep_points(body, .not. taken)
-      if (body%n_points == 0) call scene_fault(error, scene, group, number, 'shape', &
-        & 'the scene has no points: every point of its bodies was '// &
-        & trim(merge('left out', 'removed ', group == 'keep')), '')
-    end subroutine take
-
+      if (body%n_points == 0) call nothing_left(scene, s, error)
+      if (allocated(error)) return
+    end do
   end subroutine cut_shapes
+
+  !> How often the points of a scene are cut: by all `&keep` at once, then by each `&remove`.
+  pure integer function number_of_cuts(scene) result(cuts)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    cuts = min(1, size(scene%kept)) + size(scene%removed)
+  end function number_of_cuts
+
+  !> Which `&remove` makes a cut; 1 for that of all `&keep`.
+  pure integer function group_of_cut(scene, cut) result(number)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: cut
+    number = cut
+    if (size(scene%kept) > 0 .and. cut > 1) number = cut - 1
+  end function group_of_cut
+
+  !> Of which kind the group is.
+  pure function name_of_cut(scene, cut) result(name)
+    type(scene_type), intent(in) :: scene
+    integer, intent(in) :: cut
+    character(:), allocatable :: name
+    name = 'remove'
+    if (size(scene%kept) > 0 .and. cut == 1) name = 'keep'
+  end function name_of_cut
+
+  !> An error where a cut leaves no point.
+  subroutine nothing_left(scene, cut, error)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    integer, intent(in) :: cut             !! 1 to `number_of_cuts`
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: group
+
+    group = name_of_cut(scene, cut)
+    call scene_fault(error, scene, group, group_of_cut(scene, cut), 'shape', &
+      & 'the scene has no points: every point of its bodies was '// &
+      & trim(merge('left out', 'removed ', group == 'keep')), '')
+  end subroutine nothing_left
+
+  !> The points that a cut takes. An error if an expression has no finite value at one.
+  subroutine find_taken(scene, body, cut, taken, error)
+    type(scene_type), intent(in) :: scene          !! a checked scene
+    type(body_type), intent(in) :: body            !! what earlier cuts have left
+    integer, intent(in) :: cut                     !! 1 to `number_of_cuts`
+    logical, allocatable, intent(out) :: taken(:)  !! (n_points)
+    type(error_type), allocatable, intent(out) :: error
+    logical, allocatable :: chosen(:)
+    integer :: i
+
+    i = group_of_cut(scene, cut)
+    if (name_of_cut(scene, cut) == 'remove') then
+      call choose_points(scene, body, scene%removed(i), 'remove', i, taken, error)
+      return
+    end if
+    allocate (taken(body%n_points), source=.true.)
+    do i = 1, size(scene%kept)
+      call choose_points(scene, body, scene%kept(i), 'keep', i, chosen, error)
+      if (allocated(error)) return
+      taken = taken .and. .not. chosen
+    end do
+  end subroutine find_taken
 
   !> An error if the horizon holds more points than any computation is meant to have in a family;
   !> counts in families and offsets below then fit their integers.

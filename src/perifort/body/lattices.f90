@@ -6,26 +6,9 @@ module pd_body_lattices
   use pd_body_body, only: body_type, grid_type, lattice_type, allocate_points
   implicit none (type, external)
   private
-  public :: lattice_points, lattice_of, box_of_cells, lattice_grid, cell_of, axes_of, place_in, &
-    & coordinate
+  public :: lattice_of, box_of_cells, lattice_grid, cell_of, axes_of, place_in, coordinate
 
 contains
-
-  !> Points of a lattice, x fastest.
-  pure subroutine lattice_points(dim, group, depth, body)
-    integer, intent(in) :: dim             !! of the scene: 1, 2 or 3
-    type(body_group), intent(in) :: group  !! with lower, upper and points
-    real(wp), intent(in) :: depth          !! what makes dx^dim a volume: thickness, area or 1
-    type(body_type), intent(out) :: body   !! points with positions, volumes and spacings, in point
-                                           !! order
-    type(grid_type) :: grid
-    integer :: count(3)
-
-    count = 1
-    count(:dim) = group%points(:dim)
-    grid = lattice_grid(group, dim)
-    call box_of_cells(dim, grid, [1, 1, 1], count, depth, body)
-  end subroutine lattice_points
 
   !> The cells of a lattice body.
   pure type(lattice_type) function lattice_of(group, dim) result(lattice)

@@ -7,16 +7,18 @@
 module pd_body_layers
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_error, only: error_type
-  use pd_base_lookup, only: lookup_type, mix
   use pd_base_text, only: to_text, with_unit
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: adds_layer, has_own_horizons, has_refinement, scene_type
-  use pd_body_body, only: body_type, grid_type, allocate_points, append_points, keep_points
+  use pd_body_body, only: body_type, grid_type, lattice_type, allocate_points, append_points, &
+    & keep_points
   use pd_body_lattices, only: box_of_cells, cell_of, place_in
   use pd_body_refine, only: finer, level_of
   implicit none (type, external)
   private
   public :: add_layers, layer_rows, layer_count_type, layer_count_text
+  public :: layer_type, begin_layers, begin_side, see_points, choose_sides, box_of_layer, &
+    & layer_cells, check_layer
 
   real(wp), parameter :: same_place = 1.0e-6_wp  !! of faces [spacings]
   !> Overlap of columns of two bodies that touch up to the digits of their corners [spacings].
@@ -49,6 +51,16 @@ module pd_body_layers
     logical, allocatable :: has(:, :)  !! whether the column gets the layer
   end type side_type
 
+  !> A layer in the making: first its sides see the points of the bodies, all at once or some after
+  !> others, then its columns are chosen, then its cells are made.
+  type :: layer_type
+    type(layer_count_type) :: tally    !! with the boundary's number
+    integer :: axis = 0                !! across the side: 1, 2, 3
+    integer :: outward = 0             !! 1 at an upper side, -1 at a lower one
+    type(side_type), allocatable :: of_body(:, :)  !! (0:levels, bodies) while points are seen
+    type(side_type), allocatable :: sides(:)       !! those of which something is left
+  end type layer_type
+
   integer, parameter :: nothing = -huge(0)  !! height of a column of which nothing is left
 
 contains
@@ -70,135 +82,227 @@ contains
     type(layer_count_type), allocatable, intent(out) :: counts(:)
       !! (layers), what their columns came to
     type(error_type), allocatable, intent(out) :: error
-    type(lookup_type) :: claimed
-    integer(i2), allocatable :: owner(:)
-    type(body_type) :: layer
-    integer :: i, n_body
+    type(layer_type), allocatable :: layers(:)
+    type(body_type) :: layer, part
+    integer :: i, s, shared, n_body, first(3), last(3)
 
-    allocate (counts(count(adds_layer(scene%boundaries))), owner(0))
     n_body = body%n_points
-    counts%boundary = pack([(i, i=1, size(scene%boundaries))], adds_layer(scene%boundaries))
-    do i = 1, size(counts)
-      call make_layer(scene, delta, depth, body, n_body, claimed, owner, counts(i), layer, error)
+    call begin_layers(scene, layers)
+    do i = 1, size(layers)
+      call see_points(scene, body, n_body, layers(i))
+      call choose_sides(scene, delta, body%dim, layers(i))
+      call allocate_points(layer, body%dim, 0)
+      do s = 1, size(layers(i)%sides)
+        if (.not. any(layers(i)%sides(s)%has)) cycle
+        call box_of_layer(layers(i), s, first, last)
+        call layer_cells(scene, body%dim, body%grids, layers, i, s, first, last, depth, part, &
+          & shared)
+        layers(i)%tally%shared = layers(i)%tally%shared + shared
+        call append_points(layer, part)
+      end do
+      call check_layer(scene, layers(i), int(layer%n_points, i8), error)
       if (allocated(error)) return
       call append_points(body, layer)
     end do
+    counts = layers%tally
   end subroutine add_layers
 
-  !> The layer of one boundary.
-  subroutine make_layer(scene, delta, depth, body, n_body, claimed, owner, tally, layer, error)
-    type(scene_type), intent(in) :: scene
-    real(wp), intent(in) :: delta                 !! horizon [m]
-    real(wp), intent(in) :: depth                 !! what makes dx^dim a volume
-    type(body_type), intent(in) :: body           !! its first `n_body` points are no layer
-    integer, intent(in) :: n_body                 !! points of bodies
-    type(lookup_type), intent(inout) :: claimed   !! cells that layers have
-    integer(i2), allocatable, intent(inout) :: owner(:)  !! the boundary of each of these
-    type(layer_count_type), intent(inout) :: tally  !! with the boundary's number; is filled in
-    type(body_type), intent(out) :: layer         !! its points, on the grids of `body`
-    type(error_type), allocatable, intent(out) :: error
-    type(side_type), allocatable :: sides(:)
-    type(body_type) :: part
-    logical, allocatable :: chosen(:)
-    integer :: axis, outward, i, n, first(3), last(3)
+  !> The layers of a scene, of which no points have been seen yet.
+  subroutine begin_layers(scene, layers)
+    type(scene_type), intent(in) :: scene                    !! a checked scene
+    type(layer_type), allocatable, intent(out) :: layers(:)  !! in the order of the groups
+    integer :: i, n, levels
 
-    associate (boundary => scene%boundaries(tally%boundary))
-      axis = index('xyz', boundary%side(1:1))
-      outward = merge(-1, 1, boundary%side(3:5) == 'min')
-      call find_sides(scene, boundary%body, body, n_body, axis, outward, delta, sides)
-      call choose_columns(body%dim, axis, outward, sides, tally)
-      call allocate_points(layer, body%dim, 0)
-      do i = 1, size(sides)
-        if (.not. any(sides(i)%has)) cycle
-        call box_of_layer(sides(i), axis, outward, first, last)
-        call box_of_cells(body%dim, sides(i)%grid, first, last, depth, part)
-        chosen = cells_of_layer(sides(i), axis, outward, first, last)
-        n = count(chosen)
-        call claim_cells(scene, tally%boundary, body, sides(i), first, last, claimed, owner, chosen)
-        tally%shared = tally%shared + n - count(chosen)
-        if (.not. all(chosen)) call keep_points(part, chosen)
-        part%grid = sides(i)%number
-        part%body = int(sides(i)%body, i2)
-        part%material = sides(i)%material
-        part%layer = int(tally%boundary, i2)
-        call append_points(layer, part)
-      end do
-      if (layer%n_points > 0) return
-      call scene_fault(error, scene, 'boundary', tally%boundary, 'side', 'the layer at side '''// &
-        & trim(boundary%side)//''' joins no point', why_empty())
-    end associate
-
-  contains
-
-    !> The error message for a layer without points.
-    function why_empty() result(text)
-      character(:), allocatable :: text
-
-      if (size(sides) == 0) then
-        text = 'every point of the body was removed'
-      else if (all(sides%rows == 0)) then
-        text = 'the horizon of '//with_unit(sides(1)%delta, 'm')// &
-          & ' is shorter than the spacing of '//with_unit(sides(1)%grid%spacing, 'm')
-      else
-        text = 'all its cells belong to the layers of earlier &boundary groups'
-      end if
-    end function why_empty
-  end subroutine make_layer
-
-  !> The sides of the bodies that a boundary names, or of all lattice bodies, one for each level of
-  !> their cells: those of which something is left.
-  subroutine find_sides(scene, name, body, n_body, axis, outward, delta, sides)
-    type(scene_type), intent(in) :: scene
-    character(*), intent(in) :: name       !! of the body, '' for all
-    type(body_type), intent(in) :: body
-    integer, intent(in) :: n_body          !! its first points, which are no layer
-    integer, intent(in) :: axis            !! across the side: 1, 2, 3
-    integer, intent(in) :: outward         !! 1 at an upper side, -1 at a lower one
-    real(wp), intent(in) :: delta          !! horizon [m]
-    type(side_type), allocatable, intent(out) :: sides(:)
-      !! in the order of the bodies, the coarsest level first
-    type(side_type), allocatable :: all_sides(:, :)
-    integer :: b, c(2), k, n, cell(3), points(3), level, levels
-
-    c = across(axis)
+    allocate (layers(count(adds_layer(scene%boundaries))))
     levels = 0
     if (has_refinement(scene)) levels = maxval(scene%refines%levels)
-    allocate (all_sides(0:levels, size(scene%bodies)))
-    do k = 1, n_body
-      b = body%body(k)
-      if (body%grid(k) == 0) cycle
-      if (name /= '' .and. scene%bodies(b)%name /= name) cycle
-      level = level_of(body, k)
-      associate (side => all_sides(level, b))
-        if (side%number == 0_i2) then
-          side%number = body%grid(k)
-          side%material = body%material(k)
-          side%body = b
-          side%grid = finer(body%lattices(b)%grid, level)
-          side%parts = 2**level
+    n = 0
+    do i = 1, size(scene%boundaries)
+      if (.not. adds_layer(scene%boundaries(i))) cycle
+      n = n + 1
+      layers(n)%tally%boundary = i
+      layers(n)%axis = index('xyz', scene%boundaries(i)%side(1:1))
+      layers(n)%outward = merge(-1, 1, scene%boundaries(i)%side(3:5) == 'min')
+      allocate (layers(n)%of_body(0:levels, size(scene%bodies)))
+    end do
+  end subroutine begin_layers
+
+  !> An error, with its place, for a layer without a point.
+  subroutine check_layer(scene, layer, points, error)
+    type(scene_type), intent(in) :: scene   !! gives the boundary
+    type(layer_type), intent(in) :: layer   !! with its sides
+    integer(i8), intent(in) :: points       !! that it has
+    type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: why
+
+    if (points > 0_i8) return
+    if (size(layer%sides) == 0) then
+      why = 'every point of the body was removed'
+    else if (all(layer%sides%rows == 0)) then
+      why = 'the horizon of '//with_unit(layer%sides(1)%delta, 'm')// &
+        & ' is shorter than the spacing of '//with_unit(layer%sides(1)%grid%spacing, 'm')
+    else
+      why = 'all its cells belong to the layers of earlier &boundary groups'
+    end if
+    associate (number => layer%tally%boundary)
+      call scene_fault(error, scene, 'boundary', number, 'side', 'the layer at side '''// &
+        & trim(scene%boundaries(number)%side)//''' joins no point', why)
+    end associate
+  end subroutine check_layer
+
+  !> The points of a layer in the cells first..last of one of its sides, x fastest. Where the corner
+  !> between two sides is cut or round, both layers reach for the same cells: the earlier one has
+  !> them. Two layers at one side, or of different bodies, must not meet like that; there the cells
+  !> remain, and are found to overlap.
+  subroutine layer_cells(scene, dim, grids, layers, layer, side, first, last, depth, part, shared)
+    type(scene_type), intent(in) :: scene       !! gives the boundaries
+    integer, intent(in) :: dim                  !! of the scene
+    type(grid_type), intent(in) :: grids(:)     !! all grids of the bodies
+    type(layer_type), intent(in) :: layers(:)   !! this one and those before it have their sides
+    integer, intent(in) :: layer, side          !! which layer, and which of its sides
+    integer, intent(in) :: first(3), last(3)    !! cells of the side's grid
+    real(wp), intent(in) :: depth               !! what makes dx^dim a volume
+    type(body_type), intent(out) :: part        !! the points
+    integer, intent(out) :: shared              !! cells that an earlier layer has
+    logical, allocatable :: chosen(:)
+    integer :: i, j, k, n, l
+
+    associate (this => layers(layer)%sides(side), boundary => layers(layer)%tally%boundary)
+      call box_of_cells(dim, this%grid, first, last, depth, part)
+      chosen = cells_of_layer(layers(layer), side, first, last)
+      shared = count(chosen)
+      n = 0
+      do k = first(3), last(3)
+        do j = first(2), last(2)
+          do i = first(1), last(1)
+            n = n + 1
+            if (.not. chosen(n)) cycle
+            l = claimed_by(layers(:layer - 1), dim, grids(this%number), this, [i, j, k])
+            if (l == 0) cycle
+            associate (earlier => scene%boundaries(layers(l)%tally%boundary), &
+              & own => scene%boundaries(boundary))
+              chosen(n) = earlier%body /= own%body .or. earlier%side(1:1) == own%side(1:1)
+            end associate
+          end do
+        end do
+      end do
+      shared = shared - count(chosen)
+      if (.not. all(chosen)) call keep_points(part, chosen)
+      part%grid = this%number
+      part%body = int(this%body, i2)
+      part%material = this%material
+      part%layer = int(boundary, i2)
+    end associate
+  end subroutine layer_cells
+
+  !> The first of some layers that has a cell of a side's grid; 0 if none has it.
+  pure integer function claimed_by(layers, dim, grid, side, cell) result(l)
+    type(layer_type), intent(in) :: layers(:)  !! with their sides
+    integer, intent(in) :: dim                 !! of the scene
+    type(grid_type), intent(in) :: grid        !! that the side and others are on
+    type(side_type), intent(in) :: side        !! whose corner the cell counts from
+    integer, intent(in) :: cell(3)
+    integer :: s, c(2), at(3), level
+
+    do l = 1, size(layers)
+      c = across(layers(l)%axis)
+      do s = 1, size(layers(l)%sides)
+        associate (other => layers(l)%sides(s))
+          if (other%number /= side%number) cycle
+          ! cells are counted from the body's corner, and bodies of one grid have different ones
+          at = cell
+          at(:dim) = at(:dim) + nint(place_in(grid, side%grid%origin(:dim))) &
+            & - nint(place_in(grid, other%grid%origin(:dim)))
+          if (any(at(c) < 1 .or. at(c) > shape(other%top))) cycle
+          if (.not. other%has(at(c(1)), at(c(2)))) cycle
+          level = layers(l)%outward*at(layers(l)%axis) - other%top(at(c(1)), at(c(2)))
+          if (level > 0 .and. level <= other%rows) return
+        end associate
+      end do
+    end do
+    l = 0
+  end function claimed_by
+
+  !> Look at points of bodies: the outermost cell of each column of the sides, one side for each
+  !> level of the cells of a lattice body.
+  subroutine see_points(scene, body, n_body, layer)
+    type(scene_type), intent(in) :: scene     !! gives the boundary
+    type(body_type), intent(in) :: body       !! some points or all, with the lattices of all bodies
+    integer, intent(in) :: n_body             !! its first points, which are no layer
+    type(layer_type), intent(inout) :: layer  !! from `begin_layers`; may have seen others
+    integer :: b, c(2), k, cell(3), level
+    logical :: refined
+
+    c = across(layer%axis)
+    refined = has_refinement(scene)
+    level = 0
+    associate (name => scene%boundaries(layer%tally%boundary)%body)
+      do k = 1, n_body
+        b = body%body(k)
+        if (body%grid(k) == 0) cycle
+        if (name /= '' .and. scene%bodies(b)%name /= name) cycle
+        if (refined) level = level_of(body, k)
+        associate (side => layer%of_body(level, b))
+          if (side%number == 0_i2) call begin_side(body%dim, layer%axis, body%lattices(b), level, &
+            & b, body%grid(k), body%material(k), side)
+          cell = cell_of(side%grid, body%x(k, :))
+          side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), &
+            & layer%outward*cell(layer%axis))
+        end associate
+      end do
+    end associate
+  end subroutine see_points
+
+  !> A side of which nothing has been seen.
+  subroutine begin_side(dim, axis, lattice, level, body, grid, material, side)
+    integer, intent(in) :: dim                  !! of the scene
+    integer, intent(in) :: axis                 !! across the side: 1, 2, 3
+    type(lattice_type), intent(in) :: lattice   !! of the body
+    integer, intent(in) :: level                !! of its cells
+    integer, intent(in) :: body                 !! its number
+    integer(i2), intent(in) :: grid, material   !! numbers of those of the points
+    type(side_type), intent(out) :: side
+    integer :: c(2), points(3)
+
+    c = across(axis)
+    side%number = grid
+    side%material = material
+    side%body = body
+    side%grid = finer(lattice%grid, level)
+    side%parts = 2**level
+    points = lattice%cells
+    points(:dim) = points(:dim)*side%parts
+    allocate (side%top(points(c(1)), points(c(2))), source=nothing)
+    allocate (side%hidden(points(c(1)), points(c(2))), side%has(points(c(1)), points(c(2))), &
+      & source=.false.)
+  end subroutine begin_side
+
+  !> When all points have been seen: the sides of which something is left, in the order of the
+  !> bodies, the coarsest level first, and the columns that get the layer.
+  subroutine choose_sides(scene, delta, dim, layer)
+    type(scene_type), intent(in) :: scene     !! a checked scene
+    real(wp), intent(in) :: delta             !! horizon, the largest one of all points [m]
+    integer, intent(in) :: dim                !! of the scene
+    type(layer_type), intent(inout) :: layer  !! gets its sides
+    integer :: b, n, level
+
+    allocate (layer%sides(count(layer%of_body%number /= 0_i2)))
+    n = 0
+    do b = 1, size(layer%of_body, 2)
+      do level = 0, ubound(layer%of_body, 1)
+        if (layer%of_body(level, b)%number == 0_i2) cycle
+        n = n + 1
+        layer%sides(n) = layer%of_body(level, b)
+        associate (side => layer%sides(n))
           side%delta = delta
           if (has_own_horizons(scene)) side%delta = scene%horizon%ratio*side%grid%spacing
           side%rows = layer_rows(side%delta, side%grid%spacing)
-          points = body%lattices(b)%cells
-          points(:body%dim) = points(:body%dim)*side%parts
-          allocate (side%top(points(c(1)), points(c(2))), source=nothing)
-          allocate (side%hidden(points(c(1)), points(c(2))), side%has(points(c(1)), &
-            & points(c(2))), source=.false.)
-        end if
-        cell = cell_of(side%grid, body%x(k, :))
-        side%top(cell(c(1)), cell(c(2))) = max(side%top(cell(c(1)), cell(c(2))), outward*cell(axis))
-      end associate
-    end do
-    allocate (sides(count(all_sides%number /= 0_i2)))
-    n = 0
-    do b = 1, size(all_sides, 2)
-      do level = 0, levels
-        if (all_sides(level, b)%number == 0_i2) cycle
-        n = n + 1
-        sides(n) = all_sides(level, b)
+        end associate
       end do
     end do
-  end subroutine find_sides
+    deallocate (layer%of_body)
+    call choose_columns(dim, layer%axis, layer%outward, layer%sides, layer%tally)
+  end subroutine choose_sides
 
   !> The axes across an axis, in ascending order.
   pure function across(axis)
@@ -210,7 +314,7 @@ contains
   !> Mark the columns that get the layer, and count.
   subroutine choose_columns(dim, axis, outward, sides, tally)
     integer, intent(in) :: dim                      !! of the scene
-    integer, intent(in) :: axis, outward            !! as in `find_sides`
+    integer, intent(in) :: axis, outward            !! as in `layer_type`
     type(side_type), intent(inout) :: sides(:)      !! `has` is set
     type(layer_count_type), intent(inout) :: tally  !! columns are added
     real(wp) :: outer(size(sides)), outermost
@@ -297,7 +401,7 @@ contains
   !> How far out the outer face of a cell lies [m], growing outwards.
   pure real(wp) function face_of(side, axis, outward, level) result(face)
     type(side_type), intent(in) :: side
-    integer, intent(in) :: axis, outward  !! as in `find_sides`
+    integer, intent(in) :: axis, outward  !! as in `layer_type`
     integer, intent(in) :: level          !! height of the cell
     face = outward*side%grid%origin(axis) + (level + merge(1, 0, outward < 0)) &
       & *side%grid%spacing
@@ -308,7 +412,7 @@ contains
     type(side_type), intent(in) :: side      !! whose columns are looked at
     type(side_type), intent(in) :: other     !! of another body
     integer, intent(in) :: dim               !! of the scene
-    integer, intent(in) :: axis, outward     !! as in `find_sides`
+    integer, intent(in) :: axis, outward     !! as in `layer_type`
     logical, intent(inout) :: hidden(:, :)   !! the columns of `side`; marks are added
     real(wp) :: edge, face
     integer :: c(2), m, n, i, low(2), high(2)
@@ -350,88 +454,50 @@ contains
     end function ends_below
   end subroutine hide
 
-  !> The box of cells first..last around the layer at one side, which some column has.
-  pure subroutine box_of_layer(side, axis, outward, first, last)
-    type(side_type), intent(in) :: side        !! with a column that has the layer
-    integer, intent(in) :: axis, outward       !! as in `find_sides`
+  !> The box of cells first..last around the layer at one of its sides, which some column has.
+  pure subroutine box_of_layer(layer, s, first, last)
+    type(layer_type), intent(in) :: layer      !! with its sides
+    integer, intent(in) :: s                   !! which of them; some column of it has the layer
     integer, intent(out) :: first(3), last(3)  !! cells; last < first if it has no rows
     integer :: low, high
 
-    first = 1
-    last(across(axis)) = shape(side%top)
-    low = minval(side%top, mask=side%has) + 1
-    high = maxval(side%top, mask=side%has) + side%rows
-    first(axis) = min(outward*low, outward*high)
-    last(axis) = max(outward*low, outward*high)
-    if (side%rows == 0) last(axis) = first(axis) - 1
+    associate (side => layer%sides(s), axis => layer%axis, outward => layer%outward)
+      first = 1
+      last(across(axis)) = shape(side%top)
+      low = minval(side%top, mask=side%has) + 1
+      high = maxval(side%top, mask=side%has) + side%rows
+      first(axis) = min(outward*low, outward*high)
+      last(axis) = max(outward*low, outward*high)
+      if (side%rows == 0) last(axis) = first(axis) - 1
+    end associate
   end subroutine box_of_layer
 
-  !> Which cells of the box first..last, x fastest, belong to the layer at one side.
-  pure function cells_of_layer(side, axis, outward, first, last) result(chosen)
-    type(side_type), intent(in) :: side
-    integer, intent(in) :: axis, outward      !! as in `find_sides`
-    integer, intent(in) :: first(3), last(3)  !! of `box_of_layer`
+  !> Which of the cells first..last, x fastest, belong to the layer at one of its sides.
+  pure function cells_of_layer(layer, s, first, last) result(chosen)
+    type(layer_type), intent(in) :: layer     !! with its sides
+    integer, intent(in) :: s                  !! which of them
+    integer, intent(in) :: first(3), last(3)  !! in the box of `box_of_layer`
     logical, allocatable :: chosen(:)
     integer :: c(2), i, j, k, n, level, at(3)
 
-    c = across(axis)
+    c = across(layer%axis)
     allocate (chosen(product(max(0, last - first + 1))))
     n = 0
-    do k = first(3), last(3)
-      do j = first(2), last(2)
-        do i = first(1), last(1)
-          n = n + 1
-          at = [i, j, k]
-          chosen(n) = side%has(at(c(1)), at(c(2)))
-          if (.not. chosen(n)) cycle
-          level = outward*at(axis) - side%top(at(c(1)), at(c(2)))
-          chosen(n) = level > 0 .and. level <= side%rows
+    associate (side => layer%sides(s))
+      do k = first(3), last(3)
+        do j = first(2), last(2)
+          do i = first(1), last(1)
+            n = n + 1
+            at = [i, j, k]
+            chosen(n) = side%has(at(c(1)), at(c(2)))
+            if (.not. chosen(n)) cycle
+            level = layer%outward*at(layer%axis) - side%top(at(c(1)), at(c(2)))
+            chosen(n) = level > 0 .and. level <= side%rows
+          end do
         end do
       end do
-    end do
+    end associate
   end function cells_of_layer
-
-  !> Where the corner between two sides is cut or round, both layers reach for the same cells: the
-  !> earlier one has them, and they are taken from `chosen`. Two layers at one side, or of different
-  !> bodies, must not meet like that; there the cells remain, and are found to overlap.
-  subroutine claim_cells(scene, boundary, body, side, first, last, claimed, owner, chosen)
-    type(scene_type), intent(in) :: scene
-    integer, intent(in) :: boundary               !! number of the group
-    type(body_type), intent(in) :: body           !! for its grids
-    type(side_type), intent(in) :: side
-    integer, intent(in) :: first(3), last(3)      !! the box of cells, x fastest
-    type(lookup_type), intent(inout) :: claimed   !! cells that layers have
-    integer(i2), allocatable, intent(inout) :: owner(:)  !! the boundary of each of these
-    logical, intent(inout) :: chosen(:)           !! the layer's cells in the box
-    logical :: is_new
-    integer :: i, j, k, n, number, shift(3)
-    integer(i8) :: key
-
-    ! the numbers of cells count from the body's corner, bodies of one grid from different ones
-    shift = 0
-    shift(:body%dim) = nint(place_in(body%grids(side%number), side%grid%origin(:body%dim)))
-    n = 0
-    do k = first(3), last(3)
-      do j = first(2), last(2)
-        do i = first(1), last(1)
-          n = n + 1
-          if (.not. chosen(n)) cycle
-          key = mix(mix(mix(int(side%number, i8), int(i + shift(1), i8)), int(j + shift(2), i8)), &
-            & int(k + shift(3), i8))
-          call claimed%number_of(key, number, is_new)
-          if (is_new) then
-            if (number > size(owner)) owner = [owner, spread(0_i2, 1, max(1024, number))]
-            owner(number) = int(boundary, i2)
-          else
-            associate (earlier => scene%boundaries(owner(number)), &
-              & this => scene%boundaries(boundary))
-              chosen(n) = earlier%body /= this%body .or. earlier%side(1:1) == this%side(1:1)
-            end associate
-          end if
-        end do
-      end do
-    end do
-  end subroutine claim_cells
 
   !> What the user reads of a layer that does not cover its side; '' if it does.
   function layer_count_text(scene, tally) result(text)

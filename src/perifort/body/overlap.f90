@@ -7,7 +7,7 @@ module pd_body_overlap
   use pd_base_text, only: to_text
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: adds_layer, has_grid, scene_type
-  use pd_body_body, only: body_type, grid_type
+  use pd_body_body, only: body_type, grid_type, number_at
   use pd_body_lattices, only: cell_of, place_in
   use pd_body_refine, only: finer, level_of
   implicit none (type, external)
@@ -42,7 +42,8 @@ contains
   !> of its cells lies in it, a point on its surface does not.
   subroutine check_lattices(scene, body, error)
     type(scene_type), intent(in) :: scene        !! gives the names of the bodies
-    type(body_type), intent(in) :: body          !! in point order, with its lattices
+    type(body_type), intent(in) :: body          !! in point order, with its lattices: all points,
+                                                 !! or those that a rank has
     type(error_type), allocatable, intent(out) :: error
     type(cells_type), allocatable :: bodies(:)
     integer, allocatable :: first(:), order(:)
@@ -322,7 +323,7 @@ contains
       integer, intent(in) :: s
       character(:), allocatable :: text
       integer :: c
-      text = to_text(s)//' ('//to_text(body%x(s, 1))
+      text = to_text(number_at(body, s))//' ('//to_text(body%x(s, 1))
       do c = 2, body%dim
         text = text//', '//to_text(body%x(s, c))
       end do

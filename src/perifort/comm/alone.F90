@@ -27,9 +27,13 @@ contains
     if (self%ranks > 1 .and. size(values) > 0) call internal_fault('there is no other rank')
   end procedure take_largest
 
-  module procedure share
-    if (self%ranks > 1 .and. size(values) > 0) call internal_fault('there is no other rank')
-  end procedure share
+  module procedure start_sharing
+    if (self%ranks > 1 .and. size(values) + which > 0) call internal_fault('there is no other rank')
+  end procedure start_sharing
+
+  module procedure finish_sharing
+    if (self%ranks > 1 .and. size(values) + which > 0) call internal_fault('there is no other rank')
+  end procedure finish_sharing
 
   module procedure join
     if (size(owner) + size(number) + size(slot) > 0 .or. self%ranks > 1 &

@@ -75,49 +75,82 @@ contains
     call count_sum(self, begin)
   end procedure take_largest
 
-  module procedure share
-    real(wp), asynchronous :: sent(size(values, 2)*size(self%send_slot))
-    real(wp), asynchronous :: taken(size(values, 2)*size(self%take_slot))
+  module procedure start_sharing
+    type(MPI_Request) :: request
+    real(wp) :: begin
+    integer :: c, i, n, m, first, number, at
+
+    begin = wall_time()
+    m = size(values, 2)
+    associate (messages => self%exchanges(which), neighbours => size(self%neighbour))
+      if (allocated(messages%request)) call internal_fault('messages that nobody waits for')
+      allocate (messages%request(2*neighbours))
+      call make_room(m*size(self%send_slot), messages%sent)
+      call make_room(m*size(self%take_slot), messages%taken)
+      do n = 1, neighbours
+        first = self%take_first(n)
+        number = self%take_first(n + 1) - first
+        at = m*(first - 1)
+        call MPI_Irecv(messages%taken(at + 1:at + m*number), m*number, MPI_DOUBLE_PRECISION, &
+          & self%neighbour(n), tag + which, MPI_COMM_WORLD, request)
+        messages%request(n) = request%MPI_VAL
+      end do
+      do n = 1, neighbours
+        first = self%send_first(n)
+        number = self%send_first(n + 1) - first
+        at = m*(first - 1)
+        do c = 1, m
+          do i = 1, number
+            messages%sent(at + (c - 1)*number + i) = values(self%send_slot(first + i - 1), c)
+          end do
+        end do
+        call MPI_Isend(messages%sent(at + 1:at + m*number), m*number, MPI_DOUBLE_PRECISION, &
+          & self%neighbour(n), tag + which, MPI_COMM_WORLD, request)
+        messages%request(neighbours + n) = request%MPI_VAL
+      end do
+    end associate
+    self%bytes = self%bytes + 8_i8*m*size(self%send_slot)
+    self%messages = self%messages + size(self%neighbour)
+    self%sharing = self%sharing + wall_time() - begin
+  end procedure start_sharing
+
+  !> Room for so many values, which stays where it is while messages need it.
+  subroutine make_room(number, values)
+    integer, intent(in) :: number
+    real(wp), allocatable, intent(inout) :: values(:)
+
+    if (allocated(values)) then
+      if (size(values) >= number) return
+      deallocate (values)
+    end if
+    allocate (values(number))
+  end subroutine make_room
+
+  module procedure finish_sharing
     type(MPI_Request) :: request(2*size(self%neighbour))
     real(wp) :: begin
     integer :: c, i, n, m, first, number, at
 
     begin = wall_time()
     m = size(values, 2)
-    do n = 1, size(self%neighbour)
-      first = self%take_first(n)
-      number = self%take_first(n + 1) - first
-      at = m*(first - 1)
-      call MPI_Irecv(taken(at + 1:at + m*number), m*number, MPI_DOUBLE_PRECISION, &
-        & self%neighbour(n), tag, MPI_COMM_WORLD, request(n))
-    end do
-    do n = 1, size(self%neighbour)
-      first = self%send_first(n)
-      number = self%send_first(n + 1) - first
-      at = m*(first - 1)
-      do c = 1, m
-        do i = 1, number
-          sent(at + (c - 1)*number + i) = values(self%send_slot(first + i - 1), c)
+    associate (messages => self%exchanges(which))
+      if (.not. allocated(messages%request)) call internal_fault('messages that nobody has sent')
+      request%MPI_VAL = messages%request
+      call MPI_Waitall(size(request), request, MPI_STATUSES_IGNORE)
+      deallocate (messages%request)
+      do n = 1, size(self%neighbour)
+        first = self%take_first(n)
+        number = self%take_first(n + 1) - first
+        at = m*(first - 1)
+        do c = 1, m
+          do i = 1, number
+            values(self%take_slot(first + i - 1), c) = messages%taken(at + (c - 1)*number + i)
+          end do
         end do
       end do
-      call MPI_Isend(sent(at + 1:at + m*number), m*number, MPI_DOUBLE_PRECISION, &
-        & self%neighbour(n), tag, MPI_COMM_WORLD, request(size(self%neighbour) + n))
-    end do
-    call MPI_Waitall(size(request), request, MPI_STATUSES_IGNORE)
-    do n = 1, size(self%neighbour)
-      first = self%take_first(n)
-      number = self%take_first(n + 1) - first
-      at = m*(first - 1)
-      do c = 1, m
-        do i = 1, number
-          values(self%take_slot(first + i - 1), c) = taken(at + (c - 1)*number + i)
-        end do
-      end do
-    end do
-    self%bytes = self%bytes + 8_i8*m*size(self%send_slot)
-    self%messages = self%messages + size(self%neighbour)
+    end associate
     self%sharing = self%sharing + wall_time() - begin
-  end procedure share
+  end procedure finish_sharing
 
   module procedure join
     integer :: wanted(0:self%ranks - 1), asked(0:self%ranks - 1)

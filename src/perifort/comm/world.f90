@@ -9,6 +9,13 @@ module pd_comm_world
   private
   public :: world_type, begin_world, end_world, abort_world, wait_for_turn
 
+  !> Values on their way.
+  type :: exchange_type
+    real(wp), allocatable :: sent(:)               !! by neighbour, then component
+    real(wp), allocatable :: taken(:)
+    integer, allocatable :: request(:)             !! handles of the messages
+  end type exchange_type
+
   !> All ranks, and of one body's halo: which values go where.
   type, extends(ranks_type) :: world_type
     integer :: rank = 0                            !! of this process, from 0
@@ -20,10 +27,12 @@ module pd_comm_world
     integer(i4), allocatable :: send_slot(:)       !! slots of points that others have copies of
     integer, allocatable :: take_first(:)          !! the same of `take_slot`
     integer(i4), allocatable :: take_slot(:)       !! slots of copies, neighbour by neighbour
+    type(exchange_type) :: exchanges(2)            !! what is on its way
   contains
     procedure :: add_all
     procedure :: take_largest
-    procedure :: share
+    procedure :: start_sharing
+    procedure :: finish_sharing
     procedure :: join
     procedure :: collect
     procedure :: number_before
@@ -65,12 +74,21 @@ module pd_comm_world
       real(wp), intent(inout) :: values(:)  !! as many on every rank
     end subroutine take_largest
 
-    !> Copy the values of points that others own from there: one message for each neighbour.
-    module subroutine share(self, values)
+    !> Send the values of owned points to those that have copies: one message for each neighbour.
+    module subroutine start_sharing(self, values, which)
       implicit none (type, external)
       class(world_type), intent(inout) :: self
-      real(wp), intent(inout) :: values(:, :)  !! (n_slots, components)
-    end subroutine share
+      real(wp), intent(in), contiguous :: values(:, :)  !! (n_slots, components)
+      integer, intent(in) :: which                      !! `exchange` or `side_exchange`
+    end subroutine start_sharing
+
+    !> Wait for the values of copies, and for what is sent.
+    module subroutine finish_sharing(self, values, which)
+      implicit none (type, external)
+      class(world_type), intent(inout) :: self
+      real(wp), intent(inout), contiguous :: values(:, :)  !! (n_slots, components)
+      integer, intent(in) :: which                         !! that has been started
+    end subroutine finish_sharing
 
     !> Find out what each rank sends: every rank tells the owners of its copies which they are.
     module subroutine join(self, owner, number, slot, owned_number, owned_slot)

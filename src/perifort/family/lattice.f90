@@ -13,6 +13,7 @@ module pd_family_lattice
   use pd_base_archive, only: archive_type
   use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_lanes, only: lanes, word_bits
+  use pd_base_reduce, only: any_of_ranks, largest_of_ranks
   use pd_base_error, only: error_type, fail
   use pd_base_system, only: available_memory
   use pd_base_text, only: to_text, with_unit
@@ -29,7 +30,7 @@ module pd_family_lattice
   implicit none (type, external)
   private
   public :: lattice_family_type, offsets_type, new_lattice_family, lattice_suits, use_double, &
-    & grids_fit, find_listed, grid_at, both_ends
+    & grids_fit, find_listed, grid_at, both_ends, cells_between
 
   real(wp), parameter :: least_filled = 0.05_wp     !! part of the box's cells that must hold points
   integer, parameter :: most_slots = 1000000000     !! slots and shifts are 32-bit numbers
@@ -42,6 +43,7 @@ module pd_family_lattice
                                                !! other ranks' points, or points with bonds in the
                                                !! list of a composite family
     integer(i8) :: last_owned = huge(0_i8)     !! the last slot that is no copy
+    integer(i4), allocatable :: copies(:)      !! slots of copies of other ranks' points, if any
     integer :: block_length = lanes            !! slots of a block; 2*lanes if mixed
     integer(i1), allocatable :: alive(:)       !! 1 where a slot holds a point
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
@@ -65,42 +67,54 @@ module pd_family_lattice
 contains
 
   !> Whether lattice families are possible for a body in point order: every point on a grid, grids
-  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not.
-  subroutine lattice_suits(body, rule, suits, reason, listed)
-    type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
+  !> that no bond joins, and grids filled reasonably. Otherwise `reason` says why not. Ranks with
+  !> parts of a body come to one answer.
+  subroutine lattice_suits(body, rule, suits, reason, listed, cells)
+    type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots:
+                                                      !! all points, or those of a rank
     type(volume_rule_type), intent(in) :: rule        !! how far families reach
     logical, intent(out) :: suits                     !! a lattice family can be made
     character(:), allocatable, intent(out) :: reason
       !! why not, without a full stop; empty if it suits
     logical, allocatable, intent(out) :: listed(:)    !! (n_points) as `find_listed` has them
+    integer, intent(in), optional :: cells(:, :)
+      !! (3, grids) of the box around the points of all ranks on each grid, 0 if there are none;
+      !! absent: all points are here
 
     suits = .false.
     call find_listed(body, rule, listed)
-    if (any(body%grid == 0)) then
+    if (any_of_ranks(body%order, any(body%grid == 0))) then
       reason = 'some points are a cloud, a mesh or cut cells'
-    else if (any(listed)) then
+    else if (any_of_ranks(body%order, any(listed))) then
       reason = 'bonds join bodies on different grids'
     else
-      call grids_fit(body, rule, suits, reason)
+      call grids_fit(body, rule, suits, reason, cells)
     end if
   end subroutine lattice_suits
 
   !> Whether the grids of a body are filled reasonably and have room for their slots.
-  subroutine grids_fit(body, rule, suits, reason)
+  subroutine grids_fit(body, rule, suits, reason, cells)
     type(body_type), intent(in) :: body               !! in point order, not yet arranged in slots
     type(volume_rule_type), intent(in) :: rule        !! how far families reach
     logical, intent(out) :: suits                     !! they have
     character(:), allocatable, intent(out) :: reason
       !! why not, without a full stop; empty if it suits
-    real(wp) :: room
+    integer, intent(in), optional :: cells(:, :)      !! as in `lattice_suits`
+    real(wp) :: room, filled
     integer :: g
 
     reason = ''
     room = 0.0_wp
-    do g = 1, size(body%grids)
-      if (any(body%grid == g)) room = room + product(real(extent(body, g), wp))
-    end do
-    suits = count(body%grid > 0) >= least_filled*room
+    if (present(cells)) then
+      room = sum(product(real(cells, wp), dim=1))
+      filled = real(body%order%n_global, wp)
+    else
+      do g = 1, size(body%grids)
+        if (any(body%grid == g)) room = room + product(real(extent(body, g), wp))
+      end do
+      filled = count(body%grid > 0)
+    end if
+    suits = filled >= least_filled*room
     if (.not. suits) then
       reason = 'the points fill too little of their grid'
       return
@@ -109,6 +123,7 @@ contains
     do g = 1, size(body%grids)
       if (any(body%grid == g)) room = room + padded(body, rule, g)
     end do
+    room = largest_of_ranks(body%order, room)
     suits = room <= most_slots
     if (.not. suits) reason = 'with its padding the grid has '//to_text(room, 3)// &
       & ' cells, more than '//to_text(most_slots)
@@ -169,12 +184,22 @@ contains
 
     cells = 1
     do c = 1, body%dim
-      ! far apart, two bodies may span more cells than a number has room for
       along = coordinate(body%grids(g), body%x, c)
-      cells(c) = nint(min(real(most_slots, wp), (maxval(along, mask=body%grid == g) &
-        & - minval(along, mask=body%grid == g))/body%grids(g)%spacing)) + 1
+      cells(c) = cells_between(minval(along, mask=body%grid == g), maxval(along, &
+        & mask=body%grid == g), body%grids(g)%spacing)
     end do
   end function extent
+
+  !> Cells of a row between two places of points, theirs included; 0 if there are no points.
+  elemental integer function cells_between(lowest, highest, spacing) result(cells)
+    real(wp), intent(in) :: lowest, highest  !! along the row; lowest > highest: no points [m]
+    real(wp), intent(in) :: spacing          !! [m]
+
+    cells = 0
+    if (lowest > highest) return
+    ! far apart, two bodies may span more cells than a number has room for
+    cells = nint(min(real(most_slots, wp), (highest - lowest)/spacing)) + 1
+  end function cells_between
 
   !> Families of a body that `lattice_suits`; the body is arranged in slots, points on no grid
   !> behind the others and without bonds. `breakable`: bonds may break or be cut, so each gets a
@@ -212,8 +237,10 @@ contains
     family%words = (family%most_bonds + word_bits - 1)/word_bits
     call place_points(body, family, error)
     if (allocated(error)) return
-    if (body%n_points > body%order%n_owned) &
-      & family%last_owned = maxval(body%slot(:body%order%n_owned))
+    if (body%n_points > body%order%n_owned) then
+      family%last_owned = maxval(body%slot(:body%order%n_owned))
+      family%copies = body%slot(body%order%n_owned + 1:)
+    end if
     allocate (apart(body%n_slots), source=.false.)
     if (present(listed)) then
       do k = 1, body%n_slots
@@ -415,8 +442,38 @@ contains
       if (pass == 1) allocate (family%block(n))
     end do
     call find_slabs(family%grids, family%dim, both_ends(family%dim, family%mixed), &
-      & family%block_length, family%block, family%slabs)
+      & family%block_length, family%block, family%slabs, touch_copies(family))
   end subroutine find_blocks
+
+  !> Which blocks have bonds of copies of other ranks' points among those that loops compute for
+  !> them.
+  pure function touch_copies(family) result(touched)
+    type(lattice_family_type), intent(in) :: family  !! with its blocks
+    logical, allocatable :: touched(:)
+    integer(i1), allocatable :: copy(:)
+    integer(i8) :: first, last
+    integer :: b, o
+    logical :: both
+
+    allocate (touched(size(family%block)), source=.false.)
+    if (.not. allocated(family%copies)) return
+    both = both_ends(family%dim, family%mixed)
+    allocate (copy(family%n_slots), source=0_i1)
+    copy(family%copies) = 1_i1
+    do b = 1, size(family%block)
+      first = family%block(b)
+      last = first + family%block_length - 1
+      touched(b) = any(copy(first:last) == 1_i1)
+      if (touched(b)) cycle
+      associate (grid => family%grids(grid_at(family, first)))
+        do o = 1, grid%n
+          if (both .and. grid%shift(o) < 0_i8) cycle
+          touched(b) = any(copy(first + grid%shift(o):last + grid%shift(o)) == 1_i1)
+          if (touched(b)) exit
+        end do
+      end associate
+    end do
+  end function touch_copies
 
   !> The first slot of the class of slot `k`; `k` itself if it is dead.
   pure integer function alike(family, k)

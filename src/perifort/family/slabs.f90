@@ -5,6 +5,9 @@
 !> same slot. All slabs of the first colour are worked through, in any order and by any threads, and
 !> then those of the second: what is added to a slot, and in which order, never depends on the
 !> threads.
+!>
+!> Where other ranks own some of the points, blocks that need values of these come late, in two more
+!> colours, so that the others can be worked through while messages are on their way.
 module pd_family_slabs
   use pd_base_kinds, only: i8
   use pd_family_offsets, only: offsets_type, first_cell
@@ -15,7 +18,8 @@ module pd_family_slabs
   !> Blocks sorted by slab, slabs by colour.
   type :: slabs_type
     integer, allocatable :: first(:)   !! first block of each slab, and one past the last block
-    integer :: colour(3) = 1           !! first slab of each colour, and one past the last slab
+    integer :: colour(5) = 1           !! first slab of each colour, and one past the last slab:
+                                       !! the third and fourth are those that come late
   end type slabs_type
 
   integer, parameter :: enough = 16       !! slabs that make another axis than the slowest needless
@@ -27,7 +31,7 @@ contains
   !> Cut the blocks of all grids into slabs, and sort `block`, the first slot of each, that way. All
   !> blocks are `block_length` slots long. No bond joins two grids. Where loops do not add to `both`
   !> ends of a bond, there is nothing to keep apart.
-  pure subroutine find_slabs(grids, dim, both, block_length, block, slabs)
+  pure subroutine find_slabs(grids, dim, both, block_length, block, slabs, late)
     type(offsets_type), intent(in) :: grids(:)  !! (any number) with their boxes
     integer, intent(in) :: dim                  !! of the body: 1 to 3
     integer, intent(in) :: block_length         !! slots of a block
@@ -35,14 +39,26 @@ contains
     integer(i8), intent(inout) :: block(:)
       !! (any number) first slot of each block; sorted by slab on return
     type(slabs_type), intent(out) :: slabs      !! of the sorted blocks
+    logical, intent(in), optional :: late(:)    !! which blocks come late, in their first order;
+                                                !! absent: none
     integer, allocatable :: slab(:), of_grid(:), order(:), layer(:, :)
-    integer :: b, g, n, reach(dim)
+    logical, allocatable :: waits(:)
+    integer :: b, g, n, m, reach(dim)
 
+    allocate (waits(size(block)), source=.false.)
+    if (present(late)) waits = late
     if (.not. both) then
-      ! all are of the first colour
-      n = max(1, min(2*most_pairs, size(block)/least_blocks))
-      slabs%first = [(1 + int(int(size(block), i8)*b/n), b=0, n)]
-      slabs%colour = [1, n + 1, n + 1]
+      ! all are of the first colour, and of the third those that come late
+      block = [pack(block, .not. waits), pack(block, waits)]
+      m = count(waits)
+      n = max(1, min(2*most_pairs, (size(block) - m)/least_blocks))
+      slabs%first = [(1 + int(int(size(block) - m, i8)*b/n), b=0, n)]
+      slabs%colour = n + 1
+      slabs%colour(1) = 1
+      if (m == 0) return
+      n = max(1, min(2*most_pairs, m/least_blocks))
+      slabs%first = [slabs%first, (size(block) - m + 1 + int(int(m, i8)*b/n), b=1, n)]
+      slabs%colour(4:) = slabs%colour(3) + n
       return
     end if
     allocate (slab(size(block)))
@@ -66,9 +82,31 @@ contains
         n = n + modulo(n, 2)
       end associate
     end do
-    call sort_into_slabs(slab, slabs, order)
+    if (any(grids%fixed)) call keep_order(slab, n, waits)
+    call sort_into_slabs(slab, waits, slabs, order)
     block = block(order)
   end subroutine find_slabs
+
+  !> Where what is added to a slot must come in the same order on all ranks, slabs come late as a
+  !> whole, and those of the second colour after both of their neighbours, which add to the same
+  !> slots before them.
+  pure subroutine keep_order(slab, slabs, late)
+    integer, intent(in) :: slab(:)        !! of each block, from 1
+    integer, intent(in) :: slabs          !! how many there are
+    logical, intent(inout) :: late(:)     !! (blocks)
+    logical :: waits(0:slabs + 1), even(0:slabs + 1)
+    integer :: b, s
+
+    waits = .false.
+    do b = 1, size(slab)
+      waits(slab(b)) = waits(slab(b)) .or. late(b)
+    end do
+    even = waits
+    do s = 2, slabs, 2
+      even(s) = any(waits(s - 1:s + 1))
+    end do
+    late = even(slab)
+  end subroutine keep_order
 
   !> The layer of each block along each axis, from 0; along x, layers are as thick as blocks.
   pure subroutine find_layers(grid, dim, block_length, block, layer)
@@ -171,30 +209,35 @@ contains
   end subroutine cut_layers
 
   !> Slabs of all grids together, and the order that sorts their blocks: `order(i)` is the block
-  !> that becomes the i-th. Odd slabs are of the first colour, even ones of the second.
-  pure subroutine sort_into_slabs(slab, slabs, order)
+  !> that becomes the i-th. Odd slabs are of the first colour, even ones of the second; what of them
+  !> comes late is a slab of its own, of the third or fourth.
+  pure subroutine sort_into_slabs(slab, late, slabs, order)
     integer, intent(in) :: slab(:)
+    logical, intent(in) :: late(:)
     type(slabs_type), intent(out) :: slabs
     integer, allocatable, intent(out) :: order(:)
     integer, allocatable :: next(:)
-    integer :: b, n, odd, s
+    integer :: b, n, odd, s, times
 
     n = maxval(slab)
     odd = (n + 1)/2
-    allocate (slabs%first(n + 1), order(size(slab)))
-    slabs%colour = [1, odd + 1, n + 1]
+    times = merge(2, 1, any(late))
+    allocate (slabs%first(times*n + 1), order(size(slab)))
+    slabs%colour = times*n + 1
+    slabs%colour(:3) = [1, odd + 1, n + 1]
+    if (times == 2) slabs%colour(4) = n + odd + 1
     slabs%first = 0
     do b = 1, size(slab)
-      s = sorted(slab(b))
+      s = sorted(slab(b), late(b))
       slabs%first(s + 1) = slabs%first(s + 1) + 1
     end do
     slabs%first(1) = 1
-    do s = 1, n
+    do s = 1, times*n
       slabs%first(s + 1) = slabs%first(s + 1) + slabs%first(s)
     end do
     next = slabs%first
     do b = 1, size(slab)
-      s = sorted(slab(b))
+      s = sorted(slab(b), late(b))
       order(next(s)) = b
       next(s) = next(s) + 1
     end do
@@ -202,10 +245,12 @@ contains
   contains
 
     !> Odd slabs come first.
-    pure integer function sorted(s)
+    pure integer function sorted(s, waits)
       integer, intent(in) :: s
+      logical, intent(in) :: waits
       sorted = (s + 1)/2
       if (modulo(s, 2) == 0) sorted = odd + s/2
+      if (waits) sorted = sorted + n
     end function sorted
   end subroutine sort_into_slabs
 

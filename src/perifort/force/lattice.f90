@@ -26,7 +26,11 @@ module pd_force_lattice
   use pd_force_workspace, only: lattice_workspace_type, singles_type, weights_type
   implicit none (type, external)
   private
-  public :: lattice_dilatation, lattice_force, lattice_energy
+  public :: lattice_dilatation, lattice_force, lattice_energy, all_blocks, early_blocks, late_blocks
+
+  !> Which blocks a pass works through: those that need no values of copies of other ranks' points,
+  !> then those that do, or all in one call.
+  integer, parameter :: all_blocks = 0, early_blocks = 1, late_blocks = 2
 
   !> Room of one thread.
   type :: scratch_type
@@ -40,7 +44,7 @@ contains
 
   !> p_k = 2 a d delta theta_k of all slots; marks strained slots where bonds can break, and keeps
   !> in `formulas_used` of the workspace which fast formulas each block has used.
-  subroutine lattice_dilatation(family, model, options, workspace, u, p, strained)
+  subroutine lattice_dilatation(family, model, options, workspace, u, p, strained, blocks)
     type(lattice_family_type), intent(in) :: family  !! the family
     type(model_type), intent(in) :: model            !! that the weights were made for
     type(force_options_type), intent(in) :: options  !! what the forces take in
@@ -51,30 +55,34 @@ contains
       !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
     integer(i1), intent(inout), contiguous :: strained(:)
       !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
+    integer, intent(in), optional :: blocks
+      !! `early_blocks`, then, in a call of its own, `late_blocks`; `all_blocks` if absent
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
-    logical :: both, in_parts
-    integer :: b, s, k, colour
+    logical :: both, in_parts, begins, ends
+    integer :: b, s, k, colour, colours(2)
 
     call prepare_blocks(family, model, workspace)
+    call choose_colours(family, blocks, colours, begins, ends)
     both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model, options)
     in_parts = allocated(workspace%part)
     !$omp parallel default(none) &
     !$omp shared(family, model, options, workspace, u, p, strained, both, limit, in_parts) &
-    !$omp private(scratch, own, b, s, k, colour)
+    !$omp shared(begins, ends, colours) private(scratch, own, b, s, k, colour)
     call allocate_scratch(family, scratch)
+    ! once more before late blocks, which need those of copies
     if (family%mixed) call split_displacements(workspace%singles, u)
-    if (family%mixed .and. both) call clear_sums(workspace%singles, 1)
-    if (both) then
+    if (family%mixed .and. both .and. begins) call clear_sums(workspace%singles, 1)
+    if (both .and. begins) then
       !$omp do simd schedule(static)
       do k = 1, size(p)
         p(k) = 0.0_wp
       end do
     end if
-    call clear(strained)
-    do colour = 1, 2
+    if (begins) call clear(strained)
+    do colour = colours(1), colours(2)
       !$omp do schedule(static)
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
@@ -93,9 +101,9 @@ contains
         end do
       end do
     end do
-    if (family%mixed .and. both) &
+    if (family%mixed .and. both .and. ends) &
       & call add_sums(workspace%singles, 1, workspace%singles%volume, p)
-    if (both) then
+    if (both .and. ends) then
       !$omp do schedule(static)
       do k = 1, size(p), lanes
         call scale(model, int(k, i8), p)
@@ -106,7 +114,7 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `lattice_dilatation` at the same displacements.
-  subroutine lattice_force(family, model, options, workspace, u, p, force, strained)
+  subroutine lattice_force(family, model, options, workspace, u, p, force, strained, blocks)
     type(lattice_family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model               !! that the weights were made for
     type(force_options_type), intent(in) :: options
@@ -119,25 +127,28 @@ contains
     real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
       !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
+    integer, intent(in), optional :: blocks
+      !! `early_blocks`, then, in a call of its own, `late_blocks`; `all_blocks` if absent
     type(scratch_type) :: scratch
     type(weights_type) :: own
     real(wp) :: limit(2)
-    logical :: both, in_parts, fresh
-    integer :: b, c, s, k, colour
+    logical :: both, in_parts, fresh, ends
+    integer :: b, c, s, k, colour, colours(2)
 
     call prepare_blocks(family, model, workspace)
+    call choose_colours(family, blocks, colours, fresh, ends)
     both = both_ends(family%dim, family%mixed)
     limit = fast_limits(family, model, options)
     in_parts = allocated(workspace%part)
-    fresh = .not. (in_parts .and. workspace%onto)
+    if (in_parts) fresh = fresh .and. .not. workspace%onto
     !$omp parallel default(none) &
     !$omp shared(family, model, options, workspace, u, p, force, strained, both, limit, in_parts) &
-    !$omp shared(fresh) &
-    !$omp private(scratch, own, b, c, s, k, colour)
+    !$omp shared(fresh, ends, colours) private(scratch, own, b, c, s, k, colour)
     call allocate_scratch(family, scratch)
     if (family%mixed .and. .not. options%dilatation) call split_displacements(workspace%singles, u)
     if (family%mixed .and. options%dilatation) call round_dilatation(workspace%singles, p)
-    if (family%mixed .and. both) call clear_sums(workspace%singles, size(force, 2))
+    if (family%mixed .and. both .and. colours(1) == 1) &
+      & call clear_sums(workspace%singles, size(force, 2))
     if (fresh .and. (both .or. in_parts)) then
       do c = 1, size(force, 2)
         !$omp do simd schedule(static)
@@ -148,7 +159,7 @@ contains
       end do
     end if
     if (fresh) call clear(strained)
-    do colour = 1, 2
+    do colour = colours(1), colours(2)
       !$omp do schedule(static)
       do s = family%slabs%colour(colour), family%slabs%colour(colour + 1) - 1
         do b = family%slabs%first(s), family%slabs%first(s + 1) - 1
@@ -167,13 +178,30 @@ contains
         end do
       end do
     end do
-    if (family%mixed .and. both) then
+    if (family%mixed .and. both .and. ends) then
       do c = 1, size(force, 2)
         call add_sums(workspace%singles, c, 1.0_wp, force(:, c))
       end do
     end if
     !$omp end parallel
   end subroutine lattice_force
+
+  !> The first and the last colour of the slabs that a pass works through, and whether it begins and
+  !> ends with this call.
+  pure subroutine choose_colours(family, blocks, colours, begins, ends)
+    type(lattice_family_type), intent(in) :: family
+    integer, intent(in), optional :: blocks
+    integer, intent(out) :: colours(2)
+    logical, intent(out) :: begins, ends
+    integer :: which
+
+    which = all_blocks
+    if (present(blocks)) which = blocks
+    begins = which /= late_blocks
+    ends = which /= early_blocks
+    colours = [merge(1, 3, begins), merge(4, 2, ends)]
+    if (begins .and. family%slabs%colour(3) == family%slabs%colour(5)) colours(2) = 2
+  end subroutine choose_colours
 
   !> Strain energy density of all slots [J/m3]. With `theta` that of the stretches alone, and the
   !> dilatation beside it.

@@ -5,11 +5,12 @@ module pd_motion_system
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: to_text
   use pd_base_reduce, only: any_of_ranks, largest_over
-  use pd_body_body, only: body_type, not_finite_text, share_halo
+  use pd_base_order, only: side_exchange
+  use pd_body_body, only: body_type, finish_halo, not_finite_text, share_halo, start_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds, stretch_ratios
   use pd_force_generic_pass, only: renew_pulls
-  use pd_force_forces, only: internal_force, whole, up_to_marks, after_marks
+  use pd_force_forces, only: arriving_force, internal_force, whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of, p_of
   use pd_force_obstacle, only: obstacle_type
   use pd_force_reference, only: point_dilatation, point_force
@@ -218,10 +219,12 @@ contains
     if (late) call settle_account(system)
     call renew_conditions(system, t)
     call impose(system%motions, t, system%state%u, system%state%v)
-    if (system%model%breaking) call share_halo(system%body, system%state%v)
+    ! the velocities of copies are needed where bonds break
+    if (system%model%breaking) call start_halo(system%body, system%state%v, side_exchange)
     call bring_temperature(system, t)
     if (early) then
       call renew_forces(system, t, up_to_marks)
+      call finish_halo(system%body, system%state%v, side_exchange)
       call break_marked(system, t, pair, slots)
       if (system%model%generic) then
         call renew_pulls(system%family, system%model, system%workspace%generic, system%state%u, &
@@ -234,6 +237,7 @@ contains
       call renew_forces(system, t, after_marks)
     else
       call renew_forces(system, t)
+      if (system%model%breaking) call finish_halo(system%body, system%state%v, side_exchange)
     end if
     if (late) call break_marked(system, t, pair, slots)
   end subroutine evaluate
@@ -257,10 +261,15 @@ contains
     of_copies = system%static .or. system%break_late
     now = whole
     if (present(part)) now = part
-    if (now /= after_marks) call share_halo(system%body, system%state%u)
     associate (state => system%state)
-      call internal_force(system%body, system%family, system%model, options_of(system%model), &
-        & system%workspace, state%u, state%p, state%force, system%strained, now, of_copies)
+      if (associated(system%body%order%ranks) .and. now /= after_marks) then
+        call start_halo(system%body, state%u)
+        call arriving_force(system%body, system%family, system%model, options_of(system%model), &
+          & system%workspace, state%u, state%p, state%force, system%strained, now, of_copies)
+      else
+        call internal_force(system%body, system%family, system%model, options_of(system%model), &
+          & system%workspace, state%u, state%p, state%force, system%strained, now, of_copies)
+      end if
     end associate
     if (system%terms%inside == 0 .or. now == up_to_marks) return
     call view_of(system, t, view)

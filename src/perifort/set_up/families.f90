@@ -6,8 +6,10 @@ module pd_set_up_families
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_lattices, only: axes_of
+  use pd_body_windows, only: survey_type
   use pd_family_composite, only: composite_family_type, composite_suits, new_composite_family
-  use pd_family_lattice, only: lattice_family_type, lattice_suits, new_lattice_family
+  use pd_family_lattice, only: cells_between, lattice_family_type, lattice_suits, &
+    & new_lattice_family
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_rule_type
   use pd_force_composite, only: prepare_composite
@@ -35,20 +37,34 @@ contains
   !> The kind of families that suits the points: lattices, lattices joined by a list, or a list of
   !> all. An error is set if the scene asks for a lattice, or for mixed precision, that its points
   !> cannot have.
-  subroutine choose_family(scene, rule, body, laws, divided, choice, error)
+  subroutine choose_family(scene, rule, body, laws, divided, choice, error, survey)
     type(scene_type), intent(in) :: scene       !! a checked scene
     type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
-    type(body_type), intent(in) :: body         !! in point order, with all points
+    type(body_type), intent(in) :: body         !! in point order, with all points, or those of a
+                                                !! rank
     type(law_item_type), intent(in) :: laws(:)  !! (materials) their bond laws
-    logical, intent(in) :: divided              !! several ranks will have parts of the body
+    logical, intent(in) :: divided              !! several ranks have, or will have, parts of it
     type(family_choice_type), intent(out) :: choice
     type(error_type), allocatable, intent(out) :: error
+    type(survey_type), intent(in), optional :: survey  !! of all points, where a rank has its own
+    integer :: cells(3, size(body%grids)), c, g
 
     choice%kind = 'list'
     if (scene%horizon%family == 'list') then
       choice%reason = 'asked for'
     else
-      call lattice_suits(body, rule, choice%regular, choice%reason, choice%listed)
+      if (present(survey)) then
+        do g = 1, size(body%grids)
+          cells(:, g) = 1
+          do c = 1, body%dim
+            cells(c, g) = cells_between(survey%lowest(c, g), survey%highest(c, g), &
+              & body%grids(g)%spacing)
+          end do
+        end do
+        call lattice_suits(body, rule, choice%regular, choice%reason, choice%listed, cells)
+      else
+        call lattice_suits(body, rule, choice%regular, choice%reason, choice%listed)
+      end if
       if (choice%regular) choice%kind = 'lattice'
     end if
     if (scene%horizon%family == 'lattice' .and. .not. choice%regular) then

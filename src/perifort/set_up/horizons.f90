@@ -21,14 +21,14 @@ contains
   !> The volume correction and the horizon of a scene, or the ratio that gives each point its own.
   function rule_of_scene(scene, body, delta) result(rule)
     type(scene_type), intent(in) :: scene  !! a checked scene
-    type(body_type), intent(in) :: body    !! its points, in point order
+    type(body_type), intent(in) :: body    !! knows the spacings of all points
     real(wp), intent(in) :: delta          !! horizon, the largest where points have their own [m]
     type(volume_rule_type) :: rule
 
     rule%kind = volume_rule_number(trim(scene%horizon%volume_correction))
     rule%delta = delta
     if (.not. has_own_horizons(scene)) return
-    if (maxval(body%spacing) - minval(body%spacing) > same*maxval(body%spacing)) &
+    if (body%largest_spacing - body%least_spacing > same*body%largest_spacing) &
       & rule%ratio = scene%horizon%ratio
   end function rule_of_scene
 

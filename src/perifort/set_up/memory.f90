@@ -9,6 +9,7 @@ module pd_set_up_memory
   use pd_scene_content_types, only: has_grid, has_own_horizons, is_lattice, is_set, laws_of, &
     & scene_type
   use pd_body_generate, only: horizon_of
+  use pd_body_windows, only: has_windows
   implicit none (type, external)
   private
   public :: check_memory, predicted_memory, any_critical
@@ -17,7 +18,8 @@ contains
 
   !> An error if the lattice bodies of a scene need more memory than there is, at the body with the
   !> most points. Refined cells are known when `points` are. Of several ranks each needs its part,
-  !> and the positions of all points for a moment; how many share a machine is not known.
+  !> and the positions of all points for a moment, if some are no lattice; how many ranks share a
+  !> machine is not known.
   subroutine check_memory(scene, error, points, ranks)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(error_type), allocatable, intent(out) :: error  !! too many points
@@ -30,7 +32,7 @@ contains
     if (present(points)) number = points
     need = predicted_memory(scene, points)
     if (present(ranks)) then
-      if (ranks > 1) need = need/ranks + per_position*number
+      if (ranks > 1) need = need/ranks + merge(0.0_wp, per_position*number, has_windows(scene))
     end if
     there = real(available_memory(), wp)
     if (need <= there) return

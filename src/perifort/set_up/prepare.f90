@@ -11,8 +11,10 @@ module pd_set_up_prepare
   use pd_body_initial, only: initial_state
   use pd_body_regions, only: check_regions
   use pd_body_layers, only: layer_count_type, layer_count_text
+  use pd_body_overlap, only: check_lattices
   use pd_body_surface_stl, only: read_stl
   use pd_body_surface_surface, only: surface_type
+  use pd_body_windows, only: agree_on_error, has_windows, survey_points, survey_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_family_crack_surface, only: cut_by_facets
@@ -41,7 +43,7 @@ module pd_set_up_prepare
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
   use pd_set_up_ranks, only: bonds_of_ranks, broken_bonds, check_ranks, divide_body, &
-    & find_lowest, join_ranks, reproducible_layer
+    & divide_survey, find_lowest, join_ranks, reproducible_layer
   use pd_set_up_plan, only: plan_type, make_plan
   use pd_set_up_substeps, only: arrange_substeps, check_step
   use pd_set_up_rigid_bodies, only: check_within, rigid_bodies_of_scene
@@ -91,12 +93,14 @@ contains
     integer(i8) :: cut
     integer, allocatable :: owner(:)
     type(family_choice_type) :: choice
-    logical :: divided
-    integer :: i, ranks
+    type(survey_type) :: survey
+    logical :: divided, in_windows
+    integer :: i, ranks, blocks
 
     ranks = 1
     if (present(world)) ranks = world%ranks
     divided = ranks > 1
+    in_windows = divided .and. has_windows(scene)
     call check_memory(scene, error, ranks=ranks)
     if (.not. allocated(error) .and. divided) call check_ranks(scene, error)
     if (.not. allocated(error) .and. divided .and. present(terms)) call fail(error, &
@@ -105,8 +109,17 @@ contains
     if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
-      call generate_body(scene, system%body, delta, error, layers, set_up%warnings)
-      if (allocated(error)) return
+      if (in_windows) then
+        call survey_points(scene, survey, error, world, world%rank, world%ranks)
+        if (.not. allocated(error)) call check_number(scene, survey%none%order%n_global, error)
+        if (allocated(error)) return
+        system%body = survey%none
+        delta = survey%none%delta
+        layers = survey%counts
+      else
+        call generate_body(scene, system%body, delta, error, layers, set_up%warnings)
+        if (allocated(error)) return
+      end if
       if (has_refinement(scene)) call check_memory(scene, error, system%body%n_points)
       if (allocated(error)) return
       do i = 1, size(layers)
@@ -122,18 +135,30 @@ contains
 
       call timer%start('families')
       rule = rule_of_scene(scene, system%body, delta)
-      call choose_family(scene, rule, system%body, laws, divided, choice, error)
+      blocks = 1
+      if (present(world)) then
+        if (world%reproducible) blocks = reproducible_layer(scene%header%precision == 'mixed')
+      end if
+      if (in_windows) then
+        call divide_survey(scene, rule, blocks, world, survey, system%body, owner, error)
+        if (allocated(error)) return
+        call check_lattices(scene, system%body, error)
+        call agree_on_error(world, world%rank, error)
+        if (allocated(error)) return
+        call choose_family(scene, rule, system%body, laws, divided, choice, error, survey)
+      else
+        call choose_family(scene, rule, system%body, laws, divided, choice, error)
+      end if
       if (allocated(error)) return
       if (present(world)) then
         if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, &
           & 'horizon', 1, 'family', '--reproducible needs lattice families: on lists forces '// &
           & 'depend on the ranks in their last digits', choice%reason)
-        if (world%reproducible) call find_lowest(system%body)
+        if (world%reproducible .and. .not. in_windows) call find_lowest(system%body)
         system%body%order%reproducible = world%reproducible
       end if
       if (allocated(error)) return
-      if (divided) call divide_body(scene, rule, merge(reproducible_layer( &
-        & scene%header%precision == 'mixed'), 1, choice%regular .and. world%reproducible), world, &
+      if (divided .and. .not. in_windows) call divide_body(scene, rule, blocks, world, &
         & system%body, owner, error)
       if (allocated(error)) return
       call make_family(scene, rule, choice, system, error)
@@ -257,6 +282,18 @@ contains
       call timer%stop('time step')
     end associate
   end subroutine prepare
+
+  !> An error is set if ranks have more points together than the first one can write.
+  subroutine check_number(scene, points, error)
+    type(scene_type), intent(in) :: scene
+    integer(i8), intent(in) :: points  !! of all ranks
+    type(error_type), allocatable, intent(out) :: error
+
+    if (points <= huge(0)) return
+    call scene_fault(error, scene, 'body', 1, 'points', 'the scene has '//to_text(points)// &
+      & ' points; results can have at most '//to_text(huge(0)), &
+      & 'the first rank, which writes them, numbers them with 32 bits')
+  end subroutine check_number
 
   !> An error is set if the generic pass cannot serve what a scene asks for.
   subroutine check_laws(scene, system, error)

@@ -9,6 +9,7 @@ module pd_set_up_ranks
   use pd_body_body, only: body_type
   use pd_body_division, only: divide_space, division_type, take_part, work_of_points
   use pd_body_lattices, only: coordinate
+  use pd_body_windows, only: begin_work, make_part, survey_type, work_of_windows
   use pd_comm_world, only: world_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_volume, only: reach, volume_rule_type
@@ -16,8 +17,8 @@ module pd_set_up_ranks
   use pd_scene_content_types, only: has_refinement, scene_type, is_set
   implicit none (type, external)
   private
-  public :: check_ranks, divide_body, find_lowest, work_of_body, join_ranks, bonds_of_ranks, &
-    & broken_bonds, reproducible_layer
+  public :: check_ranks, divide_body, divide_survey, find_lowest, work_of_body, join_ranks, &
+    & bonds_of_ranks, broken_bonds, reproducible_layer
 
   character(*), parameter :: one_rank = 'on one rank it can'
 
@@ -112,25 +113,58 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(work_of_points) :: work
     type(division_type) :: division
-    integer :: i
-    real(wp) :: farthest
 
     call work_of_body(body, blocks, work)
     call divide_space(work, world%ranks, division)
-    i = minloc(division%work, dim=1) - 1
-    if (.not. division%work(i) > 0.0_wp) then
-      call scene_fault(error, scene, 'body', 1, 'points', 'the scene has too few points for '// &
-        & to_text(world%ranks)//' ranks: rank '//to_text(i)//' would have none', &
-        & 'use fewer ranks')
-      return
-    end if
-    farthest = 0.0_wp
-    do i = 1, body%n_points
-      farthest = max(farthest, reach(rule, body%spacing(i), body%dim))
-    end do
-    call take_part(division, world%rank, farthest, body, owner)
+    call check_division(scene, division, error)
+    if (allocated(error)) return
+    call take_part(division, world%rank, reach(rule, body%largest_spacing, body%dim), body, owner)
     body%order%ranks => world
   end subroutine divide_body
+
+  !> Make the points of this rank and copies of others, without all points. An error if some rank
+  !> would have no point.
+  subroutine divide_survey(scene, rule, blocks, world, survey, body, owner, error)
+    type(scene_type), intent(in), target :: scene
+    type(volume_rule_type), intent(in) :: rule     !! how far bonds reach
+    integer, intent(in) :: blocks                  !! as in `divide_body`
+    type(world_type), intent(inout), target :: world
+    type(survey_type), intent(in), target :: survey  !! of the points of all ranks
+    type(body_type), intent(out) :: body           !! in point order
+    integer, allocatable, intent(out) :: owner(:)  !! rank that owns each copy, from 0
+    type(error_type), allocatable, intent(out) :: error
+    type(work_of_windows) :: work
+    type(division_type) :: division
+    integer :: g
+
+    call begin_work(scene, survey, blocks, work)
+    call divide_space(work, world%ranks, division)
+    call check_division(scene, division, error)
+    if (allocated(error)) return
+    call make_part(scene, survey, division, world%rank, reach(rule, survey%none%largest_spacing, &
+      & survey%none%dim), body, owner)
+    body%order%ranks => world
+    body%order%reproducible = world%reproducible
+    if (.not. world%reproducible) return
+    do g = 1, size(body%grids)
+      if (survey%highest(1, g) >= survey%lowest(1, g)) &
+        & body%grids(g)%lowest = survey%lowest(:body%dim, g)
+    end do
+  end subroutine divide_survey
+
+  !> An error if some rank would have no point.
+  subroutine check_division(scene, division, error)
+    type(scene_type), intent(in) :: scene
+    type(division_type), intent(in) :: division
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i
+
+    i = minloc(division%work, dim=1) - 1
+    if (division%work(i) > 0.0_wp) return
+    call scene_fault(error, scene, 'body', 1, 'points', 'the scene has too few points for '// &
+      & to_text(division%ranks)//' ranks: rank '//to_text(i)//' would have none', &
+      & 'use fewer ranks')
+  end subroutine check_division
 
   !> Note where each grid begins, so that blocks and slabs of lattices are the same on all ranks.
   subroutine find_lowest(body)

@@ -2,6 +2,7 @@
 module pd_output_report_after
   use pd_base_kinds, only: wp, i8
   use pd_base_reduce, only: count_of_ranks, largest_of_ranks, largest_over
+  use pd_base_system, only: peak_memory
   use pd_base_text, only: counted, line => labelled_line, newline, to_text, with_unit
   use pd_motion_system, only: system_type
   use pd_output_report_recorder, only: recorder_type
@@ -69,8 +70,8 @@ contains
     real(wp), intent(in) :: seconds        !! of all of them [s]
     character(*), intent(in) :: unit       !! what a step is called
     character(:), allocatable :: text
-    real(wp) :: sharing, summing
-    integer(i8) :: bytes, messages
+    real(wp) :: sharing, summing, largest
+    integer(i8) :: bytes, messages, memory
 
     associate (order => system%body%order)
       bytes = count_of_ranks(order, order%ranks%bytes)
@@ -83,6 +84,10 @@ contains
         & //line('sums', to_text(real(order%ranks%sums, wp)/steps, 3)//' over all ranks a '// &
         & unit//', '//to_text(100*summing/max(seconds, tiny(seconds)), 2)// &
         & ' % of the time with waiting')
+      memory = count_of_ranks(order, peak_memory())
+      largest = largest_of_ranks(order, real(peak_memory(), wp))
+      if (memory > 0_i8) text = text//line('peak memory', 'of the rank with the most '// &
+        & with_unit(largest, 'B', 4)//', of all '//with_unit(real(memory, wp), 'B', 4))
     end associate
   end function messages_of
 

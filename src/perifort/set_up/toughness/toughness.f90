@@ -29,7 +29,7 @@ contains
   !> cannot be had the formula's stays, and a note tells why.
   subroutine set_critical_by_lattice(scene, body, delta, materials, laws, notes)
     type(scene_type), intent(in) :: scene                !! a checked scene
-    type(body_type), intent(in) :: body                  !! its points
+    type(body_type), intent(in) :: body                  !! knows the spacings of its points
     real(wp), intent(in) :: delta                        !! horizon [m]
     type(material_type), intent(inout) :: materials(:)   !! (materials) with s_c of the formula
     type(law_item_type), intent(inout) :: laws(:)        !! (materials) that have these materials
@@ -65,7 +65,7 @@ contains
     else if (any(body%grid == 0)) then
       reason = 'some points are a cloud'
     else
-      spacing = maxval(body%spacing)
+      spacing = body%largest_spacing
       subject%dim = scene%header%dimension
       subject%plane_strain = subject%dim == 2 .and. scene%header%plane == 'strain'
       subject%rule = volume_rule_type(volume_rule_number(trim(scene%horizon%volume_correction)), &
@@ -73,7 +73,7 @@ contains
       subject%corrected = scene%horizon%surface_correction /= 'none'
       ! lattices with horizons of their own are all alike in spacings
       if (.not. has_own_horizons(scene) .and. &
-        & spacing - minval(body%spacing) > same_spacing*spacing) then
+        & spacing - body%least_spacing > same_spacing*spacing) then
         reason = 'spacings differ'
       else if (subject%rule%delta > longest(subject%dim)) then
         reason = 'the lattice is solved for horizons of at most '// &
