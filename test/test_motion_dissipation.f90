@@ -13,11 +13,13 @@ module test_motion_dissipation
   use comparisons, only: max_abs
   use testdrive, only: error_type, new_unittest, unittest_type, test_failed
   use bodies, only: box_scene, expect, expect_true, ready, text_of
+  use runs, only: ready_text
   implicit none (type, external)
   private
   public :: collect_motion_dissipation
 
   real(wp), parameter :: spacing = 1.0e-3_wp
+  character(*), parameter :: nl = new_line('a')
   character(7), parameter :: families(2) = [character(7) :: 'lattice', 'list']
   character(13), parameter :: orders(2) = [character(13) :: 'before_forces', 'after_forces']
   character(16), parameter :: integrators(5) = [character(16) :: 'forward_backward', &
@@ -45,6 +47,7 @@ contains
       & test_integrators), &
       & new_unittest('a bond that breaks at the start loses its energy at fixed displacements', &
       & test_start), &
+      & new_unittest('what breaks by cooling loses the work of the temperature', test_cooling), &
       & new_unittest('the same bits on any number of threads', test_threads)]
   end subroutine collect_motion_dissipation
 
@@ -259,6 +262,60 @@ contains
         & 1.0e-12_wp*energies%strain, 'energies after and before, '//trim(integrators(i)))
     end do
   end subroutine test_start
+
+  !> A body whose points are held cools until all bonds have broken: nothing moves, so that they
+  !> lose the work of the temperature, by steps of any length, integrators and orders, with the
+  !> chapter's laws and one on the generic pass.
+  subroutine test_cooling(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: models(3) = [character(11) :: 'state_based', 'bond_based', &
+      & 'generic']
+    character(*), parameter :: keys = ' youngs_modulus = 2e9 density = 1200 '// &
+      & 'critical_stretch = 1e-2 thermal_expansion = 2e-5'
+    character(*), parameter :: body = '&body lower = 0, 0 upper = 8e-3, 5e-3 points = 8, 5 /'//nl
+    character(*), parameter :: other = &
+      & "&body lower = 8e-3, 0 upper = 12e-3, 5e-3 points = 4, 5 material = 'B' /"//nl// &
+      & "&material name = 'B' influence = 'constant' poissons_ratio = 0.2"//keys//' /'//nl
+    character(:), allocatable :: text
+    type(set_up_type) :: set_up
+    type(balance_type) :: balance
+    type(fault_type), allocatable :: fault
+    integer :: i, o, m
+
+    do m = 1, size(models)
+      text = '&scene dimension = 2 thickness = 1e-3 /'//nl
+      select case (models(m))
+      case ('state_based')
+        text = text//body//'&material poissons_ratio = 0.2'//keys//' /'//nl
+      case ('bond_based')
+        text = text//body//"&material model = 'bond_based'"//keys//' /'//nl
+      case default
+        ! two influence functions in one body
+        text = text//body(:len(body) - 2)//"material = 'A' /"//nl// &
+          & "&material name = 'A' poissons_ratio = 0.2"//keys//' /'//nl//other
+      end select
+      text = text//"&region name = 'all' shape = 'box' lower = -1, -1 /"//nl// &
+        & "&boundary region = 'all' displacement_x = 0 displacement_y = 0 /"//nl// &
+        & '&initial temperature_change = -1000 ramp_time = 1e-5 /'//nl
+      do i = 1, size(integrators)
+        do o = 1, size(orders)
+          call ready_text(text//"&time integrator = '"//trim(integrators(i))//"' breaking = '"// &
+            & trim(orders(o))//"' step = 1.3e-7 steps = 80 /"//nl, set_up, error)
+          if (allocated(error)) return
+          call expect_true(error, set_up%system%model%generic .eqv. models(m) == 'generic', &
+            & 'not the pass that is to be tested')
+          balance = balance_type()
+          call run_explicit(set_up%system, trim(integrators(i)), 1.3e-7_wp, 80, balance, fault)
+          if (allocated(fault)) call test_failed(error, fault%message)
+          if (allocated(error)) return
+          call expect_true(error, balance%broken(81) == balance%broken(79) &
+            & .and. balance%broken(81) > 200, 'bonds do not break one after another')
+          call expect(error, balance%gap(81), 0.0_wp, 1.0e-12_wp*set_up%system%dissipated, &
+            & 'balance, '//trim(models(m))//' '//trim(integrators(i))//' '//trim(orders(o)))
+        end do
+      end do
+    end do
+  end subroutine test_cooling
 
   subroutine test_threads(error)
     type(error_type), allocatable, intent(out) :: error

@@ -457,6 +457,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: no = '&time substeps do not serve '
     character(:), allocatable :: text, other
+    type(set_up_type) :: set_up
     integer :: i
 
     text = refined(2, 1, 0.2_wp, fast//'steps = 5')
@@ -475,6 +476,13 @@ contains
     call refuse(error, text(:i - 1)//'thermal_expansion = 1e-5 '//text(i:)// &
       & '&initial temperature_change = 1.0 ramp_time = 3.0 /'//line, &
       & no//'a temperature that varies in time')
+    other = text(:i - 1)//'critical_stretch = 1e-3 '//text(i:)// &
+      & "&region name = 'all' shape = 'box' lower = -1, -1 /"//line
+    call refuse(error, other//"&boundary region = 'all' velocity_x = 1.0 /"//line, &
+      & no//'moved points whose bonds take substeps and can break')
+    call ready_text(other//"&boundary region = 'all' velocity_x = 0.0 /"//line, set_up, error)
+    call ready_text(other//"&boundary region = 'all' velocity_x = 1.0 /"//line// &
+      & "&no_fail region = 'all' /"//line, set_up, error)
     call refuse(error, text//"&horizon family = 'list' /"//line, &
       & no//'a scene without lattices that a list joins|asked for')
     i = index(text, '&refine')

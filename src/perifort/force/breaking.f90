@@ -49,7 +49,7 @@ contains
   !> the stretches and dilatations under `u` and under that set in place of the squares
   !> (doc/theory.md, 9).
   subroutine break_bonds(body, family, model, u, slots, damage, broken, dissipated, others, &
-    & products, laws, part, level)
+    & products, laws, part, level, expansions)
     type(body_type), intent(in) :: body          !! its volumes [m3]
     class(family_type), intent(inout) :: family  !! with the bonds broken at both ends on return
     type(model_type), intent(in) :: model        !! limits of the bonds, and the strain energy
@@ -69,6 +69,8 @@ contains
       !! of its limit, beyond which a bond breaks; 1 by default [-]
     integer, intent(in), optional :: level
       !! of substeps: bonds of this level alone break; all by default
+    real(wp), intent(in), optional :: expansions(:, :)
+      !! (n_slots, sets) thermal strains with each set of `others`; those of the model by default [-]
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:), after(:)
     logical, allocatable :: gone(:)
@@ -91,7 +93,7 @@ contains
     together = family%bytes_are_shared()
     !$omp parallel default(none) &
     !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
-    !$omp shared(of_limit, only) &
+    !$omp shared(of_limit, only, expansions) &
     !$omp firstprivate(before, after) private(bonds, gone, g, m, k, i, breaks) if(.not. together)
     call allocate_bonds(family, bonds)
     allocate (gone(family%most_bonds))
@@ -111,13 +113,13 @@ contains
         end do
         if (number(m) == 0) cycle
         if (model%generic) then
-          call energies(family, model, laws, u, k, before, others)
+          call energies(family, model, laws, u, k, before, others, expansions)
           call family%bonds_of(k, bonds)
           call refresh_slot(k, bonds, laws)
-          call energies(family, model, laws, u, k, after, others)
+          call energies(family, model, laws, u, k, after, others, expansions)
           damage(k) = generic_point_damage(family, model, laws, u, k, bonds)
         else
-          call energies_of_loss(model, u, k, bonds, gone, before, after, others)
+          call energies_of_loss(model, u, k, bonds, gone, before, after, others, expansions)
           call family%bonds_of(k, bonds)
           damage(k) = point_damage(bonds)
         end if
@@ -141,7 +143,7 @@ contains
 
   !> Energy density of slot `k` by the generic pass [J/m3]: as it is, and with the products of each
   !> set of `others`.
-  pure subroutine energies(family, model, laws, u, k, density, others)
+  pure subroutine energies(family, model, laws, u, k, density, others, expansions)
     class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
     type(generic_workspace_type), intent(in), optional :: laws
@@ -149,12 +151,18 @@ contains
     integer, intent(in) :: k
     real(wp), intent(out) :: density(0:)               !! (0:sets) [J/m3]
     real(wp), intent(in), optional :: others(:, :, :)  !! (n_slots, dim, sets) [m]
+    real(wp), intent(in), optional :: expansions(:, :)  !! (n_slots, sets) [-]
     integer :: o
 
     if (.not. present(laws)) call internal_fault('bonds of laws break without their history')
     density(0) = generic_point_energy(family, model, laws, u, k)
     do o = 1, ubound(density, 1)
-      density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k)
+      if (present(expansions)) then
+        density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k, &
+          & expansions(:, o))
+      else
+        density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k)
+      end if
     end do
   end subroutine energies
 

@@ -23,12 +23,14 @@ module pd_force_reference
 contains
 
   !> State of the `i`-th bond of slot `k` under displacements `u` (n_slots, dim) [m].
-  pure function state_of_bond(model, u, k, bonds, i) result(state)
+  pure function state_of_bond(model, u, k, bonds, i, expansion) result(state)
     type(model_type), intent(in) :: model  !! parameters of the slots
     real(wp), intent(in) :: u(:, :)        !! (n_slots, dim) displacements [m]
     integer, intent(in) :: k               !! slot
     type(bonds_type), intent(in) :: bonds  !! of slot `k`
     integer, intent(in) :: i               !! number of the bond, from 1
+    real(wp), intent(in), optional :: expansion(:)
+      !! (n_slots) thermal strains; those of the model by default [-]
     type(bond_state_type) :: state
     real(wp) :: n(3), deformed(3), length, y, gb, gd
     integer :: dim, j
@@ -41,7 +43,11 @@ contains
     ! a bond crushed to a point has no direction: no force rather than NaN
     if (y > 0.0_wp) state%direction = deformed/y
     if (model%projected) state%lambda = dot_product(state%direction(:dim), n(:dim))
-    if (model%thermal) state%stretch = state%stretch - (model%expansion(k) + model%expansion(j))/2
+    if (present(expansion)) then
+      state%stretch = state%stretch - (expansion(k) + expansion(j))/2
+    else if (model%thermal) then
+      state%stretch = state%stretch - (model%expansion(k) + model%expansion(j))/2
+    end if
     if (model%surface) then
       state%Gd = bond_factor(n(:dim), model%D(k, :), model%D(j, :), model%axes)
       state%Gb = bond_factor(n(:dim), model%S(k, :), model%S(j, :), model%axes)
@@ -178,7 +184,7 @@ contains
 
   !> Energy densities of slot `k` [J/m3] before and after some of its bonds break: `energy_product`
   !> of `u` with itself, and with each set of `others`. Each bond's states are found once.
-  pure subroutine energies_of_loss(model, u, k, bonds, breaks, before, after, others)
+  pure subroutine energies_of_loss(model, u, k, bonds, breaks, before, after, others, expansions)
     type(model_type), intent(in) :: model              !! parameters of the slots
     real(wp), intent(in) :: u(:, :)                    !! displacements (n_slots, dim) [m]
     integer, intent(in) :: k                           !! slot
@@ -187,6 +193,8 @@ contains
     real(wp), intent(out) :: before(0:), after(0:)     !! (0:sets) [J/m3]
     real(wp), intent(in), optional :: others(:, :, :)
       !! (n_slots, dim, sets) other displacements, read at `k` and at the ends of its bonds [m]
+    real(wp), intent(in), optional :: expansions(:, :)
+      !! (n_slots, sets) thermal strains with each of them; those of the model by default [-]
     type(bond_state_type) :: own, state
     real(wp) :: theta(2, 0:ubound(before, 1)), energy, dilatation
     integer :: i, o
@@ -199,7 +207,11 @@ contains
       own = state_of_bond(model, u, k, bonds, i)
       state = own
       do o = 0, ubound(before, 1)
-        if (o > 0) state = state_of_bond(model, others(:, :, o), k, bonds, i)
+        if (o > 0 .and. present(expansions)) then
+          state = state_of_bond(model, others(:, :, o), k, bonds, i, expansions(:, o))
+        else if (o > 0) then
+          state = state_of_bond(model, others(:, :, o), k, bonds, i)
+        end if
         energy = own%Gb*(own%stretch*state%stretch)*bonds%length(i)*bonds%weight(i)
         dilatation = state%Gd*state%stretch*state%lambda*bonds%weight(i)
         before(o) = before(o) + energy

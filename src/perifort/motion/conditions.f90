@@ -12,7 +12,7 @@ module pd_motion_conditions
   use pd_motion_pose, only: pose_type, arm_of, displacement_of, keep_pose, spin_of, spin_rate_of
   implicit none (type, external)
   private
-  public :: motion_type, free_component, moved_by_displacement, moved_by_velocity, impose, &
+  public :: motion_type, free_component, moved_by_displacement, moved_by_velocity, impose, moves, &
     & remember_start, vary_in_time, advance_paths, keep_paths, accelerations_of, renew_motions, &
     & condition_fault, note_fault, guide, keep_poses
 
@@ -63,6 +63,20 @@ module pd_motion_conditions
   end type motion_type
 
 contains
+
+  !> Whether a motion imposes any other displacement or velocity than 0 on some component.
+  pure logical function moves(motion)
+    type(motion_type), intent(in) :: motion  !! of some points
+    integer :: c
+
+    moves = .false.
+    do c = 1, size(motion%kind)
+      if (motion%kind(c) == free_component) cycle
+      moves = moves .or. motion%by_time(c) .or. abs(motion%amplitude(c)) > 0.0_wp
+      if (.not. allocated(motion%profile)) cycle
+      if (c <= size(motion%profile, 2)) moves = moves .or. any(abs(motion%profile(:, c)) > 0.0_wp)
+    end do
+  end function moves
 
   !> Keep the displacements at t = 0, from which imposed velocities integrate.
   pure subroutine remember_start(motions, u)

@@ -12,7 +12,7 @@ module pd_motion_heating
   use pd_motion_curve, only: curve_type
   implicit none (type, external)
   private
-  public :: heating_type, new_heating, heat, apply_factors, keep_heating, largest_expansion
+  public :: heating_type, new_heating, heat, heat_at, apply_factors, keep_heating, largest_expansion
   public :: timed_heat_type, new_timed_heat, apply_rate, is_timed, heating_fault
 
   real(wp), parameter :: small = 1.0e-3_wp  !! thermal strain over which energies are compared [-]
@@ -69,16 +69,33 @@ contains
     real(wp), intent(in) :: t                    !! [s]; in relaxation 0 to 1 over the load steps
     real(wp), intent(inout) :: expansion(:)      !! alpha dT of each slot [-]
     real(wp) :: factors(size(heating%curves))
+
+    factors = factors_at(heating, t)
+    if (all(abs(factors - heating%factors) <= 0.0_wp)) return
+    heating%factors = factors
+    call apply_factors(heating, factors, expansion)
+  end subroutine heat
+
+  !> Thermal strains of another time; the present ones stay.
+  subroutine heat_at(heating, t, expansion)
+    type(heating_type), intent(in) :: heating    !! whose courses vary
+    real(wp), intent(in) :: t                    !! [s]
+    real(wp), intent(inout) :: expansion(:)      !! alpha dT of each slot: of any time, then of `t`
+    call apply_factors(heating, factors_at(heating, t), expansion)
+  end subroutine heat_at
+
+  !> The factors of the courses at time `t` [-]; of those that are expressions the time [s].
+  pure function factors_at(heating, t) result(factors)
+    type(heating_type), intent(in) :: heating
+    real(wp), intent(in) :: t
+    real(wp) :: factors(size(heating%curves))
     integer :: i
 
     do i = 1, size(factors)
       factors(i) = heating%curves(i)%value(t)
       if (is_timed(heating, i)) factors(i) = t
     end do
-    if (all(abs(factors - heating%factors) <= 0.0_wp)) return
-    heating%factors = factors
-    call apply_factors(heating, factors, expansion)
-  end subroutine heat
+  end function factors_at
 
   !> Thermal strains under given factors of the courses.
   subroutine apply_factors(heating, factors, expansion)

@@ -21,7 +21,7 @@ module pd_motion_system
     & condition_fault, renew_motions
   use pd_motion_loads, only: load_type, number_of_loads, load_of, acts_along, density_of, &
     & renew_load
-  use pd_motion_heating, only: heating_type, heat, heating_fault
+  use pd_motion_heating, only: heating_type, heat, heat_at, heating_fault
   use pd_motion_memory, only: memory_type
   use pd_motion_pose, only: fit_pose, moments_about, new_pose
   use pd_motion_rigid_body, only: rigid_body_type
@@ -87,6 +87,7 @@ module pd_motion_system
     real(wp) :: offset = 0.0_wp  !! from the present instant to the other one [s]
     real(wp) :: kick = 0.0_wp    !! 0 where the accelerations a of the present are not known yet [s]
     real(wp) :: held = 0.0_wp    !! the offset that the work of imposed motion implies [s]
+    real(wp) :: heat = 0.0_wp    !! the offset that the work of temperatures implies [s]
   end type pairing_type
 
   !> Points of a load from which on threads share it.
@@ -377,7 +378,7 @@ contains
     type(pairing_type), intent(in) :: pairing          !! for their energy
     integer(i4), allocatable, intent(out) :: slots(:)  !! those that lost some, ascending
     integer, intent(in), optional :: level             !! of substeps: bonds of this level alone
-    real(wp), allocatable :: others(:, :, :), products(:)
+    real(wp), allocatable :: others(:, :, :), expansions(:, :), products(:)
     real(wp) :: dissipated
     integer(i8) :: broken
     integer :: m
@@ -386,16 +387,18 @@ contains
     if (present(level)) slots = pack(slots, [(system%family%has_level(int(slots(m)), level), &
       & m=1, size(slots))])
     if (size(slots) == 0 .and. .not. associated(system%body%order%ranks)) return
-    if (abs(pairing%offset) > 0.0_wp .or. abs(pairing%held) > 0.0_wp) then
+    if (any(abs([pairing%offset, pairing%held, pairing%heat]) > 0.0_wp)) then
       call displacements_at(system, t, pairing, slots, others)
+      call expansions_at(system, t, pairing, size(others, 3), expansions)
       allocate (products(size(others, 3)))
+      ! not allocated is not present
       call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
         & system%state%damage, broken, dissipated, others, products, system%workspace%generic, &
-        & level=level)
+        & level=level, expansions=expansions)
       ! what bonds that break after the forces still do, they do in the step to come
       system%dissipation_due = system%dissipation_due + (products(1) - dissipated)
-      ! the trapezoidal rule lets bonds pull at constrained points up to half a step before or after
-      ! the present, whatever the integrator does
+      ! the trapezoidal rule lets bonds pull at constrained points, and temperatures act on them, up
+      ! to half a step before or after the present, whatever the integrator does
       if (size(products) > 1) system%work_due = system%work_due + (products(1) - products(2))
       if (.not. system%break_late) call settle_account(system)
     else
@@ -415,8 +418,8 @@ contains
     system%work_due = 0.0_wp
   end subroutine settle_account
 
-  !> Displacements of the other instant of a pairing; where the work of constrained components is
-  !> summed with another offset, these in a second set. They are made only where they are needed, at
+  !> Displacements of the other instant of a pairing; where the work of constrained components or
+  !> temperatures is summed with another offset, these in a second set. They are made only where they are needed, at
   !> `slots` and at the ends of their bonds: the rest of `others` is left as it is allocated, so
   !> that a step in which few bonds break pays for these alone.
   subroutine displacements_at(system, t, pairing, slots, others)
@@ -431,6 +434,8 @@ contains
     integer :: m, i
 
     two = size(system%motions) > 0 .and. abs(pairing%offset - pairing%held) > 0.0_wp
+    two = two .or. (allocated(system%heating%curves) &
+      & .and. abs(pairing%offset - pairing%heat) > 0.0_wp)
     allocate (others(size(system%state%u, 1), size(system%state%u, 2), merge(2, 1, two)))
     if (abs(pairing%kick) > 0.0_wp .and. system%terms%outside > 0) then
       allocate (loads(size(others, 1), size(others, 2)), source=0.0_wp)
@@ -477,6 +482,21 @@ contains
     end subroutine fill
 
   end subroutine displacements_at
+
+  !> Thermal strains of the other instant, with each set of displacements; not allocated where the
+  !> temperature is constant.
+  subroutine expansions_at(system, t, pairing, sets, expansions)
+    type(system_type), intent(in) :: system
+    real(wp), intent(in) :: t                             !! of the present displacements [s]
+    type(pairing_type), intent(in) :: pairing
+    integer, intent(in) :: sets                           !! 1 or 2
+    real(wp), allocatable, intent(out) :: expansions(:, :)  !! (n_slots, sets) [-]
+
+    if (.not. allocated(system%heating%curves)) return
+    expansions = spread(system%model%expansion, 2, sets)
+    call heat_at(system%heating, t + pairing%offset, expansions(:, 1))
+    if (sets > 1) call heat_at(system%heating, t + pairing%heat, expansions(:, 2))
+  end subroutine expansions_at
 
   !> Dilatation of some slots again, after they lost bonds.
   subroutine renew_dilatation(system, slots)

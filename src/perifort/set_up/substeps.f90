@@ -4,6 +4,9 @@ module pd_set_up_substeps
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
   use pd_family_composite, only: composite_family_type
+  use pd_family_family, only: allocate_bonds, bonds_type
+  use pd_force_model, only: no_fail
+  use pd_motion_conditions, only: moves
   use pd_motion_loads, only: number_of_loads
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: scene_fault
@@ -89,6 +92,13 @@ contains
       system%workspace%lattice%due(2) = int(maxval(level) + 1, kind(system%workspace%lattice%due))
       system%levels = maxval(level)
       allocate (system%beyond(family%n_slots, family%dim), source=0.0_wp)
+      i = torn_grip(system, family)
+      if (i > 0) then
+        call refuse('boundary', i, '', 'moved points whose bonds take substeps and can break', &
+          & 'the work of what moves them is counted in whole steps; put them into a &no_fail zone, '// &
+          & 'or let cells become finer elsewhere')
+        return
+      end if
     class default
       call refuse('time', 1, 'substeps', 'a scene without lattices that a list joins', &
         & 'they need &refine or lattices of different spacings that bonds join; the scene has '// &
@@ -104,6 +114,33 @@ contains
     end subroutine refuse
 
   end subroutine arrange_substeps
+
+  !> Number of the first motion that moves a point of which a bond with substeps can break; 0 if
+  !> there is none.
+  integer function torn_grip(system, family) result(number)
+    type(system_type), intent(in) :: system
+    type(composite_family_type), intent(in) :: family  !! its family, with levels
+    type(bonds_type) :: bonds
+    integer :: i, j, k, m
+
+    number = 0
+    if (.not. system%model%breaking) return
+    call allocate_bonds(family, bonds)
+    do m = 1, size(system%motions)
+      if (.not. moves(system%motions(m))) cycle
+      do i = 1, size(system%motions(m)%slots)
+        k = system%motions(m)%slots(i)
+        if (system%model%critical(k) <= no_fail) cycle
+        call family%bonds_of(k, bonds)
+        do j = 1, bonds%n
+          if (.not. bonds%intact(j) .or. system%model%critical(bonds%j(j)) <= no_fail) cycle
+          if (family%level_of_bond(k, int(bonds%j(j))) == 0) cycle
+          number = m
+          return
+        end do
+      end do
+    end do
+  end function torn_grip
 
   !> The bound of each point's stiffness for the step of level 0 (doc/theory.md, 5): a point of
   !> level n, whose steps are 2^n times as short, may be 4^n times as stiff.

@@ -35,8 +35,8 @@ contains
   !> The strain energy density of one slot with the products of the stretches under `u` and `other`
   !> in place of their squares; of laws with a history, whose energy is no form of the stretches
   !> alone, that under `u` [J/m3].
-  pure real(wp) function generic_energy_product(family, model, workspace, u, other, k) &
-    & result(energy)
+  pure real(wp) function generic_energy_product(family, model, workspace, u, other, k, &
+    & expansion) result(energy)
     class(family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model        !! with its laws
     type(generic_workspace_type), intent(in) :: workspace  !! with the history
@@ -44,6 +44,8 @@ contains
     real(wp), intent(in), contiguous :: other(:, :)
       !! (n_slots, dim) displacements of another instant [m]
     integer, intent(in) :: k                     !! slot
+    real(wp), intent(in), optional :: expansion(:)
+      !! (n_slots) thermal strains with `other`; those of the model by default [-]
     type(law_bonds_type) :: seen
     real(wp), allocatable :: stretch(:), stretch_of_other(:)
     integer :: n
@@ -57,6 +59,12 @@ contains
       call new_law_bonds(family, model, seen)
       call gather_bonds(model, options_of(model), workspace, other, k, seen)
       stretch_of_other = seen%stretch(:n)
+      if (present(expansion)) then
+        associate (member => workspace%member(workspace%start(k):workspace%start(k + 1) - 1))
+          stretch_of_other = stretch_of_other + (model%expansion(k) - expansion(k) &
+            & + model%expansion(member) - expansion(member))/2
+        end associate
+      end if
       call gather_bonds(model, options_of(model), workspace, u, k, seen)
       stretch = seen%stretch(:n)
       ! Q(a, b) = Q((a + b)/2) - Q((a - b)/2) of a quadratic form Q

@@ -224,6 +224,8 @@ contains
     end select
     pairing%offset = 2*part*dt
     if (n > 0) pairing%held = -dt
+    ! the energy that temperatures change is that of the bonds which are left
+    pairing%heat = pairing%held
     if (.not. late) return
     pairing%held = dt
     ! the accelerations are known then: velocities are brought to the middle of the way
