@@ -55,6 +55,7 @@ module test_ranks
     procedure :: take_largest
     procedure :: share
     procedure :: collect
+    procedure :: deal
     procedure :: number_before
   end type fake_type
 
@@ -142,6 +143,26 @@ contains
     end if
     !$omp barrier
   end subroutine collect
+
+  subroutine deal(self, values, given, got)
+    class(fake_type), intent(inout) :: self
+    real(wp), intent(in) :: values(:)
+    integer, intent(in) :: given(:)
+    real(wp), allocatable, intent(out) :: got(:)
+    integer :: r, at
+
+    self%hub%of_rank(self%rank)%values = values
+    self%hub%of_rank(self%rank)%field = reshape(real(given, wp), [size(given), 1])
+    !$omp barrier
+    allocate (got(0))
+    do r = 1, size(self%hub%of_rank)
+      associate (all_given => nint(self%hub%of_rank(r)%field(:, 1)))
+        at = sum(all_given(:self%rank - 1))
+        got = [got, self%hub%of_rank(r)%values(at + 1:at + all_given(self%rank))]
+      end associate
+    end do
+    !$omp barrier
+  end subroutine deal
 
   integer(i8) function number_before(self, number) result(before)
     class(fake_type), intent(inout) :: self
