@@ -5,7 +5,8 @@ submodule(pd_comm_world) messages
   use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Alltoall, MPI_Alltoallv, MPI_Barrier, &
     & MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, MPI_Exscan, &
     & MPI_Finalize, &
-    & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_INFO_NULL, MPI_Init_thread, MPI_Initialized, &
+    & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_INFO_NULL, MPI_Init_thread, &
+    & MPI_Initialized, &
     & MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, MPI_Isend, MPI_MAX, MPI_Request, MPI_STATUSES_IGNORE, &
     & MPI_SUM, MPI_THREAD_FUNNELED, MPI_Waitall
   use pd_base_error, only: internal_fault

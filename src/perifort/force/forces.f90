@@ -109,7 +109,7 @@ contains
         end do
         return
       end if
-    class default  ! sums over lists depend on the ranks
+    class default  ! formulas of lists do not depend on the ranks where they must not
       continue
     end select
     call share_halo(body, p)

@@ -56,7 +56,7 @@ contains
     end do
     allocate (workspace%large(size(family%start) - 1), source=little)
     call survey(family, model, workspace)
-    call make_tables(family, model, workspace)
+    if (.not. family%fixed_order) call make_tables(family, model, workspace)
   end subroutine prepare_list
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
@@ -183,7 +183,7 @@ contains
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
       call take_given(workspace, work)
-      if (options%thermal .or. model%weighted .or. model%consistent) then
+      if (options%thermal .or. model%weighted .or. model%consistent .or. family%fixed_order) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
             & .true., work)
@@ -244,6 +244,11 @@ contains
     type(task_type) :: task
     logical :: missed
 
+    ! which of the loops serves a cluster depends on all of its points, and they on the ranks
+    if (family%fixed_order) then
+      strain = beyond
+      return
+    end if
     task = loops%task
     if (workspace%stored(work%cluster) == 0_i8) &
       & call plain_task(family, model, options, workspace, work%cluster, task)

@@ -40,7 +40,8 @@ contains
     type(volume_rule_type), intent(in) :: rule  !! volume correction and horizon
     type(body_type), intent(in) :: body         !! in point order, with all points
     type(law_item_type), intent(in) :: laws(:)  !! (materials) their bond laws
-    logical, intent(in) :: divided              !! several ranks will have parts of the body
+    logical, intent(in) :: divided              !! several ranks will have parts of the body, or may
+                                                !! have with the same results
     type(family_choice_type), intent(out) :: choice
     type(error_type), allocatable, intent(out) :: error
 
@@ -78,7 +79,7 @@ contains
 
     if (all(body%grid == 0)) return
     reason = ''
-    if (divided) reason = 'on several ranks'
+    if (divided) reason = 'on several ranks and with --reproducible'
     if (scene%horizon%surface_correction == 'consistent') &
       & reason = "surface_correction = 'consistent'"
     do i = 1, size(laws)

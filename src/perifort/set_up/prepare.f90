@@ -91,7 +91,7 @@ contains
     integer(i8) :: cut
     integer, allocatable :: owner(:)
     type(family_choice_type) :: choice
-    logical :: divided
+    logical :: divided, reproducible
     integer :: i, ranks
 
     ranks = 1
@@ -122,18 +122,14 @@ contains
 
       call timer%start('families')
       rule = rule_of_scene(scene, system%body, delta)
-      call choose_family(scene, rule, system%body, laws, divided, choice, error)
+      reproducible = .false.
+      if (present(world)) reproducible = world%reproducible
+      call choose_family(scene, rule, system%body, laws, divided .or. reproducible, choice, error)
       if (allocated(error)) return
-      if (present(world)) then
-        if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, &
-          & 'horizon', 1, 'family', '--reproducible needs lattice families: on lists forces '// &
-          & 'depend on the ranks in their last digits', choice%reason)
-        if (world%reproducible) call find_lowest(system%body)
-        system%body%order%reproducible = world%reproducible
-      end if
-      if (allocated(error)) return
+      if (reproducible) call find_lowest(system%body)
+      system%body%order%reproducible = reproducible
       if (divided) call divide_body(scene, rule, merge(reproducible_layer( &
-        & scene%header%precision == 'mixed'), 1, choice%regular .and. world%reproducible), world, &
+        & scene%header%precision == 'mixed'), 1, choice%regular .and. reproducible), world, &
         & system%body, owner, error)
       if (allocated(error)) return
       call make_family(scene, rule, choice, system, error)

@@ -22,6 +22,7 @@ module pd_output_results_hdf5
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   use pd_base_text, only: to_text
+  use pd_comm_world, only: find_handles
   use pd_output_results_files, only: set_environment
   use pd_output_results_together, only: access_together, can_write_together, write_together
   implicit none (type, external)
@@ -101,14 +102,20 @@ contains
     started = status == 0
   end subroutine start_hdf5
 
-  !> The version of the HDF5 library, such as 1.10.8, and whether it is a parallel one.
+  !> The version of the HDF5 library, such as 1.10.8; where there may be several ranks, also which
+  !> of them write with it.
   function hdf5_version() result(version)
     character(:), allocatable :: version
-    integer :: major, minor, release, status
+    integer :: major, minor, release, status, ranks, hints
 
     call h5get_libversion_f(major, minor, release, status)
     version = to_text(major)//'.'//to_text(minor)//'.'//to_text(release)
-    if (can_write_together()) version = version//', parallel'
+    call find_handles(ranks, hints)
+    if (can_write_together()) then
+      version = version//', parallel: all ranks write results'
+    else if (ranks >= 0) then
+      version = version//', serial: the first rank writes results'
+    end if
   end function hdf5_version
 
   !> Collect the reason from one entry of the error stack.

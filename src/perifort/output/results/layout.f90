@@ -227,7 +227,7 @@ contains
 
   !> In how many pieces rows are converted and written, so that every rank has as many writes.
   pure integer(i8) function pieces_of(most) result(pieces)
-    integer(i8), intent(in) :: most  !! rows of the rank that has most; of this one where it is alone
+    integer(i8), intent(in) :: most  !! rows of the rank that has most, where all ranks write
     pieces = (most + block_rows - 1)/block_rows
   end function pieces_of
 

@@ -13,10 +13,10 @@
 !> `close` none the less: it leaves the files as they were at the last complete output. Where there
 !> are none, the folder is removed again if `create` made it.
 !>
-!> Several ranks share the rows of the points (`pd_output_results_rows`), and all make the same calls,
-!> each with its own rows. The first one has the files. Rows of the HDF5 file are written by their
-!> ranks if the HDF5 library is a parallel one; else, and for `.vtu` files, the first rank gets them
-!> in turns, as many at a time as it has itself.
+!> Several ranks share the rows of the points (`pd_output_results_rows`), and all make the same
+!> calls, each with its own rows. The first one has the files. Rows of the HDF5 file are written by
+!> their ranks if the HDF5 library is a parallel one; else, and for `.vtu` files, the first rank
+!> gets them in turns, as many at a time as it has itself.
 !>
 !> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
 !> are the fields of the last output, and `answer` gives both.
@@ -86,7 +86,7 @@ module pd_output_results_results
     logical :: use_vtkhdf = .false., use_xdmf = .false., use_vtu = .false.
     logical :: use_surfaces = .false.
     logical :: together = .false.        !! all ranks write rows of the HDF5 file
-    logical :: hdf5_in_turns = .false.   !! the first rank writes those of all into the HDF5 file, ..
+    logical :: hdf5_in_turns = .false.   !! the first rank writes those of all into that file, ..
     logical :: vtu_in_turns = .false.    !! and into .vtu files
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
@@ -120,6 +120,7 @@ module pd_output_results_results
     procedure :: sync
     procedure :: kept => rows_and_times
     procedure :: resumes
+    procedure :: written_by
     procedure :: keep_outputs
     procedure :: answer
   end type results_type
@@ -192,8 +193,8 @@ contains
     self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
     allocate (self%of_points(0))
-    if (directory /= '' .and. self%rows%divided()) call share_files(self, directory, format, fields, &
-      & single)
+    if (directory /= '' .and. self%rows%divided()) call share_files(self, directory, format, &
+      & fields, single)
     if (self%use_vtu .or. self%rows%divided()) self%here = positions
     ! room for one output at least; whether there are too many shows with the file
     self%use_xdmf = self%use_vtkhdf .and. has_list(stem, format, fields, 1)
@@ -397,8 +398,8 @@ contains
     end if
   end subroutine put_rows_of_points
 
-  !> On several ranks, after the last `put_points` and before the first output: write what the points
-  !> are, unless the files go on from an earlier run.
+  !> On several ranks, after the last `put_points` and before the first output: write what the
+  !> points are, unless the files go on from an earlier run.
   subroutine settle(self, error)
     class(results_type), intent(inout) :: self  !! created
     type(error_type), allocatable, intent(out) :: error
@@ -955,6 +956,17 @@ contains
     class(results_type), intent(in) :: self  !! the results
     resumes = self%resumed
   end function resumes
+
+  !> Which ranks write the fields; '' where there is one, or no file.
+  pure function written_by(self) result(text)
+    class(results_type), intent(in) :: self  !! the results
+    character(:), allocatable :: text
+
+    text = ''
+    if (self%together) text = 'all ranks'
+    if (self%hdf5_in_turns .or. (self%vtu_in_turns .and. .not. self%together)) &
+      & text = 'the first rank'
+  end function written_by
 
   !> From now on keep the fields of each output in memory until the next one is complete.
   subroutine keep_outputs(self, positions)

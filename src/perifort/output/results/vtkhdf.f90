@@ -404,8 +404,9 @@ contains
     type(error_type), allocatable, intent(out) :: error
 
     call start_hdf5(error)
-    if (.not. allocated(error)) call open_file(self%path//trim(merge('     ', '.part', published)), &
-      & .true., self%shared, error, together=.true.)
+    if (allocated(error)) return
+    call open_file(self%path//trim(merge('     ', '.part', published)), .true., self%shared, &
+      & error, together=.true.)
   end subroutine open_shared
 
   !> Close the file on all ranks.
@@ -484,7 +485,8 @@ contains
     end associate
   end subroutine put_scalar
 
-  !> Write numbers from row `at` of a dataset on; `most`: of the rank that has most, where all write.
+  !> Write numbers from row `at` of a dataset on. `most`: rows of the rank that has most, where all
+  !> write.
   subroutine put_column(file, path, at, values, single, most, error)
     type(hdf5_file), intent(in) :: file
     character(*), intent(in) :: path
