@@ -46,6 +46,7 @@ SCENES = [
     ("block in motion", "trade/steps_block.nml", {}),
 ]
 LEFT_OUT = ("tip", "study")
+OF_BOTH = ("block", "plate")  # written as .vtu files, too
 SHORT = ("bar", "block", "plate", "hole", "failure", "crack", "glass", "mixed")
 # The same points as a list, whose sums depend on the ranks in the last digits: differences grow with
 # the steps, so the runs are short.
@@ -174,10 +175,13 @@ def compare_scenes(case, ranks):
         if case.options.short and name not in SHORT:
             continue
         path = case.write(name, origin, changes)
-        one = case.complete(path, 1, *ONE)
+        both = ("--set", "output%format='both'") if name in OF_BOTH else ()
+        one = case.complete(path, 1, *ONE, *both)
         for n in ranks:
-            other = case.complete(path, n, *ONE)
+            other = case.complete(path, n, *ONE, *both)
             case.equal(f"{name}: {n} ranks, the same bits", same_bits(one, other), True)
+            if name in OF_BOTH:
+                case.equal(f"{name}: {n} ranks, the same .vtu files", same_series(one, other), True)
         if name not in LISTS:
             continue
         path = case.write(name + " list", origin, {**changes, "horizon": {"family": "'list'"}}
@@ -222,6 +226,12 @@ def write_cloud(case, words):
         text = text.replace(word, value)
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def same_series(one, other):
+    """Whether two runs have the same `.vtu` files, at least two, and the same list of them."""
+    names = sorted(p.name for p in one.glob("*.vtu")) + [p.name for p in one.glob("*.pvd")]
+    return len(names) > 2 and all((one / n).read_bytes() == (other / n).read_bytes() for n in names)
 
 
 def difference_of_fields(one, other):

@@ -29,6 +29,7 @@ module pd_output_results_layout
   public :: chunk_rows, block_rows, pieces_of
 
   integer, parameter :: block_rows = 65536  !! points converted and written at a time
+  integer, parameter :: rows_together = 1048576  !! the same where ranks wait for each other
   integer(i8), parameter :: small_chunk = 65536_i8, large_chunk = 4194304_i8  ! [bytes]
   integer(i8), parameter :: most_chunks = 65536_i8, most_bytes = 2147483648_i8
 
@@ -212,7 +213,7 @@ contains
     integer(i8), allocatable :: buffer(:)
     integer(i8) :: i, pieces, k, before, count
 
-    pieces = pieces_of(most)
+    pieces = pieces_of(file, most)
     do k = 1, pieces
       before = rows*(k - 1)/pieces
       count = rows*k/pieces - before
@@ -226,9 +227,12 @@ contains
   end subroutine write_multiples
 
   !> In how many pieces rows are converted and written, so that every rank has as many writes.
-  pure integer(i8) function pieces_of(most) result(pieces)
-    integer(i8), intent(in) :: most  !! rows of the rank that has most, where all ranks write
-    pieces = (most + block_rows - 1)/block_rows
+  pure integer(i8) function pieces_of(file, most) result(pieces)
+    type(hdf5_file), intent(in) :: file  !! that gets them
+    integer(i8), intent(in) :: most      !! rows of the rank that has most, where all ranks write
+    integer :: rows
+    rows = merge(rows_together, block_rows, file%writing >= 0)
+    pieces = (most + rows - 1)/rows
   end function pieces_of
 
   !> Write the vertices of some points: each point is one.
@@ -466,7 +470,7 @@ contains
     integer(i8) :: n, first, count, i, k, pieces
 
     n = size(values, 1, kind=i8)
-    pieces = pieces_of(most)
+    pieces = pieces_of(file, most)
     do k = 1, pieces
       first = n*(k - 1)/pieces
       count = n*k/pieces - first

@@ -499,7 +499,7 @@ contains
     integer(i8) :: n, first, last, k, pieces
 
     n = size(values, kind=i8)
-    pieces = pieces_of(most)
+    pieces = pieces_of(file, most)
     do k = 1, pieces
       first = n*(k - 1)/pieces
       last = n*k/pieces
