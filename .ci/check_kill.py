@@ -3,14 +3,17 @@
 
     check_kill.py [--times N] [--seed S] NAME.vtkhdf COMMAND ...
 
-COMMAND writes NAME.vtkhdf, each time anew over what is there (perifort run ... --overwrite). It
-runs once undisturbed; then it is started N times (30) and ended with SIGKILL. Every other time it
+COMMAND writes NAME.vtkhdf, each time anew over what is there (perifort run ... --overwrite, or
+mpirun with it). It runs once undisturbed; then it is started N times (30) and ended with SIGKILL,
+with all processes that it has started, in any order. Every other time it
 finds no results, else those of the time before. Whatever file there is afterwards must open, and
 all it counts as complete must equal the undisturbed run's.
 """
 import argparse
+import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -53,6 +56,40 @@ def check_table(path, reference, what):
     assert lines == reference[:len(lines)], f"{what}: {path.name} differs"
 
 
+def below(process):
+    """The processes that a process has started, and those that these have started."""
+    found = []
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        try:
+            found += [int(word) for word in task.read_text().split()]
+        except OSError:
+            continue
+    return found + [other for one in found for other in below(one)]
+
+
+def kill(program, chance):
+    """End a program and all that it has started, and wait until they are gone."""
+    processes = below(program.pid) + [program.pid]
+    chance.shuffle(processes)
+    for process in processes:
+        try:
+            os.kill(process, signal.SIGKILL)
+        except ProcessLookupError:
+            continue
+    program.wait()
+    limit = time.monotonic() + 10
+    while any(is_alive(process) for process in processes) and time.monotonic() < limit:
+        time.sleep(0.01)
+
+
+def is_alive(process):
+    """Whether a process is there and not only waits to be counted by its parent."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def main():
     """Run, kill, compare."""
     parser = argparse.ArgumentParser(description=__doc__,
@@ -83,8 +120,7 @@ def main():
         older = path.exists()
         program = subprocess.Popen(options.command, **quiet)
         time.sleep(moments.uniform(0.0, 1.02 * duration))
-        program.kill()
-        program.wait()
+        kill(program, moments)
         what = f"kill {number}"
         if not path.exists():
             assert not older, f"{what}: older results are gone and there are no new ones"

@@ -22,6 +22,7 @@ module test_ranks
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_static_relaxation, only: relaxation_type, run_relaxation
   use pd_motion_system, only: start_system, system_type
+  use pd_output_deal, only: deal_type
   use pd_set_up_prepare, only: set_up_type
   use pd_set_up_ranks, only: find_lowest, reproducible_layer, work_of_body
   use pd_scene_content_types, only: crack_group, scene_type
@@ -58,6 +59,7 @@ module test_ranks
     procedure :: start_sharing
     procedure :: finish_sharing
     procedure :: collect
+    procedure :: deal
     procedure :: number_before
   end type fake_type
 
@@ -77,6 +79,7 @@ contains
     testsuite = [ &
       & new_unittest('sums of any arrangement of the slots', test_arrangements), &
       & new_unittest('sums of any split of the points', test_splits), &
+      & new_unittest('rows of results', test_rows), &
       & new_unittest('random numbers begin anywhere', test_noise), &
       & new_unittest('places in ascending order', test_order), &
       & new_unittest('an explicit run', test_explicit), &
@@ -168,6 +171,26 @@ contains
     end if
     !$omp barrier
   end subroutine collect
+
+  subroutine deal(self, values, given, got)
+    class(fake_type), intent(inout) :: self
+    real(wp), intent(in) :: values(:)
+    integer, intent(in) :: given(:)
+    real(wp), allocatable, intent(out) :: got(:)
+    integer :: r, at
+
+    self%hub%of_rank(self%rank)%values = values
+    self%hub%of_rank(self%rank)%field = reshape(real(given, wp), [size(given), 1])
+    !$omp barrier
+    allocate (got(0))
+    do r = 1, size(self%hub%of_rank)
+      associate (all_given => nint(self%hub%of_rank(r)%field(:, 1)))
+        at = sum(all_given(:self%rank - 1))
+        got = [got, self%hub%of_rank(r)%values(at + 1:at + all_given(self%rank))]
+      end associate
+    end do
+    !$omp barrier
+  end subroutine deal
 
   integer(i8) function number_before(self, number) result(before)
     class(fake_type), intent(inout) :: self
@@ -380,6 +403,80 @@ contains
       end do
     end subroutine try
   end subroutine test_splits
+
+  !> Points that ranks own in any way become rows in point order, equally many on each rank, and the
+  !> first rank gets them in turns, never many more than its own.
+  subroutine test_rows(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer :: i, state
+
+    call try(7, 2, [(mod(i, 2) + 1, i=1, 7)])
+    call try(3, 3, [3, 1, 2])
+    call try(1000, 3, [(merge(3, merge(1, 2, mod(i, 5) < 2), i < 17), i=1, 1000)])
+    state = 5
+    call try(300000, 4, [(min(4, 1 + int(2*(1 + noise(state)))), i=1, 300000)])
+    call try(300000, 2, [(merge(2, 1, i <= 200000), i=1, 300000)])
+
+  contains
+
+    subroutine try(n, ranks, owner)
+      integer, intent(in) :: n, ranks, owner(n)
+      type(hub_type), target :: hub
+      type(fake_type), target :: fake(ranks)
+      type(body_type) :: body
+      type(deal_type) :: deal
+      integer :: counts(ranks), befores(ranks), turns(ranks), most(ranks)
+      real(wp) :: all_rows(n), in_turns(n)
+      real(wp), allocatable :: own(:), rows(:), taken(:, :)
+      integer(i8) :: first
+      integer :: r, p, turn
+      logical :: enough
+
+      if (allocated(error)) return
+      allocate (hub%of_rank(ranks))
+      enough = .false.
+      all_rows = -1.0_wp
+      in_turns = -1.0_wp
+      !$omp parallel num_threads(ranks) default(none) &
+      !$omp shared(n, ranks, owner, hub, fake, enough, counts, befores, turns, most, all_rows) &
+      !$omp shared(in_turns) private(r, p, turn, body, deal, own, rows, taken, first)
+      if (omp_get_num_threads() == ranks) then
+        r = omp_get_thread_num() + 1
+        if (r == 1) enough = .true.
+        fake(r)%rank = r
+        fake(r)%hub => hub
+        body%number = pack([(int(p, i8), p=1, n)], owner == r)
+        body%order%ranks => fake(r)
+        call number_points([(int(p, i4), p=1, size(body%number))], body%order, body%number, &
+          & int(n, i8))
+        own = 1.0_wp/body%number
+        call deal%begin(body)
+        call deal%values_of_rows(body, own, rows)
+        counts(r) = size(rows)
+        befores(r) = int(deal%rows%before)
+        all_rows(befores(r) + 1:befores(r) + counts(r)) = rows
+        turns(r) = deal%rows%turns()
+        most(r) = 0
+        do turn = 1, turns(r)
+          call deal%rows%take_turn(turn, reshape(rows, [size(rows), 1]), first, taken)
+          most(r) = max(most(r), size(taken))
+          if (r == 1) in_turns(first + 1:first + size(taken)) = taken(:, 1)
+        end do
+      end if
+      !$omp end parallel
+      if (.not. enough) return   ! a machine that has no threads to give
+      call expect_true(error, maxval(counts) - minval(counts) <= 1, 'rows of the ranks')
+      call expect_true(error, all(befores == [(sum(counts(:r - 1)), r=1, ranks)]), &
+        & 'where the rows of a rank begin')
+      call expect_true(error, all(abs(all_rows - [(1.0_wp/r, r=1, n)]) <= 0.0_wp), &
+        & 'the rows of the ranks')
+      call expect_true(error, all(abs(in_turns - [(1.0_wp/r, r=1, n)]) <= 0.0_wp), &
+        & 'the rows that the first rank gets')
+      call expect_true(error, all(turns == turns(1)) .and. all(most(2:) == 0), &
+        & 'only the first rank gets rows')
+      call expect_true(error, most(1) <= max(65536, counts(1) + 1), 'rows of a turn')
+    end subroutine try
+  end subroutine test_rows
 
   subroutine test_noise(error)
     type(error_type), allocatable, intent(out) :: error

@@ -46,11 +46,35 @@ SCENES = [
     ("block in motion", "trade/steps_block.nml", {}),
 ]
 LEFT_OUT = ("tip", "study")
+OF_BOTH = ("block", "plate")  # written as .vtu files, too
 SHORT = ("bar", "block", "plate", "hole", "failure", "crack", "glass", "mixed")
 # The same points as a list, whose sums depend on the ranks in the last digits: differences grow with
 # the steps, so the runs are short.
 LISTS = ("crack", "glass")
 ROUNDING = 1.0e-12
+# A cloud, and what is computed with it.
+CLOUD = """
+&scene dimension = 2, thickness = 1.0 /
+&body file = 'cloud.txt' /
+&material youngs_modulus = 2.0e11, poissons_ratio = 0.3, density = 8000.0 /
+&horizon ratio = 3.015 /
+&region name = 'left', where = 'x < 0.03' /
+&region name = 'right', where = 'x > 0.41' /
+&no_fail region = 'left' /
+&no_fail region = 'right' /
+&boundary name = 'left', region = 'left', LEFT /
+&boundary name = 'right', region = 'right', RIGHT /
+&time TIME /
+&output every = 50, fields = 'displacement', 'damage', 'stress', precision = 'double' /
+"""
+PULLED = {"LEFT": "velocity_x = -10.0", "RIGHT": "velocity_x = 10.0", "TIME": "steps = 150"}
+CLOUDS = [
+    ("small strain", PULLED, ()),
+    ("breaking", PULLED, ("--set", "material%critical_stretch=2.0e-3")),
+    ("large strain", {**PULLED, "RIGHT": "velocity_x = 150.0"}, ()),
+    ("static", {"LEFT": "displacement_x = 0.0", "RIGHT": "displacement_x = 1.0e-4",
+                "TIME": "method = 'relaxation'"}, ()),
+]
 # Stopped again and again and continued on other numbers of ranks, in turn: the scene, changed keys,
 # and whether bonds break.
 REGROUPED = [
@@ -167,10 +191,13 @@ def compare_scenes(case, ranks):
         if case.options.short and name not in SHORT:
             continue
         path = case.write(name, origin, changes)
-        one = case.complete(path, 1, *ONE)
+        both = ("--set", "output%format='both'") if name in OF_BOTH else ()
+        one = case.complete(path, 1, *ONE, *both)
         for n in ranks:
-            other = case.complete(path, n, *ONE)
+            other = case.complete(path, n, *ONE, *both)
             case.equal(f"{name}: {n} ranks, the same bits", same_bits(one, other), True)
+            if name in OF_BOTH:
+                case.equal(f"{name}: {n} ranks, the same .vtu files", same_series(one, other), True)
         if name not in LISTS:
             continue
         path = case.write(name + " list", origin, {**changes, "horizon": {"family": "'list'"}}
@@ -183,6 +210,44 @@ def compare_scenes(case, ranks):
             other = case.complete(path, n, *options)
             positions = difference_of_fields(one, other)
             case.below(f"{name}, list: {n} ranks, of the largest displacement", positions, ROUNDING)
+        compare_bits(case, path, f"{name}, list", ranks, *options)
+    for name, words, options in CLOUDS:
+        compare_bits(case, write_cloud(case, words), f"cloud, {name}", ranks, *options)
+
+
+def compare_bits(case, path, name, ranks, *options):
+    """Runs with --reproducible, whose bonds break if `broken_bonds` is in their history."""
+    one = case.complete(path, 1, *options, *ONE)
+    for n in ranks:
+        other = case.complete(path, n, *options, *ONE)
+        case.equal(f"{name}: {n} ranks, the same bits", same_bits(one, other), True)
+    table = np.genfromtxt(one / "history.csv", delimiter=",", names=True)
+    column = [c for c in table.dtype.names if c.startswith("broken_bonds")]
+    if column and "breaking" in name:
+        case.equal(f"{name}: bonds break", table[column[0]][-1] > 0, True)
+
+
+def write_cloud(case, words):
+    """A plate of points with jittered places and volumes; its scene with some words."""
+    chance = np.random.default_rng(12)
+    x, y = np.meshgrid(0.01 * np.arange(45), 0.01 * np.arange(30))
+    jitter = 0.002 * (2 * chance.random((2, x.size)) - 1)
+    volume = 1.0e-4 * (1 + 0.1 * chance.random(x.size))
+    table = np.column_stack([x.ravel() + jitter[0], y.ravel() + jitter[1], 0 * volume, volume])
+    case.out.mkdir(parents=True, exist_ok=True)
+    np.savetxt(case.out / "cloud.txt", table[chance.permutation(len(table))], fmt="%.17g")
+    path = case.out / "cloud.nml"
+    text = CLOUD
+    for word, value in words.items():
+        text = text.replace(word, value)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def same_series(one, other):
+    """Whether two runs have the same `.vtu` files, at least two, and the same list of them."""
+    names = sorted(p.name for p in one.glob("*.vtu")) + [p.name for p in one.glob("*.pvd")]
+    return len(names) > 2 and all((one / n).read_bytes() == (other / n).read_bytes() for n in names)
 
 
 def difference_of_fields(one, other):

@@ -33,6 +33,7 @@ module pd_base_order
     procedure(values_to_send), deferred :: start_sharing     !! send them; what is computed
     procedure(values_to_take), deferred :: finish_sharing    !! between needs none of them
     procedure(all_points), deferred :: collect        !! values of all ranks, on the first one
+    procedure(dealt_values), deferred :: deal         !! values from every rank to every rank
     procedure(count_before), deferred :: number_before  !! sum over the ranks before this one
   end type ranks_type
 
@@ -72,6 +73,16 @@ module pd_base_order
       class(ranks_type), intent(inout) :: self
       integer(i8), intent(in) :: number  !! of this rank
     end function count_before
+
+    !> Every rank gives every rank some of its values.
+    subroutine dealt_values(self, values, given, got)
+      import :: ranks_type, wp
+      implicit none (type, external)
+      class(ranks_type), intent(inout) :: self
+      real(wp), intent(in) :: values(:)   !! those for the first rank, those for the second, ..
+      integer, intent(in) :: given(:)     !! (ranks) how many each rank gets
+      real(wp), allocatable, intent(out) :: got(:)  !! from the first rank, from the second, ..
+    end subroutine dealt_values
 
     !> Values of all ranks one after another, in the order of ranks, on the first one.
     subroutine all_points(self, values, all_values)

@@ -45,6 +45,16 @@ contains
     if (self%ranks > 1) call internal_fault('there is no other rank')
   end procedure collect
 
+  module procedure find_handles
+    ranks = -1
+    no_hints = -1
+  end procedure find_handles
+
+  module procedure deal
+    got = values
+    if (self%ranks > 1 .or. size(given) /= 1) call internal_fault('there is no other rank')
+  end procedure deal
+
   module procedure number_before
     if (self%ranks > 1 .or. number < 0_i8) call internal_fault('there is no other rank')
     before = 0_i8

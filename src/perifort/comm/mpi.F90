@@ -5,7 +5,8 @@ submodule(pd_comm_world) messages
   use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Alltoall, MPI_Alltoallv, MPI_Barrier, &
     & MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, MPI_Exscan, &
     & MPI_Finalize, &
-    & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_Init_thread, MPI_Initialized, &
+    & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_INFO_NULL, MPI_Init_thread, &
+    & MPI_Initialized, &
     & MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, MPI_Isend, MPI_MAX, MPI_Request, MPI_STATUSES_IGNORE, &
     & MPI_SUM, MPI_THREAD_FUNNELED, MPI_Waitall
   use pd_base_error, only: internal_fault
@@ -206,6 +207,27 @@ contains
     call MPI_Gatherv(values, size(values), MPI_DOUBLE_PRECISION, all_values, numbers, at, &
       & MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
   end procedure collect
+
+  module procedure find_handles
+    ranks = MPI_COMM_WORLD%MPI_VAL
+    no_hints = MPI_INFO_NULL%MPI_VAL
+  end procedure find_handles
+
+  module procedure deal
+    integer :: taken(self%ranks), given_at(self%ranks + 1), taken_at(self%ranks + 1)
+    integer :: r
+
+    call MPI_Alltoall(given, 1, MPI_INTEGER, taken, 1, MPI_INTEGER, MPI_COMM_WORLD)
+    given_at(1) = 0
+    taken_at(1) = 0
+    do r = 1, self%ranks
+      given_at(r + 1) = given_at(r) + given(r)
+      taken_at(r + 1) = taken_at(r) + taken(r)
+    end do
+    allocate (got(taken_at(self%ranks + 1)))
+    call MPI_Alltoallv(values, given, given_at(:self%ranks), MPI_DOUBLE_PRECISION, got, taken, &
+      & taken_at(:self%ranks), MPI_DOUBLE_PRECISION, MPI_COMM_WORLD)
+  end procedure deal
 
   module procedure number_before
     before = 0_i8

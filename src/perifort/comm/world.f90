@@ -7,7 +7,7 @@ module pd_comm_world
   use pd_base_order, only: ranks_type
   implicit none (type, external)
   private
-  public :: world_type, begin_world, end_world, abort_world, wait_for_turn
+  public :: world_type, begin_world, end_world, abort_world, wait_for_turn, find_handles
 
   !> Values on their way.
   type :: exchange_type
@@ -35,6 +35,7 @@ module pd_comm_world
     procedure :: finish_sharing
     procedure :: join
     procedure :: collect
+    procedure :: deal
     procedure :: number_before
     procedure :: wait_for_all
     procedure :: count_anew
@@ -58,6 +59,14 @@ module pd_comm_world
       implicit none (type, external)
       integer, intent(in) :: status  !! exit status of all
     end subroutine abort_world
+
+    !> What a library that uses MPI itself must be given, as integers of MPI's older interface;
+    !> -1 without MPI.
+    module subroutine find_handles(ranks, no_hints)
+      implicit none (type, external)
+      integer, intent(out) :: ranks     !! the group of all ranks
+      integer, intent(out) :: no_hints  !! says that there is nothing to be known of files
+    end subroutine find_handles
 
     !> Replace `values` by their sums over all ranks.
     module subroutine add_all(self, values)
@@ -116,6 +125,15 @@ module pd_comm_world
       real(wp), intent(in) :: values(:)                    !! of this rank; any number
       real(wp), allocatable, intent(out) :: all_values(:)  !! on rank 0; of size 0 elsewhere
     end subroutine collect
+
+    !> Every rank gives every rank some of its values.
+    module subroutine deal(self, values, given, got)
+      implicit none (type, external)
+      class(world_type), intent(inout) :: self
+      real(wp), intent(in) :: values(:)   !! those for the first rank, those for the second, ..
+      integer, intent(in) :: given(:)     !! (ranks) how many each rank gets
+      real(wp), allocatable, intent(out) :: got(:)  !! from the first rank, from the second, ..
+    end subroutine deal
 
     !> Wait until all ranks are here.
     module subroutine wait_for_all(self)

@@ -4,10 +4,11 @@
 module pd_family_clusters
   use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_base_lanes, only: lanes
+  use pd_base_order, only: ascending_order
   use pd_family_cells, only: cells_type, sort_into_cells
   implicit none (type, external)
   private
-  public :: rows_type, order_in_rows, collect_members, pair_members, lane_bit
+  public :: rows_type, order_in_rows, collect_members, pair_members, single_members, lane_bit
 
   !> The bit by which a lane is marked.
   integer(i1), parameter :: lane_bit(lanes) = int([1, 2, 4, 8, 16, 32, 64, -128], i1)
@@ -181,6 +182,38 @@ contains
     start = begin
     call move_alloc(both, bits)
   end subroutine pair_members
+
+  !> Packs of one member each, in the order of the points' numbers: so the bonds of a lane have an
+  !> order that does not depend on the other lanes. Packs are as from `pair_members`.
+  subroutine single_members(number, start, member, bits, pair, first)
+    integer(i8), intent(in) :: number(:)     !! (points) of each point, in the order of their slots
+    integer(i8), intent(in) :: start(:)      !! (clusters + 1) first member of each cluster, and its
+                                             !! first pack
+    integer(i4), intent(in) :: member(:)     !! (members) their points, which are their slots
+    integer(i1), intent(inout) :: bits(:)    !! (members) the lanes of each; (packs) on return
+    integer(i4), allocatable, intent(out) :: pair(:, :)
+      !! (2, packs) slots of the members of each pack, twice the same
+    integer(i1), allocatable, intent(out) :: first(:)
+      !! (packs) the lanes whose bond goes to the first of the two
+    integer(i8) :: e
+    integer :: c
+
+    allocate (pair(2, size(member)))
+    !$omp parallel do schedule(dynamic, 64) default(none) private(c, e) &
+    !$omp shared(number, start, member, bits, pair)
+    do c = 1, size(start) - 1
+      associate (from => start(c), to => start(c + 1) - 1)
+        associate (sorted => from - 1 + ascending_order(number(member(from:to))))
+          pair(1, from:to) = member(sorted)
+          bits(from:to) = bits(sorted)
+        end associate
+        do e = from, to
+          pair(2, e) = pair(1, e)
+        end do
+      end associate
+    end do
+    first = bits
+  end subroutine single_members
 
   !> Find for each member of a cluster another one with no lane in common: `partner` gets its place,
   !> 0 for members that stay single, and -1 for those that have become another's partner. Members

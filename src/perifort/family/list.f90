@@ -11,8 +11,9 @@ module pd_family_list
   use pd_base_kinds, only: wp, i1, i2, i4, i8
   use pd_base_lanes, only: lanes
   use pd_base_text, only: to_text
-  use pd_body_body, only: body_type, arrange
-  use pd_family_clusters, only: rows_type, order_in_rows, collect_members, pair_members, lane_bit
+  use pd_body_body, only: body_type, arrange, number_of_slot => number_at
+  use pd_family_clusters, only: rows_type, order_in_rows, collect_members, lane_bit, &
+    & pair_members, single_members
   use pd_family_family, only: family_type, bonds_type
   use pd_family_volume, only: volume_rule_type, volume_correction, reach, volume_exact, &
     & volume_none, horizon_of_bond, rule_of_bond
@@ -31,6 +32,8 @@ module pd_family_list
     real(wp), allocatable :: volume(:)         !! (n_slots) [m3]
     real(wp), allocatable :: spacing(:)        !! (n_slots) [m]
     logical :: one_spacing = .false.           !! all points have the same
+    logical :: fixed_order = .false.           !! bonds of each point are in the order of numbers of
+                                               !! points, and no pack has two members
     real(wp), allocatable :: fraction(:, :)    !! v_c of every lane (lanes, packs), only where it is
                                                !! no simple formula, else of size 0
     character(:), allocatable :: reason        !! why this family and no lattice
@@ -49,7 +52,8 @@ contains
   !> Families of all points of `body`, which is sorted, and filled with dead slots up to whole
   !> clusters. Members are those within the rule's reach for the bond's mean spacing and, where
   !> points have their own horizons, the larger one of both ends. In a composite family points of
-  !> one grid are no members of each other here.
+  !> one grid are no members of each other here. Where results must not depend on the ranks, the
+  !> bonds of a point have a fixed order.
   subroutine new_list_family(body, rule, family, apart)
     type(body_type), intent(inout) :: body
       !! in point order; arranged in the slots of the family on return
@@ -93,7 +97,13 @@ contains
     if (present(apart)) label = merge(body%grid(:n), 0_i2, apart)
     call collect_members(body%x(:n, :), half_reach, own, label, rows, family%start, member, &
       & family%bits)
-    call pair_members(family%start, member, family%bits, family%member, family%first)
+    family%fixed_order = body%order%reproducible
+    if (family%fixed_order) then
+      call single_members(number_of_slot(body, [(k, k=1, n)]), family%start, member, family%bits, &
+        & family%member, family%first)
+    else
+      call pair_members(family%start, member, family%bits, family%member, family%first)
+    end if
     allocate (family%intact, source=family%bits)
     call count_bonds(family)
     family%spacing = body%spacing

@@ -146,7 +146,7 @@ contains
     type is (lattice_family_type)
       with_formulas = associated(body%order%ranks) .and. body%order%reproducible
       if (with_formulas) call add_formulas(family, workspace, p, both)
-    class default  ! sums over lists depend on the ranks
+    class default  ! formulas of lists do not depend on the ranks where they must not
       continue
     end select
     if (with_formulas) then

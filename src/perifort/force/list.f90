@@ -5,6 +5,7 @@ module pd_force_list
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
+  use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
   use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
@@ -21,7 +22,8 @@ module pd_force_list
   public :: prepare_list, list_dilatation, list_force, list_energy
 
   !> How far a cluster is strained (`large` of the workspace): within the narrow polynomial, within
-  !> the wide one, beyond.
+  !> the wide one, beyond. Where bonds have a fixed order, `large` has the bits of lanes beyond
+  !> instead.
   integer(i1), parameter :: little = 0_i1, more = 1_i1, beyond = 2_i1
 
   !> The loops of a pass, and the strains for which they are valid.
@@ -88,9 +90,14 @@ contains
       call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       strain = little
-      call sum_up(family, model, options, workspace, loops, work, strain, sums)
+      if (family%fixed_order) then
+        call sum_lanes(family, model, options, workspace, loops, for_theta, work, strain, sums)
+        if (model%breaking .and. strain /= little) call mark_cluster(model, work, strained)
+      else
+        call sum_up(family, model, options, workspace, loops, work, strain, sums)
+      end if
       workspace%large(c) = strain
-      if (strain == beyond) then
+      if (strain == beyond .and. .not. family%fixed_order) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
             & .false., work)
@@ -142,8 +149,13 @@ contains
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       ! the pass before has checked the strain
       strain = merge(workspace%large(c), little, options%dilatation)
-      call sum_up(family, model, options, workspace, loops, work, strain, sums)
-      if (strain == beyond) then
+      if (family%fixed_order) then
+        call sum_lanes(family, model, options, workspace, loops, for_force, work, strain, sums)
+        if (model%breaking .and. strain /= little) call mark_cluster(model, work, strained)
+      else
+        call sum_up(family, model, options, workspace, loops, work, strain, sums)
+      end if
+      if (strain == beyond .and. .not. family%fixed_order) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
             & .false., work)
@@ -183,7 +195,7 @@ contains
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
       call take_given(workspace, work)
-      if (options%thermal .or. model%weighted .or. model%consistent) then
+      if (options%thermal .or. model%weighted .or. model%consistent .or. family%fixed_order) then
         associate (e => family%start(c), n => work%n)
           call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
             & .true., work)
@@ -262,6 +274,53 @@ contains
     strain = beyond
   end subroutine sum_up
 
+  !> The same where sums must not depend on which points share a cluster: each lane has the
+  !> polynomial of the widest range, or, if its own bonds are beyond, the general formulas. `strain`
+  !> has the bits of lanes that are known to be beyond, and of all that are on return.
+  subroutine sum_lanes(family, model, options, workspace, loops, pass, work, strain, sums)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
+    type(list_workspace_type), intent(in) :: workspace
+    type(loops_type), intent(in) :: loops
+    integer, intent(in) :: pass                !! `for_theta` or `for_force`
+    type(work_type), intent(inout) :: work
+    integer(i1), intent(inout) :: strain
+    real(wp), intent(inout) :: sums(lanes, 3)
+    type(task_type) :: task
+    real(wp) :: of_lanes(lanes, 3)
+    logical :: missed, general(lanes)
+    integer :: l
+
+    task = loops%task
+    task%wide = loops%wide > 0.0_wp
+    task%limit = max(loops%narrow, loops%wide)
+    general = .true.
+    if (task%limit > 0.0_wp) then
+      call run_loop(family, workspace, work, loops%stored, task, sums, missed)
+      general = iand(strain, lane_bit) /= 0_i1
+      do l = 1, lanes
+        if (.not. missed) exit
+        call run_loop(family, workspace, work, loops%stored, task, of_lanes, general(l), &
+          & lane_bit(l))
+      end do
+    end if
+    strain = iany(merge(lane_bit, 0_i1, general))
+    if (strain == 0_i1) return
+    of_lanes = 0.0_wp
+    associate (e => family%start(work%cluster))
+      call fill_tables(family, model, workspace, family%intact(e:e + work%n - 1), .false., work)
+    end associate
+    if (pass == for_theta) then
+      call cluster_theta(family, model, options, workspace, work, of_lanes(:, 1))
+    else
+      call cluster_force(family, model, options, workspace, work, of_lanes)
+    end if
+    do l = 1, lanes
+      if (general(l)) sums(l, :) = of_lanes(l, :)
+    end do
+  end subroutine sum_lanes
+
   !> The loop for the tables that the cluster has.
   subroutine run_either(family, workspace, work, loops, task, sums, missed)
     type(list_family_type), intent(in) :: family
@@ -281,8 +340,8 @@ contains
     end if
   end subroutine run_either
 
-  !> One loop over the packs of a cluster.
-  subroutine run_loop(family, workspace, work, loop, task, sums, missed)
+  !> One loop over the packs of a cluster, or over the bonds of some of its lanes.
+  subroutine run_loop(family, workspace, work, loop, task, sums, missed, some)
     type(list_family_type), intent(in) :: family
     type(list_workspace_type), intent(in) :: workspace
     type(work_type), intent(in) :: work
@@ -290,6 +349,7 @@ contains
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
+    integer(i1), intent(in), optional :: some  !! bits of these lanes; absent: all
     integer(i8) :: e, last, b, f, d, s
 
     ! tables that are not there have no second element; loops that need them are not called then
@@ -299,6 +359,13 @@ contains
     s = max(1_i8, workspace%shape(work%cluster))
     f = merge(e, 1_i8, size(family%fraction) > 0)
     d = merge(b, 1_i8, size(workspace%weight_D) > 0)
+    if (present(some)) then
+      call loop(work%n, family%member(:, e:last), family%first(e:last), &
+        & iand(family%intact(e:last), some), workspace%at, workspace%given, &
+        & family%fraction(:, f:), workspace%geometry(:, s:), workspace%weight_D(:, d:), &
+        & workspace%weight_S(:, b:), work%own, task, sums, missed)
+      return
+    end if
     call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
       & workspace%at, workspace%given, family%fraction(:, f:), workspace%geometry(:, s:), &
       & workspace%weight_D(:, d:), workspace%weight_S(:, b:), work%own, task, sums, missed)

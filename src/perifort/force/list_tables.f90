@@ -56,9 +56,16 @@ contains
     ! positions are off by their last bits
     near = min(8*epsilon(1.0_wp)*maxval(abs(family%x)), &
       & 2.0e-13_wp*family%rule%delta)
-    call find_shapes(family, workspace, near, shapes)
-    call find_weights(family, model, workspace, shapes, weights)
-    call share_weights(family, model, near, workspace, shapes, weights)
+    if (family%fixed_order) then
+      ! which clusters are alike depends on the ranks: each has weights of its own
+      workspace%plain = 0_i1
+      allocate (shapes%of(size(workspace%plain)), weights%of(size(workspace%plain)), source=0_i4)
+      allocate (shapes%first(0))
+    else
+      call find_shapes(family, workspace, near, shapes)
+      call find_weights(family, model, workspace, shapes, weights)
+      call share_weights(family, model, near, workspace, shapes, weights)
+    end if
     call store_own_weights(family, model, shapes, weights, workspace)
     call store_shapes(family, shapes, workspace)
   end subroutine make_tables

@@ -119,7 +119,7 @@ contains
       recorder%team = set_up%team
       recorder%measures = self%measures
       recorder%warnings = set_up%warnings
-      call open_recorder(scene, options, system, plan, self%directory, self%stem, self%restart, &
+      call open_recorder(scene, options, system, plan, self%folder, self%stem, self%restart, &
         & recorder, in_memory, error)
       if (allocated(error)) return
       call keep_checkpoints(scene, options, plan, start, points, self%folder, self%restart, &

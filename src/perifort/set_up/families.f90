@@ -43,7 +43,8 @@ contains
     type(body_type), intent(in) :: body         !! in point order, with all points, or those of a
                                                 !! rank
     type(law_item_type), intent(in) :: laws(:)  !! (materials) their bond laws
-    logical, intent(in) :: divided              !! several ranks have, or will have, parts of it
+    logical, intent(in) :: divided              !! several ranks have, or will have, parts of it, or
+                                                !! may have with the same results
     type(family_choice_type), intent(out) :: choice
     type(error_type), allocatable, intent(out) :: error
     type(survey_type), intent(in), optional :: survey  !! of all points, where a rank has its own
@@ -94,7 +95,7 @@ contains
 
     if (all(body%grid == 0)) return
     reason = ''
-    if (divided) reason = 'on several ranks'
+    if (divided) reason = 'on several ranks and with --reproducible'
     if (scene%horizon%surface_correction == 'consistent') &
       & reason = "surface_correction = 'consistent'"
     do i = 1, size(laws)

@@ -94,7 +94,7 @@ contains
     integer, allocatable :: owner(:)
     type(family_choice_type) :: choice
     type(survey_type) :: survey
-    logical :: divided, in_windows
+    logical :: divided, in_windows, reproducible
     integer :: i, ranks, blocks
 
     ranks = 1
@@ -135,29 +135,23 @@ contains
 
       call timer%start('families')
       rule = rule_of_scene(scene, system%body, delta)
+      reproducible = .false.
+      if (present(world)) reproducible = world%reproducible
       blocks = 1
-      if (present(world)) then
-        if (world%reproducible) blocks = reproducible_layer(scene%header%precision == 'mixed')
-      end if
+      if (reproducible) blocks = reproducible_layer(scene%header%precision == 'mixed')
       if (in_windows) then
         call divide_survey(scene, rule, blocks, world, survey, system%body, owner, error)
         if (allocated(error)) return
         call check_lattices(scene, system%body, error)
         call agree_on_error(world, world%rank, error)
         if (allocated(error)) return
-        call choose_family(scene, rule, system%body, laws, divided, choice, error, survey)
+        call choose_family(scene, rule, system%body, laws, .true., choice, error, survey)
       else
-        call choose_family(scene, rule, system%body, laws, divided, choice, error)
+        call choose_family(scene, rule, system%body, laws, divided .or. reproducible, choice, error)
       end if
       if (allocated(error)) return
-      if (present(world)) then
-        if (world%reproducible .and. .not. choice%regular) call scene_fault(error, scene, &
-          & 'horizon', 1, 'family', '--reproducible needs lattice families: on lists forces '// &
-          & 'depend on the ranks in their last digits', choice%reason)
-        if (world%reproducible .and. .not. in_windows) call find_lowest(system%body)
-        system%body%order%reproducible = world%reproducible
-      end if
-      if (allocated(error)) return
+      if (reproducible .and. .not. in_windows) call find_lowest(system%body)
+      system%body%order%reproducible = reproducible
       if (divided .and. .not. in_windows) call divide_body(scene, rule, blocks, world, &
         & system%body, owner, error)
       if (allocated(error)) return

@@ -2,7 +2,7 @@
 module pd_output_fields_write
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp
-  use pd_output_collector, only: collector_type
+  use pd_output_deal, only: deal_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_gradient, only: shared_type
   use pd_output_results_results, only: results_type
@@ -15,9 +15,9 @@ contains
 
   !> Write all fields of an output that has begun. `undefined` is the number of points at which the
   !> gradient of the displacements is not defined, 0 if no field needs it.
-  subroutine write_fields(results, collector, fields, now, undefined, error)
+  subroutine write_fields(results, deal, fields, now, undefined, error)
     type(results_type), intent(inout) :: results        !! was created with these fields
-    type(collector_type), intent(in) :: collector       !! of the points of all ranks
+    type(deal_type), intent(in) :: deal                 !! of values to the ranks that write them
     type(output_field_type), intent(in) :: fields(:)
     type(moment_type), intent(in) :: now
     integer, intent(out) :: undefined
@@ -34,11 +34,11 @@ contains
     do f = 1, size(fields)
       entry = fields(f)%in_file(now%system%body%dim)
       n = fields(f)%components(now%system%body%dim)
-      if (collector%needed) then
-        allocate (own(now%system%body%order%n_owned, n), values(collector%n, entry%components))
+      if (deal%needed) then
+        allocate (own(now%system%body%order%n_owned, n), values(deal%rows%n, entry%components))
         call fields(f)%all_values(moment, own)
         do c = 1, n
-          call collector%whole(now%system%body, own(:, c), one)
+          call deal%values_of_rows(now%system%body, own(:, c), one)
           values(:, c) = one
         end do
         deallocate (own)

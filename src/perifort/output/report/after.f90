@@ -58,6 +58,8 @@ contains
       & repeat(' ', 22), directory /= '')))
     if (directory == '') then
       text = text//line('results', 'in memory alone')
+    else if (recorder%results%written_by() /= '') then
+      text = text//line('results', directory//', fields written by '//recorder%results%written_by())
     else
       text = text//line('results', directory)
     end if

@@ -4,7 +4,6 @@ module pd_output_report_begin
   use pd_base_clock, only: output_is_terminal
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i1, i4, i8
-  use pd_base_reduce, only: any_of_ranks
   use pd_base_version, only: program_version
   use pd_body_refine, only: level_of
   use pd_scene_content_types, only: has_refinement, scene_type
@@ -81,8 +80,8 @@ contains
         recorder%fields(f) = table%field(trim(scene%output%fields(f)))
       end do
       call profiles_of(scene, table, body, recorder%profiles)
-      call recorder%collector%begin(body)
-      allocate (positions(recorder%collector%n, 3), source=0.0_wp)
+      call recorder%deal%begin(body)
+      allocate (positions(recorder%deal%rows%n, 3), source=0.0_wp)
       do c = 1, body%dim
         call collect(recorder, body, body%x(:, c), values)
         positions(:, c) = values
@@ -101,12 +100,11 @@ contains
         & trim(scene%output%precision), trim(scene%output%format), scene_text(scene), command, &
         & program_version, options%overwrite .or. options%restart, error, kept, &
         & [(recorder%profiles(f)%line, f=1, size(recorder%profiles))], cells, &
-        & recorder%surfaces%triangles)
+        & recorder%surfaces%triangles, recorder%deal%rows)
       if (allocated(error)) return
       if (in_memory) call recorder%results%keep_outputs(positions)
-      ! the first rank alone has files that can go on
-      if (.not. any_of_ranks(body%order, recorder%results%resumes())) &
-        & call put_points(scene, body, recorder, error)
+      if (.not. recorder%results%resumes()) call put_points(scene, body, recorder, error)
+      if (.not. allocated(error)) call recorder%results%settle(error)
       if (allocated(error)) then
         call recorder%results%close(ignored)
         return
@@ -245,17 +243,17 @@ contains
     end do
   end subroutine put_points
 
-  !> Values of slots as those of the points that this rank writes.
+  !> Values of slots as those of the rows that this rank writes.
   subroutine collect(recorder, body, of_slots, values)
     type(recorder_type), intent(in) :: recorder
     type(body_type), intent(in) :: body
     real(wp), intent(in) :: of_slots(:)              !! (n_slots)
-    real(wp), allocatable, intent(out) :: values(:)  !! (points)
+    real(wp), allocatable, intent(out) :: values(:)  !! (rows)
     real(wp), allocatable :: own(:)
 
     allocate (own(body%order%n_owned))
     call gather(body, of_slots, own)
-    call recorder%collector%whole(body, own, values)
+    call recorder%deal%values_of_rows(body, own, values)
   end subroutine collect
 
 end module pd_output_report_begin

@@ -14,7 +14,7 @@ module pd_output_report_recorder
   use pd_motion_account, only: energies_of, velocities_now
   use pd_motion_system, only: system_type
   use pd_output_checkpoint_checkpoint, only: about_type, checkpoint_type
-  use pd_output_collector, only: collector_type
+  use pd_output_deal, only: deal_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_write, only: write_fields
   use pd_output_measures_line, only: profile_type, write_profiles
@@ -34,7 +34,7 @@ module pd_output_report_recorder
 
   type, extends(observer_type) :: recorder_type
     type(results_type) :: results
-    type(collector_type) :: collector        !! of the points of all ranks
+    type(deal_type) :: deal                  !! of values to the ranks that write them
     type(schedule_type) :: schedule
     type(output_field_type), allocatable :: fields(:)  !! of every output
     type(measure_list_type) :: measures      !! of the history
@@ -115,7 +115,7 @@ contains
     stopping = may_stop .and. (interrupted() .or. time_is_over(observer) &
       & .or. allocated(observer%wish))
     keeping = may_stop .and. observer%checkpoint%is_due(instant%step)
-    if (may_stop .and. observer%collector%needed) &
+    if (may_stop .and. observer%deal%needed) &
       & call agree(system, instant%step, stopping, keeping)
     keeping = (keeping .or. stopping) .and. observer%checkpoint%in_files
     ! the history has no row of a load step that has not converged
@@ -138,7 +138,7 @@ contains
       call write_output(observer, system, instant, v, error)
       ! a restarted run does not have the output that is written because the run stops
       ! what these look for may lie at other ranks' points
-      if ((output_due .or. instant%last) .and. .not. observer%collector%needed) then
+      if ((output_due .or. instant%last) .and. .not. observer%deal%needed) then
         call warn_if_any(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
           & call warn_if_any(observer, 'strain', strain_warning(system, instant%time))
@@ -154,7 +154,7 @@ contains
       & place_of(instant, observer%schedule%relaxation)// &
         & ': this state is the last output'//way_on(observer), status_interrupted)
       error%everywhere = .true.
-      error%elsewhere = .not. observer%collector%writes
+      error%elsewhere = .not. observer%deal%rows%on_first
     end if
   end subroutine observe
 
@@ -221,7 +221,7 @@ contains
         & to_text(recorder%output_step)
       return
     end if
-    if (recorder%output_step < instant%step .and. .not. recorder%collector%needed) then
+    if (recorder%output_step < instant%step .and. .not. recorder%deal%needed) then
       call velocities_now(system, instant%time, instant%kick, v)
       call write_output(recorder, system, instant, v, error)
       if (allocated(error)) return
@@ -316,7 +316,7 @@ contains
       call history_row(recorder%columns, now, apart, row)
     end if
     call recorder%results%add_row(row, error)
-    if (.not. (recorder%turned .or. recorder%collector%needed)) then
+    if (.not. (recorder%turned .or. recorder%deal%needed)) then
       warning = rotation_warning(system, instant%time)
       recorder%turned = len(warning) > 0
       call warn_if_any(recorder, 'rotation', warning)
@@ -353,7 +353,7 @@ contains
     now%v => v
     call recorder%results%begin_output(instant%time, error)
     if (allocated(error)) return
-    call write_fields(recorder%results, recorder%collector, recorder%fields, now, undefined, error)
+    call write_fields(recorder%results, recorder%deal, recorder%fields, now, undefined, error)
     if (.not. allocated(error)) call write_profiles(recorder%results, recorder%profiles, now, error)
     if (allocated(error)) return
     if (recorder%surfaces%triangles%n_vertices > 0) then

@@ -8,6 +8,7 @@
 module pd_output_results_datasets
   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t, c_loc, c_ptr
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_NEVER_F, H5P_DATASET_CREATE_F, &
+    & H5P_DEFAULT_F, &
     & H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_I32LE, &
     & H5T_STD_I64LE, H5T_STD_I8LE, H5T_STD_U8LE, h5dclose_f, h5dcreate_f, &
     & h5dget_create_plist_f, h5dget_space_f, h5dopen_f, &
@@ -23,7 +24,7 @@ module pd_output_results_datasets
   private
   public :: put_array, make_dataset, make_series, write_rows, read_rows, set_rows, get_shape
   public :: put_unsigned, get_chunk, make_view, settled_properties, storage_f8, storage_f4, &
-    & storage_i8
+    & storage_i8, storage_i4, storage_i1
 
   integer, parameter :: storage_f8 = 1  !! 64-bit real
   integer, parameter :: storage_f4 = 2  !! 32-bit real
@@ -39,8 +40,8 @@ module pd_output_results_datasets
 
   !> Write rows `first` .. (counted from 0) of a dataset: `values(row)` or `values(component, row)`.
   interface write_rows
-    module procedure :: write_rows_real, write_rows_single, write_rows_i8, write_table_real, &
-      & write_table_single, write_table_i8
+    module procedure :: write_rows_real, write_rows_single, write_rows_i8, write_rows_i4, &
+      & write_rows_i1, write_table_real, write_table_single, write_table_i8
   end interface write_rows
 
   !> Read rows of a dataset, as `write_rows` writes them.
@@ -332,7 +333,8 @@ contains
       if (status == 0) call h5screate_simple_f(rank, count(:rank), here, status)
       if (status == 0) then
         if (writing) then
-          call h5dwrite_f(dataset, storage_id(storage), place, status, here, there)
+          call h5dwrite_f(dataset, storage_id(storage), place, status, here, there, &
+            & merge(file%writing, H5P_DEFAULT_F, file%writing >= 0))
           if (status /= 0) call explain(error, 'write', file%name)
         else
           call h5dread_f(dataset, storage_id(storage), place, status, here, there)
@@ -451,6 +453,34 @@ contains
     call move_rows(file, path, storage_i8, 1, first, size(values, kind=i8), &
       & c_loc(values), .true., error)
   end subroutine write_rows_i8
+
+  !> Write rows of one 32-bit integer each.
+  subroutine write_rows_i4(file, path, first, values, error)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
+    integer(i4), contiguous, target, intent(in) :: values(:)
+      !! (rows), as many as are to be written
+    type(error_type), allocatable, intent(out) :: error
+
+    if (size(values) == 0) return
+    call move_rows(file, path, storage_i4, 1, first, size(values, kind=i8), &
+      & c_loc(values), .true., error)
+  end subroutine write_rows_i4
+
+  !> Write rows of one 8-bit integer each.
+  subroutine write_rows_i1(file, path, first, values, error)
+    type(hdf5_file), intent(in) :: file  !! open, writable if it is written
+    character(*), intent(in) :: path     !! of the dataset in the file
+    integer(i8), intent(in) :: first     !! row of the first value, from 0
+    integer(i1), contiguous, target, intent(in) :: values(:)
+      !! (rows), as many as are to be written
+    type(error_type), allocatable, intent(out) :: error
+
+    if (size(values) == 0) return
+    call move_rows(file, path, storage_i1, 1, first, size(values, kind=i8), &
+      & c_loc(values), .true., error)
+  end subroutine write_rows_i1
 
   !> Write rows of several 64-bit reals each.
   subroutine write_table_real(file, path, first, values, error)

@@ -22,7 +22,9 @@ module pd_output_results_hdf5
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
   use pd_base_text, only: to_text
+  use pd_comm_world, only: find_handles
   use pd_output_results_files, only: set_environment
+  use pd_output_results_together, only: access_together, can_write_together, write_together
   implicit none (type, external)
   private
   public :: hdf5_file, start_hdf5, hdf5_version, create_file, open_file, flush_file, close_file
@@ -32,6 +34,7 @@ module pd_output_results_hdf5
   !> An open file.
   type :: hdf5_file
     integer(hid_t) :: id = -1_hid_t
+    integer(hid_t) :: writing = -1_hid_t  !! properties of writes by all ranks; -1: by this alone
     character(:), allocatable :: name  !! path, for messages
   end type hdf5_file
 
@@ -99,13 +102,20 @@ contains
     started = status == 0
   end subroutine start_hdf5
 
-  !> The version of the HDF5 library, such as 1.10.8.
+  !> The version of the HDF5 library, such as 1.10.8; where there may be several ranks, also which
+  !> of them write with it.
   function hdf5_version() result(version)
     character(:), allocatable :: version
-    integer :: major, minor, release, status
+    integer :: major, minor, release, status, ranks, hints
 
     call h5get_libversion_f(major, minor, release, status)
     version = to_text(major)//'.'//to_text(minor)//'.'//to_text(release)
+    call find_handles(ranks, hints)
+    if (can_write_together()) then
+      version = version//', parallel: all ranks write results'
+    else if (ranks >= 0) then
+      version = version//', serial: the first rank writes results'
+    end if
   end function hdf5_version
 
   !> Collect the reason from one entry of the error stack.
@@ -182,17 +192,25 @@ contains
     call h5pclose_f(access, ignored)
   end subroutine create_file
 
-  !> Open a file that is there, for reading only or for both.
-  subroutine open_file(name, writable, file, error)
+  !> Open a file that is there, for reading only or for both. With `together` all ranks open it,
+  !> and each write of rows is a call of all of them, each with rows of its own: no group, dataset
+  !> or attribute may be made or changed by this way.
+  subroutine open_file(name, writable, file, error, together)
     character(*), intent(in) :: name      !! path of a file that is there
     logical, intent(in) :: writable       !! for reading and writing; else for reading only
     type(hdf5_file), intent(out) :: file  !! open; not open after an error
     type(error_type), allocatable, intent(out) :: error
+    logical, intent(in), optional :: together  !! a call of all ranks; absent: of this one
     integer(hid_t) :: access
     integer :: status, ignored
+    logical :: of_all
 
+    of_all = .false.
+    if (present(together)) of_all = together
     file%name = trim(name)
     call make_access(access, status)
+    if (status == 0 .and. of_all) call access_together(access, status)
+    if (status == 0 .and. of_all) call write_together(file%writing, status)
     if (status == 0) call h5fopen_f(file%name, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writable), &
       & file%id, status, access_prp=access)
     if (status /= 0) then
@@ -216,12 +234,14 @@ contains
   subroutine close_file(file, error)
     type(hdf5_file), intent(inout) :: file  !! not open on return
     type(error_type), allocatable, intent(out) :: error
-    integer :: status
+    integer :: status, ignored
 
     if (file%id < 0) return
     call h5fclose_f(file%id, status)
     if (status /= 0) call explain(error, 'complete', file%name)
     file%id = -1
+    if (file%writing >= 0) call h5pclose_f(file%writing, ignored)
+    file%writing = -1
   end subroutine close_file
 
   !> Make a group; the groups above it must be there.

@@ -24,10 +24,12 @@ module pd_output_results_layout
     & view_type, views_fit, views_of
   implicit none (type, external)
   private
-  public :: layout_type, put_scene, put_geometry, write_vectors, copy_scene, to_single
-  public :: chunk_rows, block_rows
+  public :: layout_type, put_scene, put_geometry, write_vectors, write_vertices, copy_scene, &
+    & to_single
+  public :: chunk_rows, block_rows, pieces_of
 
   integer, parameter :: block_rows = 65536  !! points converted and written at a time
+  integer, parameter :: rows_together = 1048576  !! the same where ranks wait for each other
   integer(i8), parameter :: small_chunk = 65536_i8, large_chunk = 4194304_i8  ! [bytes]
   integer(i8), parameter :: most_chunks = 65536_i8, most_bytes = 2147483648_i8
 
@@ -108,37 +110,40 @@ contains
 
   !> What doesn't change with time: points, each of them a vertex, and no other cells; or points and
   !> nodes, with cells.
-  subroutine put_geometry(file, positions, cells, error)
+  subroutine put_geometry(file, points, positions, cells, error)
     type(hdf5_file), intent(in) :: file      !! writable, with `/VTKHDF`
-    real(wp), intent(in) :: positions(:, :)  !! (n_points, 3) [m]
+    integer(i8), intent(in) :: points        !! their number
+    real(wp), intent(in) :: positions(:, :)  !! (n_points, 3) [m]; (0, 3): they and the vertices
+                                             !! are written later
     type(cells_type), intent(in) :: cells    !! of the file; none: vertices
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: empty(3) = [character(8) :: 'Lines', 'Polygons', 'Strips']
     character(:), allocatable :: group
-    integer(i8) :: n
     integer :: i
 
     if (cells%n_cells() > 0) then
       call put_grid(file, positions, cells, error)
       return
     end if
-    n = size(positions, 1, kind=i8)
-    call put_array(file, '/VTKHDF/NumberOfPoints', [n], error)
+    call put_array(file, '/VTKHDF/NumberOfPoints', [points], error)
     if (allocated(error)) return
-    call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, n, error)
+    call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, points, error)
     if (allocated(error)) return
-    call write_vectors(file, '/VTKHDF/Points', 0_i8, positions, .false., error)
+    if (size(positions, 1) > 0) call write_vectors(file, '/VTKHDF/Points', 0_i8, positions, &
+      & .false., points, error)
     if (allocated(error)) return
 
     call make_group(file, '/VTKHDF/Vertices', error)
     if (allocated(error)) return
-    call put_array(file, '/VTKHDF/Vertices/NumberOfCells', [n], error)
+    call put_array(file, '/VTKHDF/Vertices/NumberOfCells', [points], error)
     if (allocated(error)) return
-    call put_array(file, '/VTKHDF/Vertices/NumberOfConnectivityIds', [n], error)
+    call put_array(file, '/VTKHDF/Vertices/NumberOfConnectivityIds', [points], error)
     if (allocated(error)) return
-    call put_multiples(file, '/VTKHDF/Vertices/Connectivity', n, 1_i8, 0_i8, error)
+    call make_dataset(file, '/VTKHDF/Vertices/Connectivity', storage_i8, 1, points, error)
     if (allocated(error)) return
-    call put_multiples(file, '/VTKHDF/Vertices/Offsets', n + 1, 1_i8, 0_i8, error)
+    call make_dataset(file, '/VTKHDF/Vertices/Offsets', storage_i8, 1, points + 1, error)
+    if (allocated(error)) return
+    if (size(positions, 1) > 0) call write_vertices(file, 0_i8, points, points, points, error)
     if (allocated(error)) return
     do i = 1, size(empty)
       group = '/VTKHDF/'//trim(empty(i))
@@ -168,10 +173,10 @@ contains
     if (allocated(error)) return
     call make_dataset(file, '/VTKHDF/Points', storage_f8, 3, n, error)
     if (allocated(error)) return
-    call write_vectors(file, '/VTKHDF/Points', 0_i8, positions, .false., error)
+    call write_vectors(file, '/VTKHDF/Points', 0_i8, positions, .false., n, error)
     if (allocated(error)) return
     call write_vectors(file, '/VTKHDF/Points', size(positions, 1, kind=i8), cells%nodes, .false., &
-      & error)
+      & n, error)
     if (allocated(error)) return
     call put_array(file, '/VTKHDF/NumberOfCells', [cells%n_cells()], error)
     if (allocated(error)) return
@@ -188,30 +193,64 @@ contains
     if (.not. allocated(error)) call put_array(file, '/cells/topology', cells%topology, error)
   end subroutine put_grid
 
-  !> A dataset of `rows` integers 0, step, 2 step, ...; with `chunk` above 0 one that can grow.
+  !> A dataset of `rows` integers 0, step, 2 step, ... that can grow.
   subroutine put_multiples(file, path, rows, step, chunk, error)
     type(hdf5_file), intent(in) :: file
     character(*), intent(in) :: path
     integer(i8), intent(in) :: rows, step, chunk
     type(error_type), allocatable, intent(out) :: error
-    integer(i8), allocatable :: buffer(:)
-    integer(i8) :: first, i, count
 
-    if (chunk > 0) then
-      call make_series(file, path, storage_i8, 1, rows, chunk, error)
-    else
-      call make_dataset(file, path, storage_i8, 1, rows, error)
-    end if
-    allocate (buffer(min(rows, int(block_rows, i8))))
-    do first = 0, rows - 1, block_rows
-      if (allocated(error)) return
-      count = min(int(block_rows, i8), rows - first)
-      do i = 1, count
-        buffer(i) = (first + i - 1)*step
-      end do
-      call write_rows(file, path, first, buffer(:count), error)
-    end do
+    call make_series(file, path, storage_i8, 1, rows, chunk, error)
+    if (.not. allocated(error)) call write_multiples(file, path, 0_i8, rows, step, rows, error)
   end subroutine put_multiples
+
+  !> Write multiples of `step`: row k, from 0, has k step.
+  subroutine write_multiples(file, path, first, rows, step, most, error)
+    type(hdf5_file), intent(in) :: file
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: first, rows, step, most
+    type(error_type), allocatable, intent(out) :: error
+    integer(i8), allocatable :: buffer(:)
+    integer(i8) :: i, pieces, k, before, count
+
+    pieces = pieces_of(file, most)
+    do k = 1, pieces
+      before = rows*(k - 1)/pieces
+      count = rows*k/pieces - before
+      if (.not. allocated(buffer)) allocate (buffer(count + 1))
+      do i = 1, count
+        buffer(i) = (first + before + i - 1)*step
+      end do
+      call write_rows(file, path, first + before, buffer(:count), error)
+      if (allocated(error)) return
+    end do
+  end subroutine write_multiples
+
+  !> In how many pieces rows are converted and written, so that every rank has as many writes.
+  pure integer(i8) function pieces_of(file, most) result(pieces)
+    type(hdf5_file), intent(in) :: file  !! that gets them
+    integer(i8), intent(in) :: most      !! rows of the rank that has most, where all ranks write
+    integer :: rows
+    rows = merge(rows_together, block_rows, file%writing >= 0)
+    pieces = (most + rows - 1)/rows
+  end function pieces_of
+
+  !> Write the vertices of some points: each point is one.
+  subroutine write_vertices(file, first, rows, points, most, error)
+    type(hdf5_file), intent(in) :: file  !! open and writable
+    integer(i8), intent(in) :: first     !! number of the first of these points, from 0
+    integer(i8), intent(in) :: rows      !! how many
+    integer(i8), intent(in) :: points    !! of all ranks
+    integer(i8), intent(in) :: most      !! points of the rank that has most, where all ranks write
+    type(error_type), allocatable, intent(out) :: error
+    integer(i8) :: ends
+
+    ! one offset more than points
+    ends = merge(1_i8, 0_i8, first + rows == points)
+    call write_multiples(file, '/VTKHDF/Vertices/Connectivity', first, rows, 1_i8, most, error)
+    if (.not. allocated(error)) call write_multiples(file, '/VTKHDF/Vertices/Offsets', first, &
+      & rows + ends, 1_i8, most, error)
+  end subroutine write_vertices
 
   !> What else grows with time, with room for `capacity` outputs and `row_capacity` rows of history.
   subroutine make_time_series(self, file, error)
@@ -418,21 +457,24 @@ contains
   end function fixed_bytes
 
   !> Write `values(n, components)` as rows of components from row `at` on, turned block by block.
-  subroutine write_vectors(file, path, at, values, single, error)
+  subroutine write_vectors(file, path, at, values, single, most, error)
     type(hdf5_file), intent(in) :: file   !! open and writable
     character(*), intent(in) :: path      !! of the dataset, of three components
     integer(i8), intent(in) :: at         !! row of the first vector, from 0
     real(wp), intent(in) :: values(:, :)  !! (n, 3)
     logical, intent(in) :: single         !! the dataset is in single precision
+    integer(i8), intent(in) :: most       !! rows of the rank that has most, where all ranks write
     type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: turned(:, :)
     real(sp), allocatable :: short(:, :)
-    integer(i8) :: n, first, count, i
+    integer(i8) :: n, first, count, i, k, pieces
 
     n = size(values, 1, kind=i8)
-    allocate (turned(size(values, 2), min(n, int(block_rows, i8))))
-    do first = 0, n - 1, block_rows
-      count = min(int(block_rows, i8), n - first)
+    pieces = pieces_of(file, most)
+    do k = 1, pieces
+      first = n*(k - 1)/pieces
+      count = n*k/pieces - first
+      if (.not. allocated(turned)) allocate (turned(size(values, 2), count + 1))
       do i = 1, count
         turned(:, i) = values(first + i, :)
       end do

@@ -2,6 +2,7 @@
 !>
 !>     call results%create(directory, stem, positions, fields, ...)
 !>     call results%put_points('volume', volume, error)       ! any number of these
+!>     call results%settle(error)                             ! needed on several ranks only
 !>     call results%add_row([...], error)                     ! at any time
 !>     call results%begin_output(time, error)
 !>     call results%put_field('displacement', u, error)       ! each field once
@@ -11,6 +12,11 @@
 !> Nothing of an earlier run is touched before the first output is complete. After an error call
 !> `close` none the less: it leaves the files as they were at the last complete output. Where there
 !> are none, the folder is removed again if `create` made it.
+!>
+!> Several ranks share the rows of the points (`pd_output_results_rows`), and all make the same
+!> calls, each with its own rows. The first one has the files. Rows of the HDF5 file are written by
+!> their ranks if the HDF5 library is a parallel one; else, and for `.vtu` files, the first rank
+!> gets them in turns, as many at a time as it has itself.
 !>
 !> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
 !> are the fields of the last output, and `answer` gives both.
@@ -25,13 +31,15 @@ module pd_output_results_results
   use pd_output_checkpoint_earlier, only: existing_results, mark_complete, mark_unfinished, &
     & refuse_existing
   use pd_output_results_files, only: file_exists, in_directory, make_directory, remove_empty, &
-    & remove_file
+    & remove_file, sync_path
   use pd_output_results_history, only: csv_type, history_type
   use pd_output_results_lines, only: lines_type
+  use pd_output_results_rows, only: all_rows, rows_type
   use pd_output_results_sink, only: sink_type
   use pd_output_results_profiles, only: add_profile, head_of_profile
+  use pd_output_results_together, only: can_write_together
   use pd_output_results_types, only: column_type, field_type, kept_type, label_length, line_type
-  use pd_output_results_vtkhdf, only: vtkhdf_file
+  use pd_output_results_vtkhdf, only: byte_points, real_points, short_points, vtkhdf_file
   use pd_output_results_surfaces, only: remove_surfaces, surface_series, triangles_type
   use pd_output_results_vtu, only: vtu_ending, vtu_series
   use pd_output_results_xdmf, only: xdmf_file
@@ -39,6 +47,13 @@ module pd_output_results_results
   implicit none (type, external)
   private
   public :: results_type, column_type, field_type, label_length
+
+  !> An array over the points that waits to be written by all ranks.
+  type :: waiting_type
+    character(:), allocatable :: name
+    integer :: kind_of_points = 0
+    real(wp), allocatable :: values(:)  !! (rows of this rank)
+  end type waiting_type
 
   !> The results of one run.
   type :: results_type
@@ -59,7 +74,9 @@ module pd_output_results_results
     type(line_type), allocatable :: lines(:)
     type(lines_type), allocatable :: profiles(:)        !! their tables
     type(values_type), allocatable :: waiting(:)        !! their values of the output under way
-    integer :: points = 0
+    type(rows_type) :: rows              !! of the points, that this rank writes
+    real(wp), allocatable :: here(:, :)  !! positions of their points, while they are needed
+    type(waiting_type), allocatable :: of_points(:)     !! arrays that all ranks have to write
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
     character(:), allocatable :: warnings       !! a line for each
@@ -68,6 +85,9 @@ module pd_output_results_results
     logical :: in_output = .false.
     logical :: use_vtkhdf = .false., use_xdmf = .false., use_vtu = .false.
     logical :: use_surfaces = .false.
+    logical :: together = .false.        !! all ranks write rows of the HDF5 file
+    logical :: hdf5_in_turns = .false.   !! the first rank writes those of all into that file, ..
+    logical :: vtu_in_turns = .false.    !! and into .vtu files
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
     logical :: resumed = .false.         !! they are those of a run that continues
@@ -83,6 +103,7 @@ module pd_output_results_results
     !> Write an array over the points (volume [m3], body, region_NAME, ...), before the first
     !> output: `values(n)` real, 32-bit or 8-bit integer. Only the HDF5 file has a place for it.
     generic :: put_points => put_points_real, put_points_i4, put_points_i1
+    procedure :: settle
     procedure :: begin_output
     procedure, private :: put_scalar_at, put_vector_at, put_scalar_named, put_vector_named
     !> Write one field of the output under way, by its number or name: `values(n)`, or
@@ -99,6 +120,7 @@ module pd_output_results_results
     procedure :: sync
     procedure :: kept => rows_and_times
     procedure :: resumes
+    procedure :: written_by
     procedure :: keep_outputs
     procedure :: answer
   end type results_type
@@ -116,12 +138,13 @@ contains
   !> belong to the checkpoint, or if they cannot be written.
   subroutine create(self, directory, stem, positions, fields, planned_outputs, columns, &
     & planned_rows, precision, format, scene_text, command, version, overwrite, error, kept, &
-    & lines, cells, triangles)
+    & lines, cells, triangles, rows)
     class(results_type), intent(out) :: self       !! open on return, unless an error is set
     character(*), intent(in) :: directory          !! folder of the files, made if needed; '' for
                                                    !! the current one
     character(*), intent(in) :: stem               !! name of the files without their endings
-    real(wp), intent(in) :: positions(:, :)        !! (n_points, 3) in point order [m]
+    real(wp), intent(in) :: positions(:, :)        !! (n_points, 3) in point order [m], of the rows
+                                                   !! of this rank
     type(field_type), intent(in) :: fields(:)      !! (any number) that every output has
     integer, intent(in) :: planned_outputs         !! their number; 0: unknown
     type(column_type), intent(in) :: columns(:)    !! (any number) of the history; none: no history
@@ -140,12 +163,15 @@ contains
     type(cells_type), intent(in), optional :: cells    !! of meshes, for the HDF5 file and its list
     type(triangles_type), intent(in), optional :: triangles
       !! of rigid bodies, for files of their own; none without
+    type(rows_type), intent(in), optional :: rows  !! that this rank writes; absent: all
     logical :: single
 
     call check_description(positions, fields, columns, precision, format, error)
     if (allocated(error)) return
+    self%rows = all_rows(size(positions, 1))
+    if (present(rows)) self%rows = rows
     self%resumed = .false.
-    self%in_files = directory /= ''
+    self%in_files = directory /= '' .and. self%rows%on_first
     if (self%in_files) then
       if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
       if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
@@ -159,7 +185,6 @@ contains
     allocate (self%fields, source=fields)
     allocate (self%columns, source=columns)
     allocate (self%given(size(fields)), source=.false.)
-    self%points = size(positions, 1)
     self%planned_outputs = planned_outputs
     allocate (self%lines(0))
     if (present(lines)) self%lines = lines
@@ -167,6 +192,10 @@ contains
     single = lower_case(precision) == 'single'
     self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
+    allocate (self%of_points(0))
+    if (directory /= '' .and. self%rows%divided()) call share_files(self, directory, format, &
+      & fields, single)
+    if (self%use_vtu .or. self%rows%divided()) self%here = positions
     ! room for one output at least; whether there are too many shows with the file
     self%use_xdmf = self%use_vtkhdf .and. has_list(stem, format, fields, 1)
     if (present(triangles)) self%use_surfaces = self%in_files .and. size(triangles%body) > 0
@@ -177,21 +206,26 @@ contains
       if (size(kept%rows, 1) == size(columns)) &
         & call self%history%restore(kept%rows, written=self%resumed)
     end if
-    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, positions, fields, single)
+    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, int(self%rows%all), fields, &
+      & single)
     if (self%use_surfaces) call self%surfaces%create(self%directory, self%stem, triangles)
     if (self%use_xdmf) call self%xdmf%create(in_directory(directory, self%stem//'.xdmf'), &
-      & self%stem//'.vtkhdf', size(positions, 1, kind=i8), fields, planned_outputs, single, &
-      & cells)
-    if (self%resumed) then
+      & self%stem//'.vtkhdf', self%rows%all, fields, planned_outputs, single, cells)
+    if (self%resumed .and. self%in_files) then
       if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
-        & size(positions, 1, kind=i8), fields, planned_outputs, columns, planned_rows, single, &
+        & self%rows%all, fields, planned_outputs, columns, planned_rows, single, &
         & scene_text, kept, error, self%lines, cells)
       if (self%use_vtkhdf .and. .not. allocated(error)) &
         & call cut_back(self, kept%times, scene_text, command, version, error)
       if (.not. allocated(error)) call resume_others(self, kept, error)
       if (allocated(error)) return
+    else if (self%resumed) then
+      self%times = kept%times
+      self%outputs = size(kept%times)
+      self%started = .true.
     else if (self%use_vtkhdf) then
-      call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), positions, fields, &
+      call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), self%rows%all, &
+        & positions(:merge(0, size(positions, 1), self%rows%divided()), :), fields, &
         & planned_outputs, columns, planned_rows, single, scene_text, command, version, error, &
         & self%lines, cells)
       if (allocated(error)) then
@@ -202,6 +236,27 @@ contains
     end if
     self%open = .true.
   end subroutine create
+
+  !> How ranks write the files of the first one; all learn whether these go on from an earlier run.
+  subroutine share_files(self, directory, format, fields, single)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: directory, format
+    type(field_type), intent(in) :: fields(:)
+    logical, intent(in) :: single
+    real(wp) :: goes_on(1)
+    logical :: hdf5
+
+    hdf5 = lower_case(format) /= 'vtu'
+    self%together = hdf5 .and. can_write_together()
+    self%hdf5_in_turns = hdf5 .and. .not. self%together
+    self%vtu_in_turns = lower_case(format) /= 'vtkhdf'
+    goes_on = merge(1.0_wp, 0.0_wp, self%resumed)
+    call self%rows%ranks%take_largest(goes_on)
+    if (self%in_files) return
+    if (hdf5) call self%vtkhdf%attend(in_directory(directory, self%stem//'.vtkhdf'), &
+      & self%rows%all, fields, single)
+    self%resumed = goes_on(1) > 0.0_wp
+  end subroutine share_files
 
   !> Cut the HDF5 file to the outputs at `times`, and the list of its outputs before it, so that the
   !> list never has more of them than the file.
@@ -271,7 +326,11 @@ contains
     character(*), intent(in) :: name               !! of the array, below `/points`
     real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
-    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (self%rows%divided()) then
+      call put_rows_of_points(self, name, real_points, values, error)
+    else if (self%use_vtkhdf) then
+      call self%vtkhdf%put_points(name, values, error)
+    end if
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_real
 
@@ -282,7 +341,11 @@ contains
     character(*), intent(in) :: name                  !! of the array, below `/points`
     integer(i4), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
-    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (self%rows%divided()) then
+      call put_rows_of_points(self, name, short_points, real(values, wp), error)
+    else if (self%use_vtkhdf) then
+      call self%vtkhdf%put_points(name, values, error)
+    end if
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i4
 
@@ -293,9 +356,85 @@ contains
     character(*), intent(in) :: name                  !! of the array, below `/points`
     integer(i1), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
-    if (self%use_vtkhdf) call self%vtkhdf%put_points(name, values, error)
+    if (self%rows%divided()) then
+      call put_rows_of_points(self, name, byte_points, real(values, wp), error)
+    else if (self%use_vtkhdf) then
+      call self%vtkhdf%put_points(name, values, error)
+    end if
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i1
+
+  !> An array over the points of several ranks: the first one makes it. All write their rows when
+  !> the file is laid out, or the first one gets them now.
+  subroutine put_rows_of_points(self, name, kind_of_points, values, error)
+    class(results_type), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: kind_of_points
+    real(wp), intent(in) :: values(:)
+    type(error_type), allocatable, intent(out) :: error
+    type(waiting_type) :: waiting
+    real(wp), allocatable :: got(:, :)
+    integer(i8) :: first
+    integer :: turn
+
+    if (size(values) /= self%rows%n) then
+      call fail(error, 'points/'//trim(name)//' needs one value for each point')
+      return
+    end if
+    if (self%use_vtkhdf) call self%vtkhdf%make_points(name, kind_of_points, error)
+    if (allocated(error)) return
+    if (self%together) then
+      waiting%name = trim(name)
+      waiting%kind_of_points = kind_of_points
+      waiting%values = values
+      self%of_points = [self%of_points, waiting]
+    else if (self%hdf5_in_turns) then
+      do turn = 1, self%rows%turns()
+        call self%rows%take_turn(turn, reshape(values, [size(values), 1]), first, got)
+        if (self%use_vtkhdf) call self%vtkhdf%put_rows_of_points(name, kind_of_points, first, &
+          & got(:, 1), error)
+        if (allocated(error)) return
+      end do
+    end if
+  end subroutine put_rows_of_points
+
+  !> On several ranks, after the last `put_points` and before the first output: write what the
+  !> points are, unless the files go on from an earlier run.
+  subroutine settle(self, error)
+    class(results_type), intent(inout) :: self  !! created
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: got(:, :)
+    integer(i8) :: first
+    integer :: i, turn
+
+    if (self%together .and. .not. self%resumed) then
+      if (self%use_vtkhdf) call self%vtkhdf%seal(error)
+      if (allocated(error)) return
+      call self%rows%wait()
+      call self%vtkhdf%open_shared(.false., error)
+      if (.not. allocated(error)) call self%vtkhdf%put_geometry_of_rows(self%rows%before, &
+        & self%here, self%rows%most, error)
+      do i = 1, size(self%of_points)
+        if (allocated(error)) exit
+        associate (waiting => self%of_points(i))
+          call self%vtkhdf%put_rows_of_points(waiting%name, waiting%kind_of_points, &
+            & self%rows%before, waiting%values, error)
+        end associate
+      end do
+      if (.not. allocated(error)) call self%vtkhdf%close_shared(error)
+      deallocate (self%of_points)
+    else if (self%hdf5_in_turns .and. .not. self%resumed) then
+      do turn = 1, self%rows%turns()
+        call self%rows%take_turn(turn, self%here, first, got)
+        if (self%use_vtkhdf) call self%vtkhdf%put_geometry_of_rows(first, got, &
+          & size(got, 1, kind=i8), error)
+        if (allocated(error)) exit
+      end do
+    end if
+    if (allocated(error)) self%failed = .true.
+    if (.not. (self%use_vtu .or. self%vtu_in_turns) .and. allocated(self%here)) &
+      & deallocate (self%here)
+  end subroutine settle
 
   !> Begin the output of the state at `time` [s]. An error if the results are not open, if another
   !> output is under way, or if the files cannot be written.
@@ -314,9 +453,58 @@ contains
     if (.not. allocated(error)) call check_views(self)
     if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%begin_output(error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%begin_output(error)
+    if (.not. allocated(error)) call begin_rows(self, error)
     if (allocated(error)) call explain_output(self, error)
     self%in_output = .not. allocated(error)
   end subroutine begin_output
+
+  !> Begin the rows of an output: all ranks open the HDF5 file, whose records stay as they are from
+  !> now on, and `.vtu` files get the positions.
+  subroutine begin_rows(self, error)
+    class(results_type), intent(inout) :: self
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: got(:, :)
+    integer(i8) :: first
+    integer :: turn
+
+    if (self%together) then
+      call self%rows%wait()
+      call self%vtkhdf%open_shared(self%started .or. self%resumed, error)
+      if (allocated(error)) return
+    end if
+    if (self%vtu_in_turns) then
+      do turn = 1, self%rows%turns()
+        call self%rows%take_turn(turn, self%here, first, got)
+        if (self%use_vtu) call self%vtu%put_positions(first, got, error)
+        if (allocated(error)) return
+      end do
+    else if (self%use_vtu) then
+      call self%vtu%put_positions(0_i8, self%here, error)
+    end if
+  end subroutine begin_rows
+
+  !> Write the rows of a field on several ranks.
+  subroutine put_rows(self, field, values, error)
+    class(results_type), intent(inout) :: self
+    integer, intent(in) :: field
+    real(wp), intent(in) :: values(:, :)  !! (rows of this rank, components)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), allocatable :: got(:, :)
+    integer(i8) :: first
+    integer :: turn
+
+    if (self%together) call self%vtkhdf%put_rows(field, self%outputs, self%rows%before, values, &
+      & self%rows%most, error)
+    if (allocated(error) .or. .not. (self%hdf5_in_turns .or. self%vtu_in_turns)) return
+    do turn = 1, self%rows%turns()
+      call self%rows%take_turn(turn, values, first, got)
+      if (self%use_vtkhdf .and. self%hdf5_in_turns) call self%vtkhdf%put_rows(field, self%outputs, &
+        & first, got, size(got, 1, kind=i8), error)
+      if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, first, got, &
+        & error)
+      if (allocated(error)) return
+    end do
+  end subroutine put_rows
 
   !> A field of one component, by its number. An error outside an output, for a field given twice or
   !> of another shape, or if it cannot be written.
@@ -328,8 +516,13 @@ contains
 
     call check_field(self, field, size(values), 1, error)
     if (allocated(error)) return
-    if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
-    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
+    if (self%rows%divided()) then
+      call put_rows(self, field, reshape(values, [size(values), 1]), error)
+    else
+      if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
+      if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, 0_i8, &
+        & reshape(values, [size(values), 1]), error)
+    end if
     if (allocated(error)) call explain_output(self, error)
     self%given(field) = .not. allocated(error)
     if (allocated(self%latest)) self%latest(field)%values = reshape(values, [size(values), 1])
@@ -346,8 +539,13 @@ contains
 
     call check_field(self, field, size(values, 1), size(values, 2), error)
     if (allocated(error)) return
-    if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
-    if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, values, error)
+    if (self%rows%divided()) then
+      call put_rows(self, field, values, error)
+    else
+      if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
+      if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, 0_i8, values, &
+        & error)
+    end if
     if (allocated(error)) call explain_output(self, error)
     self%given(field) = .not. allocated(error)
     if (allocated(self%latest)) self%latest(field)%values = values
@@ -459,8 +657,8 @@ contains
       call fail(error, 'these results have no field '//to_text(field))
     else if (self%given(field)) then
       call fail(error, 'field '//trim(self%fields(field)%name)//' is given twice in one output')
-    else if (points /= self%points .or. components /= self%fields(field)%components) then
-      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%points) &
+    else if (points /= self%rows%n .or. components /= self%fields(field)%components) then
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%rows%n) &
         & //' x '//to_text(self%fields(field)%components)//', not '//to_text(points)//' x ' &
         & //to_text(components))
     end if
@@ -492,6 +690,15 @@ contains
     if (self%use_surfaces .and. .not. allocated(self%places)) then
       call fail(error, 'the surfaces of rigid bodies are missing from an output')
       return
+    end if
+    ! the output counts when all ranks have written their rows
+    if (self%together) then
+      call self%vtkhdf%close_shared(error)
+      if (allocated(error)) then
+        call explain_output(self, error)
+        return
+      end if
+      call self%rows%wait()
     end if
     ! rows first: a file that counts this output holds the history up to it
     call self%history%take(table)
@@ -686,7 +893,7 @@ contains
     integer(i8) :: bytes
 
     bytes = 0
-    if (self%use_vtkhdf) bytes = self%vtkhdf%output_bytes()
+    if (self%use_vtkhdf .or. self%together) bytes = self%vtkhdf%output_bytes()
     if (self%use_vtu) bytes = bytes + self%vtu%output_bytes()
     if (self%use_surfaces) bytes = bytes + self%surfaces%output_bytes()
     call explain_need(self, 'output '//to_text(self%outputs + 1)//' at '// &
@@ -714,6 +921,11 @@ contains
     integer :: i
 
     if (.not. (self%open .and. self%started)) return
+    ! what a rank has written may lie in the memory of its machine
+    if (self%together .and. .not. self%in_files) then
+      call sync_path(in_directory(self%directory, self%stem//'.vtkhdf'), error)
+      return
+    end if
     call write_rows(self, error)
     if (self%use_vtkhdf .and. .not. allocated(error)) call self%vtkhdf%sync(error)
     if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%sync(error)
@@ -744,6 +956,17 @@ contains
     class(results_type), intent(in) :: self  !! the results
     resumes = self%resumed
   end function resumes
+
+  !> Which ranks write the fields; '' where there is one, or no file.
+  pure function written_by(self) result(text)
+    class(results_type), intent(in) :: self  !! the results
+    character(:), allocatable :: text
+
+    text = ''
+    if (self%together) text = 'all ranks'
+    if (self%hdf5_in_turns .or. (self%vtu_in_turns .and. .not. self%together)) &
+      & text = 'the first rank'
+  end function written_by
 
   !> From now on keep the fields of each output in memory until the next one is complete.
   subroutine keep_outputs(self, positions)

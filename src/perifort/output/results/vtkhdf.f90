@@ -15,20 +15,24 @@ module pd_output_results_vtkhdf
   use pd_base_kinds, only: wp, sp, i1, i4, i8
   use pd_base_text, only: to_text
   use pd_output_results_cells, only: at_nodes, cells_type, of_cells
-  use pd_output_results_datasets, only: get_chunk, get_shape, put_array, read_rows, set_rows, &
-    & write_rows
+  use pd_output_results_datasets, only: get_chunk, get_shape, make_dataset, put_array, read_rows, &
+    & set_rows, storage_f8, storage_i1, storage_i4, write_rows
   use pd_output_results_files, only: remove_file, rename_file, sync_path
   use pd_output_results_hdf5, only: change_attribute, close_file, create_file, flush_file, &
     & get_attribute, get_text, hdf5_file, make_group, object_exists, open_file, put_text, &
     & remove_object, start_hdf5
-  use pd_output_results_layout, only: block_rows, copy_scene, layout_type, &
-    & put_geometry, put_scene, to_single, write_vectors
+  use pd_output_results_layout, only: copy_scene, layout_type, pieces_of, put_geometry, put_scene, &
+    & to_single, write_vectors, write_vertices
   use pd_output_results_profiles, only: put_profile
   use pd_output_results_types, only: column_type, field_type, kept_type, line_type
   use pd_output_results_views, only: views_fit
   implicit none (type, external)
   private
-  public :: vtkhdf_file
+  public :: vtkhdf_file, real_points, short_points, byte_points
+
+  !> Kinds of arrays over the points.
+  integer, parameter :: real_points = storage_f8, short_points = storage_i4, &
+    & byte_points = storage_i1
 
   integer(i8), parameter :: default_outputs = 16_i8, default_rows = 4096_i8
 
@@ -36,6 +40,7 @@ module pd_output_results_vtkhdf
   type :: vtkhdf_file
     private
     type(hdf5_file) :: file
+    type(hdf5_file) :: shared             !! the same while all ranks write rows into it
     type(layout_type) :: layout
     character(:), allocatable :: path     !! the final name
     character(:), allocatable :: current  !! the present name
@@ -51,6 +56,14 @@ module pd_output_results_vtkhdf
     procedure, private :: put_points_real, put_points_i4, put_points_i1
     !> Add an array over the points to `/points`, before the first output.
     generic :: put_points => put_points_real, put_points_i4, put_points_i1
+    procedure :: attend
+    procedure :: make_points
+    procedure :: put_rows_of_points
+    procedure :: put_geometry_of_rows
+    procedure :: seal
+    procedure :: open_shared
+    procedure :: close_shared
+    procedure :: put_rows
     procedure :: begin_output
     procedure, private :: put_scalar, put_vector
     !> Write one field of the output under way: `values(n)` or `values(n, components)`.
@@ -73,11 +86,13 @@ contains
   !> Lay out a file for `planned_outputs` outputs of `fields` and `planned_rows` history rows of
   !> `columns` (0 = unknown) at the points `positions(n, 3)` [m]. It is
   !> made under another name until `publish`.
-  subroutine create(self, path, positions, fields, planned_outputs, columns, planned_rows, single, &
-    & scene_text, command, version, error, lines, cells)
+  subroutine create(self, path, points, positions, fields, planned_outputs, columns, &
+    & planned_rows, single, scene_text, command, version, error, lines, cells)
     class(vtkhdf_file), intent(out) :: self      !! open on return, unless an error is set
     character(*), intent(in) :: path             !! of the file, with its ending
-    real(wp), intent(in) :: positions(:, :)      !! (n_points, 3) in point order [m]
+    integer(i8), intent(in) :: points            !! their number
+    real(wp), intent(in) :: positions(:, :)      !! (n_points, 3) in point order [m]; (0, 3): rows
+                                                 !! of points come by `put_geometry_of_rows`
     type(field_type), intent(in) :: fields(:)    !! (any number) that every output has
     integer, intent(in) :: planned_outputs       !! their number; 0: unknown
     type(column_type), intent(in) :: columns(:)  !! (any number) of the history
@@ -93,8 +108,7 @@ contains
     self%path = path
     self%current = path//'.part'
     if (present(cells)) self%layout%cells = cells
-    call plan_layout(self, size(positions, 1, kind=i8), fields, planned_outputs, columns, &
-      & planned_rows, single, lines)
+    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, lines)
     call start_hdf5(error)
     if (allocated(error)) return
     call remove_file(path//'.grow')  ! a killed run may have left it
@@ -104,7 +118,7 @@ contains
       return
     end if
     call self%layout%make_heart(self%file, error)
-    if (.not. allocated(error)) call put_geometry(self%file, positions, &
+    if (.not. allocated(error)) call put_geometry(self%file, points, positions, &
       & self%layout%cells, error)
     if (.not. allocated(error)) call put_scene(self%file, scene_text, command, version, error)
     if (.not. allocated(error)) call make_group(self%file, '/points', error)
@@ -312,9 +326,123 @@ contains
     end if
   end subroutine check_points
 
+  !> Take part in the file of the first rank, without files of one's own: what is needed to write
+  !> rows into it.
+  subroutine attend(self, path, points, fields, single)
+    class(vtkhdf_file), intent(out) :: self     !! not open; knows its rows on return
+    character(*), intent(in) :: path            !! of the file, with its ending
+    integer(i8), intent(in) :: points           !! of all ranks
+    type(field_type), intent(in) :: fields(:)   !! (any number) that every output has
+    logical, intent(in) :: single               !! fields in single precision
+
+    self%path = path
+    self%current = path
+    call plan_layout(self, points, fields, 0, [column_type ::], 0, single)
+  end subroutine attend
+
+  !> Make an array over the points in `/points`, before the first output; its rows come by
+  !> `put_rows_of_points`.
+  subroutine make_points(self, name, kind_of_points, error)
+    class(vtkhdf_file), intent(inout) :: self  !! being laid out
+    character(*), intent(in) :: name           !! of the array, below `/points`
+    integer, intent(in) :: kind_of_points      !! `real_points`, `short_points` or `byte_points`
+    type(error_type), allocatable, intent(out) :: error
+
+    call check_points(self, name, self%layout%points, error)
+    if (.not. allocated(error)) call make_dataset(self%file, '/points/'//trim(name), &
+      & kind_of_points, 1, self%layout%points, error)
+  end subroutine make_points
+
+  !> Write rows of an array over the points.
+  subroutine put_rows_of_points(self, name, kind_of_points, first, values, error)
+    class(vtkhdf_file), intent(inout) :: self      !! made; open, shared or by this rank alone
+    character(*), intent(in) :: name               !! of the array, below `/points`
+    integer, intent(in) :: kind_of_points          !! as it was made
+    integer(i8), intent(in) :: first               !! row of the first value, from 0
+    real(wp), contiguous, intent(in) :: values(:)  !! (rows) in point order
+    type(error_type), allocatable, intent(out) :: error
+    type(hdf5_file) :: file
+    character(:), allocatable :: path
+
+    file = self%file
+    if (self%shared%id >= 0) file = self%shared
+    path = '/points/'//trim(name)
+    select case (kind_of_points)
+    case (real_points)
+      call write_rows(file, path, first, values, error)
+    case (short_points)
+      call write_rows(file, path, first, nint(values, i4), error)
+    case (byte_points)
+      call write_rows(file, path, first, nint(values, i1), error)
+    case default
+      call fail(error, 'points/'//trim(name)//' is of an unknown kind')
+    end select
+  end subroutine put_rows_of_points
+
+  !> Write the positions of some points, and their vertices.
+  subroutine put_geometry_of_rows(self, first, positions, most, error)
+    class(vtkhdf_file), intent(inout) :: self  !! open, shared or by this rank alone
+    integer(i8), intent(in) :: first           !! row of the first point, from 0
+    real(wp), intent(in) :: positions(:, :)    !! (rows, 3) in point order [m]
+    integer(i8), intent(in) :: most            !! rows of the rank that has most, where all write
+    type(error_type), allocatable, intent(out) :: error
+    type(hdf5_file) :: file
+
+    file = self%file
+    if (self%shared%id >= 0) file = self%shared
+    call write_vectors(file, '/VTKHDF/Points', first, positions, .false., most, error)
+    if (.not. allocated(error)) call write_vertices(file, first, size(positions, 1, kind=i8), &
+      & self%layout%points, most, error)
+  end subroutine put_geometry_of_rows
+
+  !> Open the file on all ranks, to write rows into it until `close_shared`. HDF5's own records must
+  !> not change in between. A file that the first rank has open, too: HDF5 knows it twice there, and
+  !> the other way alone writes records.
+  subroutine open_shared(self, published, error)
+    class(vtkhdf_file), intent(inout) :: self  !! laid out by the first rank
+    logical, intent(in) :: published           !! it has its final name
+    type(error_type), allocatable, intent(out) :: error
+
+    call start_hdf5(error)
+    if (allocated(error)) return
+    call open_file(self%path//trim(merge('     ', '.part', published)), .true., self%shared, &
+      & error, together=.true.)
+  end subroutine open_shared
+
+  !> Close the file on all ranks.
+  subroutine close_shared(self, error)
+    class(vtkhdf_file), intent(inout) :: self  !! opened by `open_shared`
+    type(error_type), allocatable, intent(out) :: error
+    call close_file(self%shared, error)
+  end subroutine close_shared
+
+  !> Write rows of field `i` of output `output`.
+  subroutine put_rows(self, i, output, first, values, most, error)
+    class(vtkhdf_file), intent(inout) :: self  !! open, shared or by this rank alone
+    integer, intent(in) :: i                   !! number of the field, from 1
+    integer, intent(in) :: output              !! its number, from 0
+    integer(i8), intent(in) :: first           !! row of the first value in the output, from 0
+    real(wp), intent(in) :: values(:, :)       !! (rows, components) in point order
+    integer(i8), intent(in) :: most            !! rows of the rank that has most, where all write
+    type(error_type), allocatable, intent(out) :: error
+    type(hdf5_file) :: file
+    character(:), allocatable :: path
+    integer(i8) :: at
+
+    file = self%file
+    if (self%shared%id >= 0) file = self%shared
+    path = '/VTKHDF/PointData/'//trim(self%layout%fields(i)%name)
+    at = output*self%layout%points + first
+    if (size(values, 2) == 1) then
+      call put_column(file, path, at, values(:, 1), self%layout%single, most, error)
+    else
+      call write_vectors(file, path, at, values, self%layout%single, most, error)
+    end if
+  end subroutine put_rows
+
   !> End the layout: from here on HDF5's own records stay as they are.
   subroutine seal(self, error)
-    class(vtkhdf_file), intent(inout) :: self
+    class(vtkhdf_file), intent(inout) :: self  !! laid out
     type(error_type), allocatable, intent(out) :: error
 
     if (self%sealed) return
@@ -346,33 +474,41 @@ contains
     name = trim(self%layout%fields(i)%name)
     associate (layout => self%layout, rule => self%layout%fields(i)%at_nodes)
       at = self%outputs*layout%rows_of_output()
-      call put_column(self, '/VTKHDF/PointData/'//name, at, values, error)
+      call put_column(self%file, '/VTKHDF/PointData/'//name, at, values, layout%single, &
+        & size(values, kind=i8), error)
       if (layout%cells%n_cells() == 0 .or. allocated(error)) return
-      call put_column(self, '/VTKHDF/PointData/'//name, at + layout%points, &
-        & at_nodes(layout%cells, rule, values), error)
-      if (.not. allocated(error)) call put_column(self, '/VTKHDF/CellData/'//name, &
-        & self%outputs*layout%cells%n_cells(), of_cells(layout%cells, rule, values), error)
+      call put_column(self%file, '/VTKHDF/PointData/'//name, at + layout%points, &
+        & at_nodes(layout%cells, rule, values), layout%single, layout%cells%n_nodes(), error)
+      if (.not. allocated(error)) call put_column(self%file, '/VTKHDF/CellData/'//name, &
+        & self%outputs*layout%cells%n_cells(), of_cells(layout%cells, rule, values), &
+        & layout%single, layout%cells%n_cells(), error)
     end associate
   end subroutine put_scalar
 
-  !> Write numbers from row `at` of a dataset on.
-  subroutine put_column(self, path, at, values, error)
-    class(vtkhdf_file), intent(in) :: self
+  !> Write numbers from row `at` of a dataset on. `most`: rows of the rank that has most, where all
+  !> write.
+  subroutine put_column(file, path, at, values, single, most, error)
+    type(hdf5_file), intent(in) :: file
     character(*), intent(in) :: path
     integer(i8), intent(in) :: at
     real(wp), contiguous, intent(in) :: values(:)
+    logical, intent(in) :: single
+    integer(i8), intent(in) :: most
     type(error_type), allocatable, intent(out) :: error
     real(sp), allocatable :: short(:)
-    integer(i8) :: first, count
+    integer(i8) :: n, first, last, k, pieces
 
-    if (.not. self%layout%single) then
-      call write_rows(self%file, path, at, values, error)
-      return
-    end if
-    do first = 0, size(values, kind=i8) - 1, block_rows
-      count = min(int(block_rows, i8), size(values, kind=i8) - first)
-      short = to_single(values(first + 1:first + count))
-      call write_rows(self%file, path, at + first, short, error)
+    n = size(values, kind=i8)
+    pieces = pieces_of(file, most)
+    do k = 1, pieces
+      first = n*(k - 1)/pieces
+      last = n*k/pieces
+      if (single) then
+        short = to_single(values(first + 1:last))
+        call write_rows(file, path, at + first, short, error)
+      else
+        call write_rows(file, path, at + first, values(first + 1:last), error)
+      end if
       if (allocated(error)) return
     end do
   end subroutine put_column
@@ -391,7 +527,8 @@ contains
     name = trim(self%layout%fields(i)%name)
     associate (layout => self%layout, rule => self%layout%fields(i)%at_nodes)
       at = self%outputs*layout%rows_of_output()
-      call write_vectors(self%file, '/VTKHDF/PointData/'//name, at, values, layout%single, error)
+      call write_vectors(self%file, '/VTKHDF/PointData/'//name, at, values, layout%single, &
+        & size(values, 1, kind=i8), error)
       if (layout%cells%n_cells() == 0 .or. allocated(error)) return
       allocate (nodes(layout%cells%n_nodes(), size(values, 2)))
       allocate (cells(layout%cells%n_cells(), size(values, 2)))
@@ -400,9 +537,9 @@ contains
         cells(:, c) = of_cells(layout%cells, rule, values(:, c))
       end do
       call write_vectors(self%file, '/VTKHDF/PointData/'//name, at + layout%points, nodes, &
-        & layout%single, error)
+        & layout%single, layout%cells%n_nodes(), error)
       if (.not. allocated(error)) call write_vectors(self%file, '/VTKHDF/CellData/'//name, &
-        & self%outputs*layout%cells%n_cells(), cells, layout%single, error)
+        & self%outputs*layout%cells%n_cells(), cells, layout%single, layout%cells%n_cells(), error)
     end associate
   end subroutine put_vector
 
@@ -594,6 +731,7 @@ contains
       end if
     end if
     self%file%id = -1
+    self%shared%id = -1
   end subroutine abandon
 
   !> Bytes that one output takes.

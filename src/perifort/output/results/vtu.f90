@@ -13,7 +13,7 @@ module pd_output_results_vtu
   use pd_output_results_sink, only: sink_type
   use pd_output_results_types, only: field_type
   use pd_output_results_xml, only: array_type, begin_array, end_array, member, put_bytes, &
-    & put_reals, put_vectors, remove_series, write_list
+    & put_rows, remove_series, write_list
   implicit none (type, external)
   private
   public :: vtu_series, vtu_ending
@@ -26,20 +26,20 @@ module pd_output_results_vtu
     private
     character(:), allocatable :: directory, stem
     type(field_type), allocatable :: fields(:)
-    real(wp), allocatable :: positions(:, :)
+    integer :: points = 0
     real(wp), allocatable :: times(:)
     integer :: outputs = 0
     integer :: synced = 0    !! outputs that are certainly on the disk
     logical :: single = .false.
     type(sink_type) :: sink
+    type(array_type) :: array  !! under way
   contains
     procedure :: create
     procedure :: resume
     procedure :: sync
     procedure :: begin_output
-    procedure, private :: put_scalar, put_vector
-    !> Write one field of the output under way: `values(n)` or `values(n, components)`.
-    generic :: put_field => put_scalar, put_vector
+    procedure :: put_positions
+    procedure :: put_field
     procedure :: end_output
     procedure :: output_bytes
     procedure :: abandon
@@ -47,19 +47,19 @@ module pd_output_results_vtu
 
 contains
 
-  !> Begin a series `stem_000000.vtu` ... in `directory` of `fields` at `positions(n, 3)` [m].
-  subroutine create(self, directory, stem, positions, fields, single)
+  !> Begin a series `stem_000000.vtu` ... in `directory` of `fields` at so many points.
+  subroutine create(self, directory, stem, points, fields, single)
     class(vtu_series), intent(out) :: self     !! without an output; no file is made yet
     character(*), intent(in) :: directory      !! folder of the files, which is there
     character(*), intent(in) :: stem           !! name of the files without number and ending
-    real(wp), intent(in) :: positions(:, :)    !! (n_points, 3) in point order [m]
+    integer, intent(in) :: points              !! their number
     type(field_type), intent(in) :: fields(:)  !! (any number) that every output has
     logical, intent(in) :: single              !! fields in single precision
 
     self%directory = directory
     self%stem = stem
     allocate (self%fields, source=fields)
-    allocate (self%positions, source=positions)
+    self%points = points
     allocate (self%times(16))
     self%single = single
   end subroutine create
@@ -103,13 +103,13 @@ contains
     call sync_path(in_directory(self%directory, self%stem//'.pvd'), error)
   end subroutine sync
 
-  !> Begin the file of the next output: points and cells.
+  !> Begin the file of the next output, up to its points.
   subroutine begin_output(self, error)
     class(vtu_series), intent(inout) :: self  !! with a file open on return
     type(error_type), allocatable, intent(out) :: error
     character(24) :: n
 
-    write (n, '(i0)') size(self%positions, 1)
+    write (n, '(i0)') self%points
     call self%sink%open(in_directory(self%directory, member(self%stem, self%outputs, &
       & vtu_ending)//'.part'), &
       & error)
@@ -119,11 +119,6 @@ contains
       & //' header_type="UInt64">'//newline//'<UnstructuredGrid>'//newline &
       & //'<Piece NumberOfPoints="'//trim(n)//'" NumberOfCells="'//trim(n)//'">'//newline &
       & //'<Points>', error)
-    if (.not. allocated(error)) &
-      & call put_vectors(self%sink, 'Points', self%positions, .false., error)
-    if (.not. allocated(error)) call self%sink%line('</Points>'//newline//'<Cells>', error)
-    if (.not. allocated(error)) call put_cells(self%sink, size(self%positions, 1), error)
-    if (.not. allocated(error)) call self%sink%line('</Cells>'//newline//'<PointData>', error)
   end subroutine begin_output
 
   !> A vertex at each point.
@@ -162,35 +157,50 @@ contains
     if (.not. allocated(error)) call end_array(sink, array, error)
   end subroutine put_cells
 
-  !> Write field `i` of the output under way: `values(n)`.
-  subroutine put_scalar(self, i, values, error)
-    class(vtu_series), intent(inout) :: self       !! the series
-    integer, intent(in) :: i                       !! number of the field, from 1
-    real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order, in the field's unit
+  !> Write positions of points; the first rows come first. The cells follow those of the last point.
+  subroutine put_positions(self, first, positions, error)
+    class(vtu_series), intent(inout) :: self   !! with an output that has just begun
+    integer(i8), intent(in) :: first           !! row of the first point, from 0
+    real(wp), intent(in) :: positions(:, :)    !! (rows, 3) in point order [m]
     type(error_type), allocatable, intent(out) :: error
-    type(array_type) :: array
-    integer :: n, first, count
 
-    n = size(values)
-    call begin_array(self%sink, array, merge('Float32', 'Float64', self%single), &
-      & trim(self%fields(i)%name), 1, merge(4_i8, 8_i8, self%single)*n, error)
-    do first = 0, n - 1, block_rows
-      if (allocated(error)) return
-      count = min(block_rows, n - first)
-      call put_reals(self%sink, array, values(first + 1:first + count), self%single, error)
-    end do
-    if (.not. allocated(error)) call end_array(self%sink, array, error)
-  end subroutine put_scalar
+    call put_next(self, 'Points', '', first, positions, .false., error)
+    if (allocated(error) .or. first + size(positions, 1) < self%points) return
+    call self%sink%line('</Points>'//newline//'<Cells>', error)
+    if (.not. allocated(error)) call put_cells(self%sink, self%points, error)
+    if (.not. allocated(error)) call self%sink%line('</Cells>'//newline//'<PointData>', error)
+  end subroutine put_positions
 
-  !> Write field `i` of the output under way: `values(n, 3)`.
-  subroutine put_vector(self, i, values, error)
+  !> Write rows of field `i` of the output under way; the first rows come first.
+  subroutine put_field(self, i, first, values, error)
     class(vtu_series), intent(inout) :: self  !! the series
     integer, intent(in) :: i                  !! number of the field, from 1
-    real(wp), intent(in) :: values(:, :)      !! (n_points, 3) in point order, in the field's unit
+    integer(i8), intent(in) :: first          !! row of the first value, from 0
+    real(wp), intent(in) :: values(:, :)      !! (rows, components) in point order, in the field's
+                                              !! unit
     type(error_type), allocatable, intent(out) :: error
-    call put_vectors(self%sink, trim(self%fields(i)%name), values, self%single, error, &
-      & trim(self%fields(i)%labels))
-  end subroutine put_vector
+    call put_next(self, trim(self%fields(i)%name), trim(self%fields(i)%labels), first, values, &
+      & self%single, error)
+  end subroutine put_field
+
+  !> The next rows of an array, which begins with the first one and ends with the last.
+  subroutine put_next(self, name, labels, first, values, single, error)
+    class(vtu_series), intent(inout) :: self
+    character(*), intent(in) :: name, labels
+    integer(i8), intent(in) :: first
+    real(wp), intent(in) :: values(:, :)
+    logical, intent(in) :: single
+    type(error_type), allocatable, intent(out) :: error
+    integer :: width
+
+    width = size(values, 2)
+    if (first == 0) self%array = array_type()
+    if (first == 0) call begin_array(self%sink, self%array, merge('Float32', 'Float64', single), &
+      & name, width, merge(4_i8, 8_i8, single)*self%points*width, error, labels)
+    if (.not. allocated(error)) call put_rows(self%sink, self%array, values, single, error)
+    if (.not. allocated(error) .and. first + size(values, 1) >= self%points) &
+      & call end_array(self%sink, self%array, error)
+  end subroutine put_next
 
   !> Complete the file of the output at `time` [s] and list it.
   subroutine end_output(self, time, error)
@@ -222,7 +232,7 @@ contains
     integer(i8) :: width
 
     width = 3*8 + 2*8 + 1 + sum(self%fields%components)*merge(4, 8, self%single)
-    output_bytes = 4*(size(self%positions, 1)*width)/3 + 1024
+    output_bytes = 4*(self%points*width)/3 + 1024
   end function output_bytes
 
   !> Give up the output under way and remove what there is of it.

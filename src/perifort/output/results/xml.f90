@@ -12,7 +12,7 @@ module pd_output_results_xml
   use pd_output_results_xdmf, only: escaped
   implicit none (type, external)
   private
-  public :: array_type, begin_array, put_bytes, put_reals, put_vectors, end_array
+  public :: array_type, begin_array, put_bytes, put_reals, put_rows, put_vectors, end_array
   public :: member, write_list, remove_series
 
   !> An array within the XML that is being written.
@@ -111,24 +111,35 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in), optional :: labels  !! names of the components, parted by blanks
     type(array_type) :: array
+
+    call begin_array(sink, array, merge('Float32', 'Float64', single), name, size(values, 2), &
+      & merge(4_i8, 8_i8, single)*size(values, kind=i8), error, labels)
+    if (.not. allocated(error)) call put_rows(sink, array, values, single, error)
+    if (.not. allocated(error)) call end_array(sink, array, error)
+  end subroutine put_vectors
+
+  !> Write rows `values(n, components)` of an array, block by block.
+  subroutine put_rows(sink, array, values, single, error)
+    type(sink_type), intent(inout) :: sink      !! an open file
+    type(array_type), intent(inout) :: array    !! under way
+    real(wp), intent(in) :: values(:, :)        !! (n, components), the next rows
+    logical, intent(in) :: single               !! in single precision
+    type(error_type), allocatable, intent(out) :: error
     real(wp), allocatable :: turned(:)
     integer :: n, first, count, width, i
 
     n = size(values, 1)
     width = size(values, 2)
     allocate (turned(width*min(n, block_rows)))
-    call begin_array(sink, array, merge('Float32', 'Float64', single), name, width, &
-      & merge(4_i8, 8_i8, single)*n*width, error, labels)
     do first = 0, n - 1, block_rows
-      if (allocated(error)) return
       count = min(block_rows, n - first)
       do i = 1, count
         turned(width*(i - 1) + 1:width*i) = values(first + i, :)
       end do
       call put_reals(sink, array, turned(:width*count), single, error)
+      if (allocated(error)) return
     end do
-    if (.not. allocated(error)) call end_array(sink, array, error)
-  end subroutine put_vectors
+  end subroutine put_rows
 
   !> Write reals in the wanted precision.
   subroutine put_reals(sink, array, values, single, error)
