@@ -10,6 +10,7 @@ module pd_motion_explicit_integrators
     & sums_type, total_of
   use pd_base_error, only: error_type, fail, internal_fault, status_no_answer
   use pd_base_text, only: to_text
+  use pd_body_body, only: body_type
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type
   use pd_motion_pins, only: gather_pins, move_pins
@@ -341,6 +342,8 @@ contains
     real(wp) :: scale(points_at_once), sum_of_block, largest_sum
     integer :: block, first, last, c, k
 
+    call still_copies(system%body, system%state%v)
+    call still_copies(system%body, system%state%force)
     call add_loads(system, t, kick, .true., system%state%v)
     squares = 0.0_wp
     largest_sum = 0.0_wp
@@ -405,7 +408,19 @@ contains
     end do
     call add_loads(system, t, 1.0_wp, .true., a)
     where (system%held == 1) a = 0.0_wp
+    call still_copies(system%body, a)
   end subroutine accelerations
+
+  !> Set values of copies of other ranks' points to zero. Their displacements come from their
+  !> owners, and their velocities where they are needed; a rank has a part of their forces alone,
+  !> which would drive them to any speed, so that the run seemed to have diverged.
+  pure subroutine still_copies(body, values)
+    type(body_type), intent(in) :: body
+    real(wp), intent(inout) :: values(:, :)  !! (n_slots, dim)
+
+    if (.not. associated(body%order%ranks)) return
+    values(body%slot(body%order%n_owned + 1:), :) = 0.0_wp
+  end subroutine still_copies
 
   !> Keep displacement, velocity and acceleration at the beginning of a step.
   subroutine remember_instant(system, t, start)
