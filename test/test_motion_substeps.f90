@@ -402,11 +402,10 @@ contains
     scene%bodies(2)%upper(1) = 26*spacing
     scene%bodies(2)%points(:2) = [12, 24]
     scene%boundaries(:2)%body = 'box'
-    ! moved points beside the finer ones keep their bonds
+    ! moved points keep their bonds
     deallocate (scene%no_fail)
     allocate (scene%no_fail(2))
     scene%no_fail%shape = 'box'
-    scene%no_fail%lower(1) = 15*spacing
     scene%no_fail(1)%upper(2) = 0.0_wp
     scene%no_fail(2)%lower(2) = scene%bodies(1)%upper(2)
   end subroutine notched
