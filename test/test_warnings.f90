@@ -12,6 +12,7 @@ module test_warnings
   use pd_scene_format_file, only: read_text_file
   use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
+  use perifort, only: read_scene_text
   use bodies, only: prepare_run, box_scene, expect_true
   implicit none (type, external)
   private
@@ -36,6 +37,9 @@ contains
       & new_unittest('outputs beyond the end', test_schedule), &
       & new_unittest('empty regions and zones', test_empty), &
       & new_unittest('regions that are clamped', test_clamps), &
+      & new_unittest('clamps of several groups', test_common_clamps), &
+      & new_unittest('heat without expansion', test_idle_heat), &
+      & new_unittest('velocities in relaxation', test_velocities), &
       & new_unittest('large strains', test_strains)]
   end subroutine collect_warnings
 
@@ -381,6 +385,130 @@ contains
     scene%regions(1)%upper(:2) = spacing
     call expect_told(error, scene, 'cannot rotate', .false., 'a single point', note=.true.)
   end subroutine test_clamps
+
+  !> What two groups hold together is a clamp, too; points on one line in 3D turn about it.
+  subroutine test_common_clamps(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & "points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&region name='r' where='x>.85' / "// &
+      & "&region name='p' where='(x>.95)*(y>.35)' / &region name='q' where='(x<.05)*(y<.05)' / "// &
+      & "&time method='relaxation' / &load side='x_min' force_y=1 / &boundary displacement_x=0 "
+    character(*), parameter :: block = '&scene dimension=3 / &body lower=0,0,0 upper=1,.4,.4 '// &
+      & "points=10,4,4 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+      & "&load side='x_max' force_y=1 / &boundary region='r' displacement_x=0 "// &
+      & 'displacement_y=0 displacement_z=0 / &region '
+    character(*), parameter :: text = 'it cannot rotate there, as in a clamp'
+
+    call expect_told_of(error, plate//"region='r' / &boundary region='r' displacement_y=0 /", &
+      & '&boundary number 1 and number 2 together hold all components of 24 points: '//text, &
+      & .true., 'two groups', note=.true.)
+    call expect_told_of(error, plate//"region='r' / &boundary region='p' displacement_y=0 /", &
+      & text, .false., 'two groups with one common point', note=.true.)
+    call expect_told_of(error, plate//"region='r' / &boundary region='q' displacement_y=0 /", &
+      & text, .false., 'two groups apart', note=.true.)
+    call expect_told_of(error, block//"name='r' where='(x<.1)*(y<.1)' /", text, .false., &
+      & 'a line of points', note=.true.)
+    call expect_told_of(error, block//"name='r' where='(x<.1)*(y<.1)*(z<.1)' /", text, .false., &
+      & 'a single point', note=.true.)
+    call expect_told_of(error, block//"name='r' where='(x<.1)*(y<.2)' /", text, .true., &
+      & 'two lines of points', note=.true.)
+  end subroutine test_common_clamps
+
+  !> The same of the scene of a text.
+  subroutine expect_told_of(error, scene_text, text, told, what, note)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: scene_text
+    character(*), intent(in) :: text       !! part of the warning
+    logical, intent(in) :: told            !! it must be there
+    character(*), intent(in) :: what       !! the scene, for messages
+    logical, intent(in), optional :: note  !! it is a note
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    if (allocated(error)) return
+    call read_scene_text(scene_text, '', scene, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    call expect_told(error, scene, text, told, what, note)
+  end subroutine expect_told_of
+
+  !> Two plates of different materials, parted by a crack; only the first one, or a part of it, is
+  !> heated.
+  subroutine test_idle_heat(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plates = '&scene dimension=2 / '// &
+      & "&body lower=0,0 upper=.5,.4 points=10,8 material='A' / "// &
+      & "&body lower=.5,0 upper=1,.4 points=10,8 material='B' / &crack from=.5,-1 to=.5,1 / "// &
+      & "&region name='q' where='x<.3' / &region name='r' where='x>.8' / "// &
+      & "&time method='relaxation' / "
+    character(*), parameter :: a = "&material name='A' youngs_modulus=1e9 poissons_ratio=.25 "
+    character(*), parameter :: b = "&material name='B' youngs_modulus=1e9 poissons_ratio=.25 "
+    character(*), parameter :: alone = '&scene dimension=2 / &body lower=0,0 upper=.2,.2 '// &
+      & "points=4,4 / &time method='relaxation' / &material youngs_modulus=1e9 poissons_ratio=.25 "
+    character(*), parameter :: text = 'has no thermal_expansion'
+    character(*), parameter :: expands = ' thermal_expansion=1e-5 / '
+    character(*), parameter :: warm = "&initial region='q' temperature_change=10 /"
+    character(*), parameter :: from_file = "/ &initial file='"//here//"/heat.txt' /"
+    type(sink_type) :: sink
+    type(fault_type), allocatable :: fault
+    integer :: i
+
+    call expect_told_of(error, plates//a//expands//b//'/ '//warm, text, .false., 'A is heated')
+    call expect_told_of(error, plates//a//'/ '//b//expands//warm, "material 'A' "//text, .true., &
+      & 'A does not expand')
+    call expect_told_of(error, plates//a//expands//b// &
+      & "/ &initial region='r' temperature_change='10*x*t' /", "material 'B' "//text, .true., &
+      & 'B is heated by an expression')
+    call expect_told_of(error, plates//a//'/ '//b//"/ &initial temperature_change='0*x' /", text, &
+      & .false., 'no change')
+    call expect_told_of(error, alone//'/ &initial temperature_change=10 /', &
+      & 'material number 1 '//text, .true., 'without a name')
+    call expect_told_of(error, alone//'thermal_expansion=0 / &initial temperature_change=10 /', &
+      & text, .false., 'an expansion of 0 is given')
+    do i = 0, 1
+      if (allocated(error)) return
+      call make_directory(here, fault)
+      if (.not. allocated(fault)) call sink%open(here//'/heat.txt', fault)
+      if (.not. allocated(fault)) call sink%put('temperature_change'//new_line('a')// &
+        & repeat(to_text(5*i)//new_line('a'), 16), fault)
+      if (.not. allocated(fault)) call sink%close(fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      call expect_told_of(error, alone//from_file, text, i == 1, 'a file with '//to_text(5*i))
+      call expect_told_of(error, alone//'thermal_expansion=1e-5 '//from_file, text, .false., &
+        & 'a file, expanding')
+    end do
+  end subroutine test_idle_heat
+
+  !> Velocities of boundaries as numbers, which grow over the load steps, and as expressions of t
+  !> and y: 1e-4 m/s goes 0.05 mm then, 3e-4 t**2 m/s 0.1 mm.
+  subroutine test_velocities(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & 'points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 density=1000 / '// &
+      & "&boundary side='x_min' displacement_x=0 displacement_y=0 / "
+    character(*), parameter :: relax = "&time method='relaxation' / "
+    character(*), parameter :: pulled = "&boundary side='x_max' "
+    character(*), parameter :: text = 'velocity_x of &boundary number 2 displaces its points by '
+
+    call expect_told_of(error, plate//relax//pulled//'velocity_x=1e-4 /', text//'50 um', .true., &
+      & 'a number')
+    call expect_told_of(error, plate//relax//pulled//"velocity_x='3e-4*t**2' /", text//'100 um', &
+      & .true., 'an expression of t')
+    call expect_told_of(error, plate//relax//pulled//"velocity_x='1e-4*(1-y)' /", text//'up to ', &
+      & .true., 'an expression of y')
+    call expect_told_of(error, plate//relax//pulled//"velocity_x='2*0' /", text, .false., 'zero')
+    call expect_told_of(error, plate//relax//pulled//"displacement_x='1e-4*t' /", text, .false., &
+      & 'a displacement')
+    call expect_told_of(error, plate//'&time steps=1 / '//pulled//"velocity_x='1e-4*t' /", text, &
+      & .false., 'in time')
+  end subroutine test_velocities
 
   !> A uniform strain along x of 11 % is told by the run, 9 % and a turn by 90 degrees are not; in
   !> every dimension.

@@ -30,6 +30,7 @@ module pd_set_up_prepare
   use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
+  use pd_set_up_course_warnings, only: warn_of_idle_heat
   use pd_set_up_consistent_rules, only: check_consistent, prepare_surface, weigh_bonds
   use pd_set_up_conditions, only: motions_of_scene, heating_of_scene, in_no_fail_zones
   use pd_set_up_loads, only: loads_of_scene
@@ -155,6 +156,7 @@ contains
       call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
         & heated_by, error)
       if (allocated(error)) return
+      call warn_of_idle_heat(scene, system%body, temperature_change, set_up%warnings)
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
         & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
       if (system%model%thermal) call heating_of_scene(scene, system%body, heated_by, &
