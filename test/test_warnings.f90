@@ -34,6 +34,7 @@ contains
       & new_unittest('density in other units', test_density), &
       & new_unittest('loads in other units', test_loads), &
       & new_unittest('motions in other units', test_motions), &
+      & new_unittest('expressions in other units', test_expressions), &
       & new_unittest('outputs beyond the end', test_schedule), &
       & new_unittest('empty regions and zones', test_empty), &
       & new_unittest('regions that are clamped', test_clamps), &
@@ -296,9 +297,63 @@ contains
     scene%boundaries(1)%displacement(1) = 0.07_wp
     call expect_told(error, scene, 'predicts a strain', .false., 'a large displacement')
     scene%boundaries(1)%displacement(1) = 0.1_wp
-    call expect_told(error, scene, 'its displacement predicts a strain', .true., &
-      & 'a displacement beyond the length')
+    call expect_told(error, scene, 'predicts a strain', .false., &
+      & 'a slow displacement of a body that nothing else holds')
+    scene%boundaries = [scene%boundaries(1), scene%boundaries(1)]
+    scene%boundaries(2)%side = 'x_min'
+    scene%boundaries(2)%displacement(1) = 0.0_wp
+    call expect_told(error, scene, '&boundary number 1: its displacement predicts a strain of '// &
+      & '1.2', .true., 'a displacement beyond the length')
+    scene%boundaries(2)%displacement(1) = 0.1_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'supports that move alike')
+    scene%boundaries = scene%boundaries(1:1)
+    scene%boundaries(1)%ramp_time = 0.0_wp
+    call expect_told(error, scene, 'its displacement predicts a strain of 1.2', .true., &
+      & 'a displacement at once')
   end subroutine test_motions
+
+  !> The plate is 1 m long, its material's waves run at 1000 m/s.
+  subroutine test_expressions(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & 'points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 density=1000 / '
+    character(*), parameter :: relax = "&time method='relaxation' / "
+    character(*), parameter :: steps = '&time steps=1 / '
+    character(*), parameter :: fixed = "&boundary side='x_min' displacement_x=0 displacement_y=0 / "
+    character(*), parameter :: held = "&boundary region='r' displacement_x="
+    character(*), parameter :: ends = "&region name='r' where='(x<.1)+(x>.9)' / "// &
+      & "&region name='b' where='x<.9' / &crack from=.5,-1 to=.5,2 / "
+    character(*), parameter :: text = ' predicts a strain of '
+
+    call expect_told_of(error, plate//relax//ends//held//"'2*x' /", text, .false., &
+      & 'parted by a crack, both stretched by less')
+    call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
+      & "'2*x' /", 'its displacement'//text, .true., 'a stretch by 2')
+    call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
+      & "'0.9*x' /", text, .false., 'a stretch by 0.9')
+    call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
+      & "'7*t-2*x*sin(pi*t/2)^2' displacement_y='-2*y*sin(pi*t/2)^2' /", text, .false., &
+      & 'half a turn')
+    call expect_told_of(error, plate//relax//fixed//"&load side='x_max' pressure='-9e8*t' /", &
+      & text, .false., 'a pressure as an expression')
+    call expect_told_of(error, plate//relax//fixed//"&load side='x_max' pressure='-2e9*t' /", &
+      & 'its pressure'//text, .true., 'a pressure beyond E as an expression')
+    call expect_told_of(error, plate//relax//fixed//"&load side='x_max' force_y='4e9/2' /", &
+      & 'its force'//text, .true., 'a force as an expression')
+    call expect_told_of(error, plate//relax//fixed//"&region name='r' where='x>0' / "// &
+      & "&load region='r' body_force_y='1e10*x' /", 'its body_force'//text, .true., &
+      & 'a body force as an expression')
+    call expect_told_of(error, '&scene gravity=0,-1e6 '//plate(7:)//relax//fixed, text, .false., &
+      & 'a strong gravity')
+    call expect_told_of(error, '&scene gravity=0,-9.81e9 '//plate(7:)//relax//fixed, &
+      & '&scene: its gravity'//text, .true., 'gravity in other units')
+    call expect_told_of(error, plate//steps//"&boundary side='x_max' velocity_x='990*cos(y)' /", &
+      & text, .false., 'a fast boundary')
+    call expect_told_of(error, plate//steps//"&boundary side='x_max' velocity_x='1200*cos(y)' /", &
+      & 'its velocity'//text, .true., 'a boundary faster than waves')
+    call expect_told_of(error, plate//steps//"&boundary side='x_max' velocity_x=1200 / "// &
+      & '&initial velocity_x=1200 /', text, .false., 'a body that is as fast')
+  end subroutine test_expressions
 
   !> Ten steps of 1e-7 s.
   subroutine test_schedule(error)

@@ -9,6 +9,7 @@ module pd_output_report_warnings
   use pd_body_body, only: body_type
   use pd_family_warnings, only: warn_of_points
   use pd_set_up_course_warnings, only: warn_of_courses
+  use pd_set_up_strain_warnings, only: warn_of_strains
   use pd_body_regions, only: region_mask
   use pd_set_up_conditions, only: no_fail_mask
   use pd_set_up_plan, only: plan_type
@@ -38,6 +39,7 @@ contains
     ! no rank sees all points: `check` on one rank looks for the rest
     if (associated(system%body%order%ranks)) return
     call warnings_of_scene(scene, edges_of(system%body), warnings)
+    call warn_of_strains(scene, system, plan, edges_of(system%body), warnings)
     call warn_of_points(scene, system%body, system%family, warnings)
     call warn_of_courses(scene, system, plan, warnings)
     if (plan%lowest < 0.0_wp) call warnings%add('unstable body', &
