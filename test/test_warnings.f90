@@ -5,6 +5,8 @@ module test_warnings
   use pd_base_text, only: to_text
   use pd_base_warnings, only: warnings_type
   use pd_driver, only: run_scene
+  use pd_motion_system, only: system_type
+  use pd_output_report_balance, only: balance_type
   use pd_output_report_begin, only: run_options_type
   use pd_set_up_prepare, only: set_up_type
   use pd_output_results_files, only: file_exists, make_directory
@@ -13,7 +15,8 @@ module test_warnings
   use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use perifort, only: read_scene_text
-  use bodies, only: prepare_run, box_scene, expect_true
+  use bodies, only: expect, prepare_run, box_scene, expect_true
+  use surfaces, only: ascii_stl
   implicit none (type, external)
   private
   public :: collect_warnings
@@ -27,7 +30,9 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('bodies one point thick', test_thin), &
+      & new_unittest('bodies one point thick in any direction', test_thin_anywhere), &
       & new_unittest('cracks through points', test_cracks), &
+      & new_unittest('surfaces through points', test_crack_surfaces), &
       & new_unittest('volumes of a cloud', test_volumes), &
       & new_unittest('horizons without shear stiffness', test_horizons), &
       & new_unittest('stiffness in other units', test_stiffness), &
@@ -39,6 +44,8 @@ contains
       & new_unittest('empty regions and zones', test_empty), &
       & new_unittest('regions that are clamped', test_clamps), &
       & new_unittest('clamps of several groups', test_common_clamps), &
+      & new_unittest('what drives a body that can move', test_driven), &
+      & new_unittest('energy balance beside what is dissipated', test_dissipated), &
       & new_unittest('heat without expansion', test_idle_heat), &
       & new_unittest('velocities in relaxation', test_velocities), &
       & new_unittest('large strains', test_strains)]
@@ -101,6 +108,110 @@ contains
     scene%bodies(2)%upper(2) = 2*spacing
     call expect_told(error, scene, text, .false., 'two chains side by side')
   end subroutine test_thin
+
+  !> Lattices are thin along their own axes; sheets of a cloud may lie across all axes, or be bent:
+  !> here around a cylinder with a radius of 10 spacings. Two sheets are not thin.
+  subroutine test_thin_anywhere(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: turned = ' axis_1=0.8,0.6 / &material youngs_modulus=1e9 '// &
+      & "poissons_ratio=.25 / &time method='relaxation' /"
+    character(*), parameter :: strip = '&scene dimension=2 / &body lower=0,0 '
+    character(*), parameter :: of_cloud = "&scene dimension=3 / &body file='"//here// &
+      & "/cloud.txt' / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / &horizon length=3.015 /"
+    character(*), parameter :: text = 'body 1 is one point thick'
+    integer :: layers
+
+    call expect_told_of(error, strip//'upper=1,.05 points=20,1'//turned, &
+      & text//' along its axis 2', .true., 'a turned chain')
+    call expect_told_of(error, strip//'upper=.05,1 points=1,20'//turned, &
+      & text//' along its axis 1', .true., 'a turned chain across')
+    call expect_told_of(error, strip//'upper=1,.1 points=20,2'//turned, text, .false., &
+      & 'two turned rows')
+    do layers = 1, 2
+      call sheets(layers, 0.0_wp, error)
+      call expect_told_of(error, of_cloud, text//': ', layers == 1, 'plane sheets')
+      call sheets(layers, 0.1_wp, error)
+      call expect_told_of(error, of_cloud, text//': ', layers == 1, 'bent sheets')
+    end do
+  end subroutine test_thin_anywhere
+
+  !> A cloud of 15 x 12 points in sheets 1 m apart from each other, oblique to all axes or, with a
+  !> curvature [1/m], around the x-axis.
+  subroutine sheets(layers, curvature, error)
+    integer, intent(in) :: layers
+    real(wp), intent(in) :: curvature
+    type(error_type), allocatable, intent(inout) :: error
+    real(wp), parameter :: along(3) = [1.0_wp, 2.0_wp, 2.0_wp]/3
+    real(wp), parameter :: across(3) = [2.0_wp, 1.0_wp, -2.0_wp]/3
+    real(wp), parameter :: normal(3) = [-2.0_wp, 2.0_wp, -1.0_wp]/3
+    type(sink_type) :: sink
+    type(fault_type), allocatable :: fault
+    real(wp) :: x(3), radius
+    integer :: i, j, k
+
+    if (allocated(error)) return
+    call make_directory(here, fault)
+    if (.not. allocated(fault)) call sink%open(here//'/cloud.txt', fault)
+    do k = 1, layers
+      do j = 1, 15
+        do i = 1, 12
+          x = i*along + j*across + k*normal
+          if (curvature > 0.0_wp) then
+            radius = 1/curvature + k
+            x = [real(i, wp), radius*cos(j*curvature), radius*sin(j*curvature)]
+          end if
+          if (.not. allocated(fault)) call sink%put(to_text(x(1))//' '//to_text(x(2))//' '// &
+            & to_text(x(3))//' 1'//new_line('a'), fault)
+        end do
+      end do
+    end do
+    if (.not. allocated(fault)) call sink%close(fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+  end subroutine sheets
+
+  !> Two triangles that make a square of 6 x 6 m in a cube of 6 x 6 x 6 points, through a row of
+  !> them, between rows, and through a part of a row.
+  subroutine test_crack_surfaces(error)
+    type(error_type), allocatable, intent(out) :: error
+
+    call told(3.5_wp, 6.0_wp, ' 36 points', .true., 'through a row')
+    call told(3.5_wp, 3.0_wp, ' 18 points', .true., 'through half of a row')
+    call told(3.0_wp, 6.0_wp, '', .false., 'between rows')
+
+  contains
+
+    !> Hold the square from x = 0 to `width` at a height to cutting so many points.
+    subroutine told(height, width, points, is_told, what)
+      real(wp), intent(in) :: height, width
+      character(*), intent(in) :: points, what
+      logical, intent(in) :: is_told
+      real(wp) :: x(3, 3, 2)
+      type(fault_type), allocatable :: fault
+      type(sink_type) :: sink
+
+      if (allocated(error)) return
+      x(3, :, :) = height
+      x(:2, 1, 1) = [0.0_wp, 0.0_wp]
+      x(:2, 2, 1) = [width, 0.0_wp]
+      x(:2, 3, 1) = [width, 6.0_wp]
+      x(:2, :, 2) = x(:2, [1, 3, 2], 1)
+      x(:2, 3, 2) = [0.0_wp, 6.0_wp]
+      x(:2, 2, 2) = [width, 6.0_wp]
+      call make_directory(here, fault)
+      if (.not. allocated(fault)) call sink%open(here//'/square.stl', fault)
+      if (.not. allocated(fault)) call sink%put(ascii_stl(x, 'square'), fault)
+      if (.not. allocated(fault)) call sink%close(fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      call expect_told_of(error, '&scene dimension=3 / &body lower=0,0,0 upper=6,6,6 '// &
+        & "points=6,6,6 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+        & "&crack surface='"//here//"/square.stl' scale=1 /", 'runs through'//points, is_told, what)
+    end subroutine told
+  end subroutine test_crack_surfaces
 
   !> Points lie at half-integer multiples of the spacing. Cracks between rows, or whose line runs
   !> through points beyond their tip, cut none in two.
@@ -169,6 +280,8 @@ contains
 
     call cloud(0.5_wp, scene, error)
     call expect_told(error, scene, 'volumes are too small', .true., 'half the volume')
+    call cloud(2.0_wp, scene, error)
+    call expect_told(error, scene, 'volumes are too large', .true., 'twice the volume')
     call cloud(3.0_wp, scene, error)
     call expect_told(error, scene, 'volumes are too large', .true., 'three times the volume')
     do i = 1, 3
@@ -490,6 +603,78 @@ contains
     end if
     call expect_told(error, scene, text, told, what, note)
   end subroutine expect_told_of
+
+  !> 1 kN along x at the end of a plate 1 m long and 0.4 m high. Held at the lower left point, at
+  !> (0.025, 0.025), it turns about that: 175 N m. On rollers along x it moves; at its middle a pin
+  !> leaves no moment. A block 0.4 m high turns about an edge that is held.
+  subroutine test_driven(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & "points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+      & "&load side='x_max' force_x=1e3 / "
+    character(*), parameter :: block = '&scene dimension=3 / &body lower=0,0,0 upper=1,.4,.4 '// &
+      & "points=10,4,4 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+      & "&load side='x_max' force_y=1 / "
+    character(*), parameter :: held = "&boundary region='r' displacement_x=0 displacement_y=0 "
+
+    call driven(plate//"&region name='r' where='(x<.05)*(y<.05)' / "//held//'/', &
+      & '(net moment 175 N m about (0.025, 0.025), net over applied')
+    call driven(plate, '(net force 1000 N, net moment')
+    call driven(plate//"&boundary side='y_min' displacement_y=0 /", &
+      & '(net force 1000 N along (1, 0), net over applied')
+    call driven(block//"&region name='r' where='(x<.1)*(y<.1)' / "//held//'displacement_z=0 /', &
+      & '(net moment 0.9 N m about the axis through (0.05, 0.05, 0.2) along (0, 0, 1), net over')
+
+  contains
+
+    !> A run must fail with this in its message.
+    subroutine driven(scene_text, part)
+      character(*), intent(in) :: scene_text, part
+      type(scene_type) :: scene
+      type(run_options_type) :: options
+      type(fault_type), allocatable :: fault
+
+      if (allocated(error)) return
+      call read_scene_text(scene_text, '', scene, fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      options%output_directory = here//'/driven'
+      options%quiet = .true.
+      options%overwrite = .true.
+      call run_scene(scene, options, fault)
+      if (.not. allocated(fault)) then
+        call test_failed(error, 'an equilibrium was found')
+        return
+      end if
+      call expect_true(error, index(fault%message, part) > 0, part//' is not in: '//fault%message)
+    end subroutine driven
+  end subroutine test_driven
+
+  !> A gap of 0.01 J in 2 J is compared with 0.1 J that are dissipated, not with 1e-9 J.
+  subroutine test_dissipated(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(balance_type) :: balance
+    type(system_type) :: system
+    real(wp) :: off, share, of_dissipated
+
+    balance%energies%kinetic = 1.0_wp
+    balance%energies%strain = 0.89_wp
+    balance%supply = 2.0_wp
+    system%dissipated = 0.1_wp
+    call balance%gap(system, off, share, of_dissipated)
+    call expect(error, off, -0.01_wp, 1.0e-12_wp, 'gap')
+    call expect(error, share, 0.005_wp, 1.0e-12_wp, 'share')
+    call expect(error, of_dissipated, 0.1_wp, 1.0e-12_wp, 'of what is dissipated')
+    balance%energies%strain = 0.99_wp
+    system%dissipated = 1.0e-9_wp
+    call balance%gap(system, off, share, of_dissipated)
+    call expect(error, off, -0.01_wp, 1.0e-8_wp, 'gap beside next to no dissipation')
+    call expect(error, of_dissipated, -1.0_wp, 0.0_wp, 'next to nothing is dissipated')
+  end subroutine test_dissipated
 
   !> Two plates of different materials, parted by a crack; only the first one, or a part of it, is
   !> heated.

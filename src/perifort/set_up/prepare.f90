@@ -15,8 +15,9 @@ module pd_set_up_prepare
   use pd_body_surface_surface, only: surface_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
-  use pd_family_crack_surface, only: cut_by_facets
+  use pd_family_crack_surface, only: cut_by_facets, points_on_facets
   use pd_family_cracks, only: cut_bonds, part_bodies
+  use pd_family_warnings, only: warn_of_crack
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
@@ -215,6 +216,9 @@ contains
           call place_fault(error, scene, 'crack', i, 'surface')
           if (allocated(error)) return
           call cut_by_facets(surface, system%body, system%family, cut)
+          ! no rank sees all points
+          if (.not. divided) call warn_of_crack(i, points_on_facets(surface, system%body), &
+            & system%body, set_up%warnings)
         else
           call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
         end if
