@@ -447,6 +447,8 @@ contains
     call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
       & "'7*t-2*x*sin(pi*t/2)^2' displacement_y='-2*y*sin(pi*t/2)^2' /", text, .false., &
       & 'half a turn')
+    call expect_told_of(error, plate//relax//fixed//"&boundary side='x_max' displacement_x=-2 "// &
+      & 'displacement_y=0 /', 'its displacement'//text//'2;', .true., 'ends that change places')
     call expect_told_of(error, plate//relax//fixed//"&load side='x_max' pressure='-9e8*t' /", &
       & text, .false., 'a pressure as an expression')
     call expect_told_of(error, plate//relax//fixed//"&load side='x_max' pressure='-2e9*t' /", &

@@ -27,7 +27,7 @@ module pd_set_up_strain_warnings
     integer, allocatable :: slot(:)
     integer, allocatable :: number(:)    !! of the boundary that each belongs to
     logical, allocatable :: held(:, :)   !! components whose course is known (point, dim)
-    logical, allocatable :: whole(:)     !! all components of the point are
+    logical, allocatable :: turning(:)   !! all components are, and differ from point to point
   end type support_type
 
 contains
@@ -194,11 +194,12 @@ contains
             points%slot(n) = motion%slots(i)
             points%number(n) = m
             points%held(n, :) = known
-            points%whole(n) = all(known) .and. .not. motion%is_pin
+            points%turning(n) = all(known) .and. .not. motion%is_pin .and. &
+              & (allocated(motion%profile) .or. any(motion%timed%value%in_space))
           end do
         end associate
       end do
-      if (pass == 1) allocate (points%slot(n), points%number(n), points%whole(n), &
+      if (pass == 1) allocate (points%slot(n), points%number(n), points%turning(n), &
         & points%held(n, system%body%dim))
     end do
   end subroutine list_supports
@@ -217,8 +218,8 @@ contains
   end subroutine times_of
 
   !> Raise `worst` (boundaries, dim) [m] to what two points of one piece are displaced beside each
-  !> other. Of points with all components given a common rotation counts for nothing: no more than
-  !> the change of their distance counts.
+  !> other. Of supports that may turn a common rotation counts for nothing: no more than the change
+  !> of the distance of their points counts.
   pure subroutine compare_supports(system, points, pieces, u, worst)
     type(system_type), intent(in) :: system
     type(support_type), intent(in) :: points
@@ -237,7 +238,7 @@ contains
           do c = 1, size(d)
             if (.not. (points%held(i, c) .and. points%held(j, c))) cycle
             apart = abs(d(c))
-            if (points%whole(i) .and. points%whole(j)) apart = min(apart, abs(norm2(x + d) &
+            if (points%turning(i) .and. points%turning(j)) apart = min(apart, abs(norm2(x + d) &
               & - norm2(x)))
             m = points%number(merge(i, j, abs(u(a, c)) >= abs(u(b, c))))
             worst(m, c) = max(worst(m, c), apart)
