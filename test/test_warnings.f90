@@ -5,6 +5,8 @@ module test_warnings
   use pd_base_text, only: to_text
   use pd_base_warnings, only: warnings_type
   use pd_driver, only: run_scene
+  use pd_motion_system, only: system_type
+  use pd_output_report_balance, only: balance_type
   use pd_output_report_begin, only: run_options_type
   use pd_set_up_prepare, only: set_up_type
   use pd_output_results_files, only: file_exists, make_directory
@@ -12,7 +14,9 @@ module test_warnings
   use pd_scene_format_file, only: read_text_file
   use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
-  use bodies, only: prepare_run, box_scene, expect_true
+  use perifort, only: read_scene_text
+  use bodies, only: expect, prepare_run, box_scene, expect_true
+  use surfaces, only: ascii_stl
   implicit none (type, external)
   private
   public :: collect_warnings
@@ -26,16 +30,24 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('bodies one point thick', test_thin), &
+      & new_unittest('bodies one point thick in any direction', test_thin_anywhere), &
       & new_unittest('cracks through points', test_cracks), &
+      & new_unittest('surfaces through points', test_crack_surfaces), &
       & new_unittest('volumes of a cloud', test_volumes), &
       & new_unittest('horizons without shear stiffness', test_horizons), &
       & new_unittest('stiffness in other units', test_stiffness), &
       & new_unittest('density in other units', test_density), &
       & new_unittest('loads in other units', test_loads), &
       & new_unittest('motions in other units', test_motions), &
+      & new_unittest('expressions in other units', test_expressions), &
       & new_unittest('outputs beyond the end', test_schedule), &
       & new_unittest('empty regions and zones', test_empty), &
       & new_unittest('regions that are clamped', test_clamps), &
+      & new_unittest('clamps of several groups', test_common_clamps), &
+      & new_unittest('what drives a body that can move', test_driven), &
+      & new_unittest('energy balance beside what is dissipated', test_dissipated), &
+      & new_unittest('heat without expansion', test_idle_heat), &
+      & new_unittest('velocities in relaxation', test_velocities), &
       & new_unittest('large strains', test_strains)]
   end subroutine collect_warnings
 
@@ -96,6 +108,110 @@ contains
     scene%bodies(2)%upper(2) = 2*spacing
     call expect_told(error, scene, text, .false., 'two chains side by side')
   end subroutine test_thin
+
+  !> Lattices are thin along their own axes; sheets of a cloud may lie across all axes, or be bent:
+  !> here around a cylinder with a radius of 10 spacings. Two sheets are not thin.
+  subroutine test_thin_anywhere(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: turned = ' axis_1=0.8,0.6 / &material youngs_modulus=1e9 '// &
+      & "poissons_ratio=.25 / &time method='relaxation' /"
+    character(*), parameter :: strip = '&scene dimension=2 / &body lower=0,0 '
+    character(*), parameter :: of_cloud = "&scene dimension=3 / &body file='"//here// &
+      & "/cloud.txt' / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / &horizon length=3.015 /"
+    character(*), parameter :: text = 'body 1 is one point thick'
+    integer :: layers
+
+    call expect_told_of(error, strip//'upper=1,.05 points=20,1'//turned, &
+      & text//' along its axis 2', .true., 'a turned chain')
+    call expect_told_of(error, strip//'upper=.05,1 points=1,20'//turned, &
+      & text//' along its axis 1', .true., 'a turned chain across')
+    call expect_told_of(error, strip//'upper=1,.1 points=20,2'//turned, text, .false., &
+      & 'two turned rows')
+    do layers = 1, 2
+      call sheets(layers, 0.0_wp, error)
+      call expect_told_of(error, of_cloud, text//': ', layers == 1, 'plane sheets')
+      call sheets(layers, 0.1_wp, error)
+      call expect_told_of(error, of_cloud, text//': ', layers == 1, 'bent sheets')
+    end do
+  end subroutine test_thin_anywhere
+
+  !> A cloud of 15 x 12 points in sheets 1 m apart from each other, oblique to all axes or, with a
+  !> curvature [1/m], around the x-axis.
+  subroutine sheets(layers, curvature, error)
+    integer, intent(in) :: layers
+    real(wp), intent(in) :: curvature
+    type(error_type), allocatable, intent(inout) :: error
+    real(wp), parameter :: along(3) = [1.0_wp, 2.0_wp, 2.0_wp]/3
+    real(wp), parameter :: across(3) = [2.0_wp, 1.0_wp, -2.0_wp]/3
+    real(wp), parameter :: normal(3) = [-2.0_wp, 2.0_wp, -1.0_wp]/3
+    type(sink_type) :: sink
+    type(fault_type), allocatable :: fault
+    real(wp) :: x(3), radius
+    integer :: i, j, k
+
+    if (allocated(error)) return
+    call make_directory(here, fault)
+    if (.not. allocated(fault)) call sink%open(here//'/cloud.txt', fault)
+    do k = 1, layers
+      do j = 1, 15
+        do i = 1, 12
+          x = i*along + j*across + k*normal
+          if (curvature > 0.0_wp) then
+            radius = 1/curvature + k
+            x = [real(i, wp), radius*cos(j*curvature), radius*sin(j*curvature)]
+          end if
+          if (.not. allocated(fault)) call sink%put(to_text(x(1))//' '//to_text(x(2))//' '// &
+            & to_text(x(3))//' 1'//new_line('a'), fault)
+        end do
+      end do
+    end do
+    if (.not. allocated(fault)) call sink%close(fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+  end subroutine sheets
+
+  !> Two triangles that make a square of 6 x 6 m in a cube of 6 x 6 x 6 points, through a row of
+  !> them, between rows, and through a part of a row.
+  subroutine test_crack_surfaces(error)
+    type(error_type), allocatable, intent(out) :: error
+
+    call told(3.5_wp, 6.0_wp, ' 36 points', .true., 'through a row')
+    call told(3.5_wp, 3.0_wp, ' 18 points', .true., 'through half of a row')
+    call told(3.0_wp, 6.0_wp, '', .false., 'between rows')
+
+  contains
+
+    !> Hold the square from x = 0 to `width` at a height to cutting so many points.
+    subroutine told(height, width, points, is_told, what)
+      real(wp), intent(in) :: height, width
+      character(*), intent(in) :: points, what
+      logical, intent(in) :: is_told
+      real(wp) :: x(3, 3, 2)
+      type(fault_type), allocatable :: fault
+      type(sink_type) :: sink
+
+      if (allocated(error)) return
+      x(3, :, :) = height
+      x(:2, 1, 1) = [0.0_wp, 0.0_wp]
+      x(:2, 2, 1) = [width, 0.0_wp]
+      x(:2, 3, 1) = [width, 6.0_wp]
+      x(:2, :, 2) = x(:2, [1, 3, 2], 1)
+      x(:2, 3, 2) = [0.0_wp, 6.0_wp]
+      x(:2, 2, 2) = [width, 6.0_wp]
+      call make_directory(here, fault)
+      if (.not. allocated(fault)) call sink%open(here//'/square.stl', fault)
+      if (.not. allocated(fault)) call sink%put(ascii_stl(x, 'square'), fault)
+      if (.not. allocated(fault)) call sink%close(fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      call expect_told_of(error, '&scene dimension=3 / &body lower=0,0,0 upper=6,6,6 '// &
+        & "points=6,6,6 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+        & "&crack surface='"//here//"/square.stl' scale=1 /", 'runs through'//points, is_told, what)
+    end subroutine told
+  end subroutine test_crack_surfaces
 
   !> Points lie at half-integer multiples of the spacing. Cracks between rows, or whose line runs
   !> through points beyond their tip, cut none in two.
@@ -164,6 +280,8 @@ contains
 
     call cloud(0.5_wp, scene, error)
     call expect_told(error, scene, 'volumes are too small', .true., 'half the volume')
+    call cloud(2.0_wp, scene, error)
+    call expect_told(error, scene, 'volumes are too large', .true., 'twice the volume')
     call cloud(3.0_wp, scene, error)
     call expect_told(error, scene, 'volumes are too large', .true., 'three times the volume')
     do i = 1, 3
@@ -292,9 +410,65 @@ contains
     scene%boundaries(1)%displacement(1) = 0.07_wp
     call expect_told(error, scene, 'predicts a strain', .false., 'a large displacement')
     scene%boundaries(1)%displacement(1) = 0.1_wp
-    call expect_told(error, scene, 'its displacement predicts a strain', .true., &
-      & 'a displacement beyond the length')
+    call expect_told(error, scene, 'predicts a strain', .false., &
+      & 'a slow displacement of a body that nothing else holds')
+    scene%boundaries = [scene%boundaries(1), scene%boundaries(1)]
+    scene%boundaries(2)%side = 'x_min'
+    scene%boundaries(2)%displacement(1) = 0.0_wp
+    call expect_told(error, scene, '&boundary number 1: its displacement predicts a strain of '// &
+      & '1.2', .true., 'a displacement beyond the length')
+    scene%boundaries(2)%displacement(1) = 0.1_wp
+    call expect_told(error, scene, 'predicts a strain', .false., 'supports that move alike')
+    scene%boundaries = scene%boundaries(1:1)
+    scene%boundaries(1)%ramp_time = 0.0_wp
+    call expect_told(error, scene, 'its displacement predicts a strain of 1.2', .true., &
+      & 'a displacement at once')
   end subroutine test_motions
+
+  !> The plate is 1 m long, its material's waves run at 1000 m/s.
+  subroutine test_expressions(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & 'points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 density=1000 / '
+    character(*), parameter :: relax = "&time method='relaxation' / "
+    character(*), parameter :: steps = '&time steps=1 / '
+    character(*), parameter :: fixed = "&boundary side='x_min' displacement_x=0 displacement_y=0 / "
+    character(*), parameter :: held = "&boundary region='r' displacement_x="
+    character(*), parameter :: ends = "&region name='r' where='(x<.1)+(x>.9)' / "// &
+      & "&region name='b' where='x<.9' / &crack from=.5,-1 to=.5,2 / "
+    character(*), parameter :: text = ' predicts a strain of '
+
+    call expect_told_of(error, plate//relax//ends//held//"'2*x' /", text, .false., &
+      & 'parted by a crack, both stretched by less')
+    call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
+      & "'2*x' /", 'its displacement'//text, .true., 'a stretch by 2')
+    call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
+      & "'0.9*x' /", text, .false., 'a stretch by 0.9')
+    call expect_told_of(error, plate//relax//"&region name='r' where='(x<.1)+(x>.9)' / "//held// &
+      & "'7*t-2*x*sin(pi*t/2)^2' displacement_y='-2*y*sin(pi*t/2)^2' /", text, .false., &
+      & 'half a turn')
+    call expect_told_of(error, plate//relax//fixed//"&boundary side='x_max' displacement_x=-2 "// &
+      & 'displacement_y=0 /', 'its displacement'//text//'2;', .true., 'ends that change places')
+    call expect_told_of(error, plate//relax//fixed//"&load side='x_max' pressure='-9e8*t' /", &
+      & text, .false., 'a pressure as an expression')
+    call expect_told_of(error, plate//relax//fixed//"&load side='x_max' pressure='-2e9*t' /", &
+      & 'its pressure'//text, .true., 'a pressure beyond E as an expression')
+    call expect_told_of(error, plate//relax//fixed//"&load side='x_max' force_y='4e9/2' /", &
+      & 'its force'//text, .true., 'a force as an expression')
+    call expect_told_of(error, plate//relax//fixed//"&region name='r' where='x>0' / "// &
+      & "&load region='r' body_force_y='1e10*x' /", 'its body_force'//text, .true., &
+      & 'a body force as an expression')
+    call expect_told_of(error, '&scene gravity=0,-1e6 '//plate(7:)//relax//fixed, text, .false., &
+      & 'a strong gravity')
+    call expect_told_of(error, '&scene gravity=0,-9.81e9 '//plate(7:)//relax//fixed, &
+      & '&scene: its gravity'//text, .true., 'gravity in other units')
+    call expect_told_of(error, plate//steps//"&boundary side='x_max' velocity_x='990*cos(y)' /", &
+      & text, .false., 'a fast boundary')
+    call expect_told_of(error, plate//steps//"&boundary side='x_max' velocity_x='1200*cos(y)' /", &
+      & 'its velocity'//text, .true., 'a boundary faster than waves')
+    call expect_told_of(error, plate//steps//"&boundary side='x_max' velocity_x=1200 / "// &
+      & '&initial velocity_x=1200 /', text, .false., 'a body that is as fast')
+  end subroutine test_expressions
 
   !> Ten steps of 1e-7 s.
   subroutine test_schedule(error)
@@ -381,6 +555,202 @@ contains
     scene%regions(1)%upper(:2) = spacing
     call expect_told(error, scene, 'cannot rotate', .false., 'a single point', note=.true.)
   end subroutine test_clamps
+
+  !> What two groups hold together is a clamp, too; points on one line in 3D turn about it.
+  subroutine test_common_clamps(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & "points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&region name='r' where='x>.85' / "// &
+      & "&region name='p' where='(x>.95)*(y>.35)' / &region name='q' where='(x<.05)*(y<.05)' / "// &
+      & "&time method='relaxation' / &load side='x_min' force_y=1 / &boundary displacement_x=0 "
+    character(*), parameter :: block = '&scene dimension=3 / &body lower=0,0,0 upper=1,.4,.4 '// &
+      & "points=10,4,4 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+      & "&load side='x_max' force_y=1 / &boundary region='r' displacement_x=0 "// &
+      & 'displacement_y=0 displacement_z=0 / &region '
+    character(*), parameter :: text = 'it cannot rotate there, as in a clamp'
+
+    call expect_told_of(error, plate//"region='r' / &boundary region='r' displacement_y=0 /", &
+      & '&boundary number 1 and number 2 together hold all components of 24 points: '//text, &
+      & .true., 'two groups', note=.true.)
+    call expect_told_of(error, plate//"region='r' / &boundary region='p' displacement_y=0 /", &
+      & text, .false., 'two groups with one common point', note=.true.)
+    call expect_told_of(error, plate//"region='r' / &boundary region='q' displacement_y=0 /", &
+      & text, .false., 'two groups apart', note=.true.)
+    call expect_told_of(error, block//"name='r' where='(x<.1)*(y<.1)' /", text, .false., &
+      & 'a line of points', note=.true.)
+    call expect_told_of(error, block//"name='r' where='(x<.1)*(y<.1)*(z<.1)' /", text, .false., &
+      & 'a single point', note=.true.)
+    call expect_told_of(error, block//"name='r' where='(x<.1)*(y<.2)' /", text, .true., &
+      & 'two lines of points', note=.true.)
+  end subroutine test_common_clamps
+
+  !> The same of the scene of a text.
+  subroutine expect_told_of(error, scene_text, text, told, what, note)
+    type(error_type), allocatable, intent(inout) :: error
+    character(*), intent(in) :: scene_text
+    character(*), intent(in) :: text       !! part of the warning
+    logical, intent(in) :: told            !! it must be there
+    character(*), intent(in) :: what       !! the scene, for messages
+    logical, intent(in), optional :: note  !! it is a note
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+
+    if (allocated(error)) return
+    call read_scene_text(scene_text, '', scene, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    call expect_told(error, scene, text, told, what, note)
+  end subroutine expect_told_of
+
+  !> 1 kN along x at the end of a plate 1 m long and 0.4 m high. Held at the lower left point, at
+  !> (0.025, 0.025), it turns about that: 175 N m. On rollers along x it moves; at its middle a pin
+  !> leaves no moment. A block 0.4 m high turns about an edge that is held.
+  subroutine test_driven(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & "points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+      & "&load side='x_max' force_x=1e3 / "
+    character(*), parameter :: block = '&scene dimension=3 / &body lower=0,0,0 upper=1,.4,.4 '// &
+      & "points=10,4,4 / &material youngs_modulus=1e9 poissons_ratio=.25 / "// &
+      & "&time method='relaxation' / "// &
+      & "&load side='x_max' force_y=1 / "
+    character(*), parameter :: held = "&boundary region='r' displacement_x=0 displacement_y=0 "
+
+    call driven(plate//"&region name='r' where='(x<.05)*(y<.05)' / "//held//'/', &
+      & '(net moment 175 N m about (0.025, 0.025), net over applied')
+    call driven(plate, '(net force 1000 N, net moment')
+    call driven(plate//"&boundary side='y_min' displacement_y=0 /", &
+      & '(net force 1000 N along (1, 0), net over applied')
+    call driven(block//"&region name='r' where='(x<.1)*(y<.1)' / "//held//'displacement_z=0 /', &
+      & '(net moment 0.9 N m about the axis through (0.05, 0.05, 0.2) along (0, 0, 1), net over')
+
+  contains
+
+    !> A run must fail with this in its message.
+    subroutine driven(scene_text, part)
+      character(*), intent(in) :: scene_text, part
+      type(scene_type) :: scene
+      type(run_options_type) :: options
+      type(fault_type), allocatable :: fault
+
+      if (allocated(error)) return
+      call read_scene_text(scene_text, '', scene, fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      options%output_directory = here//'/driven'
+      options%quiet = .true.
+      options%overwrite = .true.
+      call run_scene(scene, options, fault)
+      if (.not. allocated(fault)) then
+        call test_failed(error, 'an equilibrium was found')
+        return
+      end if
+      call expect_true(error, index(fault%message, part) > 0, part//' is not in: '//fault%message)
+    end subroutine driven
+  end subroutine test_driven
+
+  !> A gap of 0.01 J in 2 J is compared with 0.1 J that are dissipated, not with 1e-9 J.
+  subroutine test_dissipated(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(balance_type) :: balance
+    type(system_type) :: system
+    real(wp) :: off, share, of_dissipated
+
+    balance%energies%kinetic = 1.0_wp
+    balance%energies%strain = 0.89_wp
+    balance%supply = 2.0_wp
+    system%dissipated = 0.1_wp
+    call balance%gap(system, off, share, of_dissipated)
+    call expect(error, off, -0.01_wp, 1.0e-12_wp, 'gap')
+    call expect(error, share, 0.005_wp, 1.0e-12_wp, 'share')
+    call expect(error, of_dissipated, 0.1_wp, 1.0e-12_wp, 'of what is dissipated')
+    balance%energies%strain = 0.99_wp
+    system%dissipated = 1.0e-9_wp
+    call balance%gap(system, off, share, of_dissipated)
+    call expect(error, off, -0.01_wp, 1.0e-8_wp, 'gap beside next to no dissipation')
+    call expect(error, of_dissipated, -1.0_wp, 0.0_wp, 'next to nothing is dissipated')
+  end subroutine test_dissipated
+
+  !> Two plates of different materials, parted by a crack; only the first one, or a part of it, is
+  !> heated.
+  subroutine test_idle_heat(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plates = '&scene dimension=2 / '// &
+      & "&body lower=0,0 upper=.5,.4 points=10,8 material='A' / "// &
+      & "&body lower=.5,0 upper=1,.4 points=10,8 material='B' / &crack from=.5,-1 to=.5,1 / "// &
+      & "&region name='q' where='x<.3' / &region name='r' where='x>.8' / "// &
+      & "&time method='relaxation' / "
+    character(*), parameter :: a = "&material name='A' youngs_modulus=1e9 poissons_ratio=.25 "
+    character(*), parameter :: b = "&material name='B' youngs_modulus=1e9 poissons_ratio=.25 "
+    character(*), parameter :: alone = '&scene dimension=2 / &body lower=0,0 upper=.2,.2 '// &
+      & "points=4,4 / &time method='relaxation' / &material youngs_modulus=1e9 poissons_ratio=.25 "
+    character(*), parameter :: text = 'has no thermal_expansion'
+    character(*), parameter :: expands = ' thermal_expansion=1e-5 / '
+    character(*), parameter :: warm = "&initial region='q' temperature_change=10 /"
+    character(*), parameter :: from_file = "/ &initial file='"//here//"/heat.txt' /"
+    type(sink_type) :: sink
+    type(fault_type), allocatable :: fault
+    integer :: i
+
+    call expect_told_of(error, plates//a//expands//b//'/ '//warm, text, .false., 'A is heated')
+    call expect_told_of(error, plates//a//'/ '//b//expands//warm, "material 'A' "//text, .true., &
+      & 'A does not expand')
+    call expect_told_of(error, plates//a//expands//b// &
+      & "/ &initial region='r' temperature_change='10*x*t' /", "material 'B' "//text, .true., &
+      & 'B is heated by an expression')
+    call expect_told_of(error, plates//a//'/ '//b//"/ &initial temperature_change='0*x' /", text, &
+      & .false., 'no change')
+    call expect_told_of(error, alone//'/ &initial temperature_change=10 /', &
+      & 'material number 1 '//text, .true., 'without a name')
+    call expect_told_of(error, alone//'thermal_expansion=0 / &initial temperature_change=10 /', &
+      & text, .false., 'an expansion of 0 is given')
+    do i = 0, 1
+      if (allocated(error)) return
+      call make_directory(here, fault)
+      if (.not. allocated(fault)) call sink%open(here//'/heat.txt', fault)
+      if (.not. allocated(fault)) call sink%put('temperature_change'//new_line('a')// &
+        & repeat(to_text(5*i)//new_line('a'), 16), fault)
+      if (.not. allocated(fault)) call sink%close(fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      call expect_told_of(error, alone//from_file, text, i == 1, 'a file with '//to_text(5*i))
+      call expect_told_of(error, alone//'thermal_expansion=1e-5 '//from_file, text, .false., &
+        & 'a file, expanding')
+    end do
+  end subroutine test_idle_heat
+
+  !> Velocities of boundaries as numbers, which grow over the load steps, and as expressions of t
+  !> and y: 1e-4 m/s goes 0.05 mm then, 3e-4 t**2 m/s 0.1 mm.
+  subroutine test_velocities(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&scene dimension=2 / &body lower=0,0 upper=1,.4 '// &
+      & 'points=20,8 / &material youngs_modulus=1e9 poissons_ratio=.25 density=1000 / '// &
+      & "&boundary side='x_min' displacement_x=0 displacement_y=0 / "
+    character(*), parameter :: relax = "&time method='relaxation' / "
+    character(*), parameter :: pulled = "&boundary side='x_max' "
+    character(*), parameter :: text = 'velocity_x of &boundary number 2 displaces its points by '
+
+    call expect_told_of(error, plate//relax//pulled//'velocity_x=1e-4 /', text//'50 um', .true., &
+      & 'a number')
+    call expect_told_of(error, plate//relax//pulled//"velocity_x='3e-4*t**2' /", text//'100 um', &
+      & .true., 'an expression of t')
+    call expect_told_of(error, plate//relax//pulled//"velocity_x='1e-4*(1-y)' /", text//'up to ', &
+      & .true., 'an expression of y')
+    call expect_told_of(error, plate//relax//pulled//"velocity_x='2*0' /", text, .false., 'zero')
+    call expect_told_of(error, plate//relax//pulled//"displacement_x='1e-4*t' /", text, .false., &
+      & 'a displacement')
+    call expect_told_of(error, plate//'&time steps=1 / '//pulled//"velocity_x='1e-4*t' /", text, &
+      & .false., 'in time')
+  end subroutine test_velocities
 
   !> A uniform strain along x of 11 % is told by the run, 9 % and a turn by 90 degrees are not; in
   !> every dimension.

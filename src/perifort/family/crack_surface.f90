@@ -10,7 +10,7 @@ module pd_family_crack_surface
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   implicit none (type, external)
   private
-  public :: cut_by_facets, facet_crosses
+  public :: cut_by_facets, facet_crosses, points_on_facets
 
   real(wp), parameter :: on_plane = 1.0e-6_wp  !! [spacings]
   integer, parameter :: most_cubes = 400       !! along each axis
@@ -62,6 +62,57 @@ contains
     !$omp end parallel
     cut = cut/2_i8
   end subroutine cut_by_facets
+
+  !> How many points lie on facets, within the tolerance of the rule.
+  integer function points_on_facets(surface, body) result(number)
+    type(surface_type), intent(in) :: surface   !! finished; open or closed
+    type(body_type), intent(in) :: body         !! its points, in slots
+    type(cubes_type) :: cubes
+    integer :: n, k
+
+    call sort_facets(surface, 2*maxval(body%spacing, mask=body%point > 0), cubes)
+    number = 0
+    do n = 1, body%n_points
+      k = body%slot(n)
+      if (on_a_facet(surface, cubes, body%x(k, :), on_plane*body%spacing(k))) number = number + 1
+    end do
+  end function points_on_facets
+
+  !> Whether a place lies on some facet.
+  pure logical function on_a_facet(surface, cubes, place, tolerance)
+    type(surface_type), intent(in) :: surface
+    type(cubes_type), intent(in) :: cubes
+    real(wp), intent(in) :: place(3), tolerance
+    real(wp) :: corners(3, 3), normal(3), edge(3)
+    integer :: i, j, k, c, low(3), high(3)
+    integer(i8) :: f
+
+    on_a_facet = .false.
+    if (any(place < surface%low - tolerance) .or. any(place > surface%high + tolerance)) return
+    low = cube_at(cubes, place - tolerance)
+    high = cube_at(cubes, place + tolerance)
+    do k = low(3), high(3)
+      do j = low(2), high(2)
+        do i = low(1), high(1)
+          do f = cubes%first(number_of(cubes, i, j, k)), &
+            & cubes%first(number_of(cubes, i, j, k) + 1) - 1
+            corners = corners_of(surface, int(cubes%facet(f)))
+            normal = cross(corners(:, 2) - corners(:, 1), corners(:, 3) - corners(:, 1))
+            if (.not. norm2(normal) > 0.0_wp) cycle
+            normal = normal/norm2(normal)
+            if (abs(dot_product(place - corners(:, 1), normal)) > tolerance) cycle
+            on_a_facet = .true.
+            do c = 1, 3
+              edge = corners(:, mod(c, 3) + 1) - corners(:, c)
+              if (dot_product(cross(normal, edge), place - corners(:, c)) &
+                & < -tolerance*norm2(edge)) on_a_facet = .false.
+            end do
+            if (on_a_facet) return
+          end do
+        end do
+      end do
+    end do
+  end function on_a_facet
 
   !> Sort facets into the cubes that the boxes around them meet.
   subroutine sort_facets(surface, width, cubes)

@@ -17,8 +17,9 @@ module pd_set_up_prepare
   use pd_body_windows, only: agree_on_error, has_windows, survey_points, survey_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
-  use pd_family_crack_surface, only: cut_by_facets
+  use pd_family_crack_surface, only: cut_by_facets, points_on_facets
   use pd_family_cracks, only: cut_bonds, part_bodies
+  use pd_family_warnings, only: warn_of_crack
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
@@ -32,6 +33,7 @@ module pd_set_up_prepare
   use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
+  use pd_set_up_course_warnings, only: warn_of_idle_heat
   use pd_set_up_consistent_rules, only: check_consistent, prepare_surface, weigh_bonds
   use pd_set_up_conditions, only: motions_of_scene, heating_of_scene, in_no_fail_zones
   use pd_set_up_loads, only: loads_of_scene
@@ -174,6 +176,7 @@ contains
       call initial_state(scene, system%body, system%state%u, system%state%v, temperature_change, &
         & heated_by, error)
       if (allocated(error)) return
+      call warn_of_idle_heat(scene, system%body, temperature_change, set_up%warnings)
       call new_model(system%body, materials, scene%horizon%dilatation == 'projected', &
         & in_no_fail_zones(scene, system%body), temperature_change, system%model, laws)
       if (system%model%thermal) call heating_of_scene(scene, system%body, heated_by, &
@@ -232,6 +235,9 @@ contains
           call place_fault(error, scene, 'crack', i, 'surface')
           if (allocated(error)) return
           call cut_by_facets(surface, system%body, system%family, cut)
+          ! no rank sees all points
+          if (.not. divided) call warn_of_crack(i, points_on_facets(surface, system%body), &
+            & system%body, set_up%warnings)
         else
           call cut_bonds(scene%cracks(i:i), system%body, system%family, cut)
         end if

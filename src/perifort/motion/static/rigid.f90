@@ -318,7 +318,8 @@ contains
         if (maxval(abs(work)) <= balanced*applied) cycle
         call fail(error, piece_text(system%body, pieces, p)//' is free to move as a whole in '// &
           & to_text(piece%number)//' way(s), and the loads at t = '//to_text(t)// &
-          & ' push it that way ('//net_load(system, rigid, p, loads)//', net over applied '// &
+          & ' push it that way ('//driving_text(system%body%dim, piece, work)// &
+          & ', net over applied '// &
           & to_text(maxval(abs(work))/applied, 3)//', at most '//to_text(balanced)// &
           & ' is allowed): there is no static equilibrium. Support it with a &boundary, or '// &
           & 'balance the loads', status)
@@ -327,33 +328,81 @@ contains
     end do
   end subroutine check_balance
 
-  !> The net force and moment of `loads` (n_slots, dim) [N/m3] on a piece, in words.
-  function net_load(system, rigid, p, loads) result(text)
-    type(system_type), intent(in) :: system
-    type(rigid_type), intent(in) :: rigid
-    integer, intent(in) :: p
-    real(wp), intent(in) :: loads(:, :)
+  !> The force and moment by which loads drive the free motions of a piece, in words: the force
+  !> along its free translations, and the moment about the point, or axis, about which it can turn.
+  function driving_text(dim, piece, work) result(text)
+    integer, intent(in) :: dim
+    type(piece_type), intent(in) :: piece
+    real(wp), intent(in) :: work(6)   !! of the loads on each free motion
     character(:), allocatable :: text
-    type(running_type) :: running
-    real(wp) :: arm(3), part(3), totals(6)
-    integer :: i, k, dim
+    real(wp) :: rotations(6, 6), values(6), vectors(6, 6), mode(6), turning(6), force(3), axis(3), &
+      & place(3)
+    integer :: i, j, n, translations, turns
 
-    dim = system%body%dim
-    call new_running(running)
-    do i = rigid%pieces%start(p), rigid%pieces%start(p + 1) - 1
-      k = rigid%pieces%slots(i)
-      arm = 0.0_wp
-      part = 0.0_wp
-      arm(:dim) = system%body%x(k, :) - rigid%piece(p)%centre(:dim)
-      part(:dim) = loads(k, :)*system%body%volume(k)
-      call add_point(system%body%order, system%body%point(k), [part, arm(2)*part(3) &
-        & - arm(3)*part(2), arm(3)*part(1) - arm(1)*part(3), arm(1)*part(2) - arm(2)*part(1)], &
-        & running)
+    ! free motions without rotation are the null space of what rotates in all of them
+    n = piece%number
+    rotations = 0.0_wp
+    do i = 1, 6
+      rotations(i, i) = -1.0_wp
     end do
-    totals = total_of_running(system%body%order, running)
-    text = 'net force '//to_text(norm2(totals(:3)), 3)//' N'
-    if (dim > 1) text = text//', net moment '//to_text(norm2(totals(4:)), 3)//' N m'
-  end function net_load
+    rotations(:n, :n) = matmul(transpose(piece%combination(4:, :n)), piece%combination(4:, :n)) &
+      & /maxval(sum(piece%combination(:, :n)**2, dim=1))
+    call eigenvectors(rotations, values, vectors)
+    force = 0.0_wp
+    turning = 0.0_wp
+    translations = 0
+    turns = 0
+    do i = 1, 6
+      if (values(i) < -0.5_wp) cycle
+      mode = matmul(piece%combination(:, :n), vectors(:n, i))
+      if (values(i) <= held_at_all) then
+        translations = translations + 1
+        force = force + mode(:3)*(dot_product(work(:n), vectors(:n, i))/sum(mode(:3)**2))
+      else
+        turns = turns + 1
+        turning = turning + mode*dot_product(work(:n), vectors(:n, i))
+      end if
+    end do
+    text = ''
+    if (translations > 0) text = 'net force '//to_text(norm2(force), 3)//' N'
+    if (translations > 0 .and. translations < dim .and. norm2(force) > 0.0_wp) &
+      & text = text//' along '//vector_text(force/norm2(force))
+    if (turns == 0) return
+    if (translations > 0) text = text//', '
+    axis = [turning(5), turning(6), turning(4)]/piece%size
+    if (.not. norm2(axis) > 0.0_wp) then
+      text = text//'no moment'
+      return
+    end if
+    place = piece%centre + cross(axis, turning(:3))/sum(axis**2)
+    text = text//'net moment '//to_text(sum([(dot_product(work(:n), vectors(:n, j))**2, j=1, 6)], &
+      & mask=values > held_at_all)/norm2(axis), 3)//' N m about '
+    if (turns == 3 .and. translations == 3) then
+      text = text//'its centre '//vector_text(piece%centre)
+    else if (dim == 2) then
+      text = text//vector_text(place)
+    else
+      text = text//'the axis through '//vector_text(place)//' along '// &
+        & vector_text(axis/norm2(axis))
+    end if
+
+  contains
+
+    !> The components of a vector between brackets; those that are rounding are 0.
+    function vector_text(vector) result(words)
+      real(wp), intent(in) :: vector(3)
+      character(:), allocatable :: words
+      integer :: c
+
+      words = '('
+      do c = 1, dim
+        if (c > 1) words = words//', '
+        words = words//to_text(merge(vector(c), 0.0_wp, abs(vector(c)) &
+          & > 1.0e-9_wp*max(norm2(vector), tiny(1.0_wp))), 3)
+      end do
+      words = words//')'
+    end function vector_text
+  end function driving_text
 
   !> Take the free rigid motions of every piece out of a field (n_slots, dim), by linear modes about
   !> the undeformed body.

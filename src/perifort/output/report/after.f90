@@ -18,7 +18,7 @@ contains
     type(recorder_type), intent(in) :: recorder
     character(*), intent(in) :: directory   !! of the results; '' = there are no files
     character(:), allocatable :: text, parts, unit
-    real(wp) :: balance, share, seconds
+    real(wp) :: balance, share, of_dissipated, seconds
     integer :: steps
 
     text = recorder%timer%table()//newline
@@ -44,12 +44,12 @@ contains
           & system%state%damage), 3))
       end if
       text = text//line('external work', with_unit(system%external_work, 'J'))
-      call recorder%energy_balance(system, balance, share)
+      call recorder%energy_balance(system, balance, share, of_dissipated)
       if (share >= 0.0_wp) then
         parts = to_text(100*share, 2)//' % of the greater of the energy supplied and the '// &
           & 'energy present'
-        if (abs(system%dissipated) > 0.0_wp) parts = parts//', '// &
-          & to_text(100*abs(balance/system%dissipated), 2)//' % of the dissipated energy'
+        if (of_dissipated >= 0.0_wp) parts = parts//', '// &
+          & to_text(100*of_dissipated, 2)//' % of the dissipated energy'
         text = text//line('energy balance', 'off by '//with_unit(balance, 'J')//', '//parts)
       end if
     end associate

@@ -327,15 +327,19 @@ contains
 
   !> Deviation of the energies of the last row from the initial plus the supplied energy; a
   !> relaxation has no balance.
-  pure subroutine energy_balance(recorder, system, balance, share)
+  pure subroutine energy_balance(recorder, system, balance, share, of_dissipated)
     class(recorder_type), intent(in) :: recorder
     type(system_type), intent(in) :: system
     real(wp), intent(out) :: balance  !! [J]
     real(wp), intent(out) :: share    !! of the energy in play [-], -1 where there is no balance
+    real(wp), intent(out) :: of_dissipated
+      !! share of the dissipated energy [-], -1 where that is no noticeable part of the energy
 
     balance = 0.0_wp
     share = -1.0_wp
-    if (.not. recorder%schedule%relaxation) call recorder%balance%gap(system, balance, share)
+    of_dissipated = -1.0_wp
+    if (.not. recorder%schedule%relaxation) call recorder%balance%gap(system, balance, share, &
+      & of_dissipated)
   end subroutine energy_balance
 
   !> One output of all fields, in point order.

@@ -1,15 +1,15 @@
 !> Warnings before a run about input that is allowed but probably not intended: keys of the scene,
 !> points, plan and conditions. Notes report correct, but possibly unexpected facts.
 module pd_output_report_warnings
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i1
   use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_scene_content_types, only: adds_layer, scene_type, is_set
   use pd_scene_content_warnings, only: warnings_of_scene
   use pd_body_body, only: body_type
   use pd_family_warnings, only: warn_of_points
-  use pd_motion_conditions, only: free_component
   use pd_set_up_course_warnings, only: warn_of_courses
+  use pd_set_up_strain_warnings, only: warn_of_strains
   use pd_body_regions, only: region_mask
   use pd_set_up_conditions, only: no_fail_mask
   use pd_set_up_plan, only: plan_type
@@ -39,6 +39,7 @@ contains
     ! no rank sees all points: `check` on one rank looks for the rest
     if (associated(system%body%order%ranks)) return
     call warnings_of_scene(scene, edges_of(system%body), warnings)
+    call warn_of_strains(scene, system, plan, edges_of(system%body), warnings)
     call warn_of_points(scene, system%body, system%family, warnings)
     call warn_of_courses(scene, system, plan, warnings)
     if (plan%lowest < 0.0_wp) call warnings%add('unstable body', &
@@ -101,27 +102,90 @@ contains
     end function consequence
   end subroutine warn_of_schedule
 
-  !> Notes on a scene's conditions: a region held in all components is clamped.
+  !> Notes on a scene's conditions: points that one group or several together hold in all
+  !> components are clamped, if they cannot turn: more than a point of a body in 2D, and more than a
+  !> line of points in 3D.
   subroutine note_before(scene, system, notes)
     type(scene_type), intent(in) :: scene
     type(system_type), intent(in) :: system
     type(warnings_type), intent(inout) :: notes   !! added to
     character(:), allocatable :: held
-    integer :: m
+    integer, allocatable :: holder(:, :)
+    logical, allocatable :: to_see(:), alike(:)
+    integer :: c, d, i, k, n, dim
+    logical :: clamped
 
-    if (system%body%dim == 1) return
-    do m = 1, size(system%motions)
-      associate (motion => system%motions(m))
-        if (adds_layer(scene%boundaries(m)) .or. size(motion%slots) < 2) cycle
-        if (motion%is_pin) cycle
-        if (any(motion%kind(:system%body%dim) == free_component)) cycle
-        held = "region '"//trim(scene%boundaries(m)%region)
-        if (scene%boundaries(m)%side /= '') held = "facets '"//trim(scene%boundaries(m)%side)
-        call notes%add('clamp '//to_text(m), '&boundary number '//to_text(m)//" holds all "// &
-          & "components of the "//held//"': it cannot rotate there, as in a clamp", tell=.false.)
+    dim = system%body%dim
+    if (dim == 1) return
+    ! pins move as they turn; the points of layers lie outside of the bodies
+    allocate (holder(system%body%n_slots, dim), source=0)
+    do i = 1, size(system%motions)
+      associate (motion => system%motions(i))
+        if (motion%is_pin .or. adds_layer(scene%boundaries(i))) cycle
+        do c = 1, dim
+          where (motion%held(:, c) == 1_i1) holder(motion%slots, c) = i
+        end do
       end associate
     end do
+    to_see = all(holder > 0, dim=2) .and. system%body%point > 0
+    do n = 1, system%body%n_points
+      k = system%body%slot(n)
+      if (.not. to_see(k)) cycle
+      alike = to_see
+      do c = 1, dim
+        alike = alike .and. holder(:, c) == holder(k, c)
+      end do
+      to_see = to_see .and. .not. alike
+      clamped = .false.
+      do i = 1, size(scene%bodies)
+        if (cannot_turn(system%body, alike .and. system%body%body == i)) clamped = .true.
+      end do
+      if (.not. clamped) cycle
+      i = holder(k, 1)
+      if (all(holder(k, :) == i)) then
+        held = "region '"//trim(scene%boundaries(i)%region)
+        if (scene%boundaries(i)%side /= '') held = "facets '"//trim(scene%boundaries(i)%side)
+        held = '&boundary number '//to_text(i)//' holds all components of the '//held//"'"
+      else
+        held = ''
+        do d = 1, size(scene%boundaries)
+          if (.not. any(holder(k, :) == d)) cycle
+          if (held /= '') held = held//' and '
+          held = held//'number '//to_text(d)
+        end do
+        held = '&boundary '//held//' together hold all components of '//counted(count(alike), &
+          & 'point')
+      end if
+      call notes%add('clamp '//held, held//': it cannot rotate there, as in a clamp', tell=.false.)
+    end do
   end subroutine note_before
+
+  !> Whether held points keep a body from rotating: two of them in 2D, three that are not on one
+  !> line in 3D.
+  pure logical function cannot_turn(body, held)
+    type(body_type), intent(in) :: body
+    logical, intent(in) :: held(:)       !! (n_slots) marks
+    real(wp), parameter :: apart = 1.0e-6_wp  ! of a spacing, or of an angle
+    real(wp) :: along(body%dim), r(body%dim), across(body%dim)
+    integer :: first, k
+    logical :: there
+
+    cannot_turn = .false.
+    there = .false.
+    first = findloc(held, .true., dim=1)
+    if (first == 0) return
+    along = 0.0_wp
+    do k = first + 1, size(held)
+      if (.not. held(k)) cycle
+      r = body%x(k, :) - body%x(first, :)
+      if (norm2(r) <= apart*body%spacing(first)) cycle
+      if (.not. there) along = r/norm2(r)
+      there = .true.
+      across = r - dot_product(r, along)*along
+      cannot_turn = body%dim == 2 .or. norm2(across) > apart*norm2(r)
+      if (cannot_turn) return
+    end do
+  end function cannot_turn
 
   !> Edges of the box around the cells of all points of the bodies, layers aside (dim) [m].
   pure function edges_of(body) result(edges)
