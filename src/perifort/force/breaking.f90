@@ -70,7 +70,8 @@ contains
     integer, intent(in), optional :: level
       !! of substeps: bonds of this level alone break; all by default
     real(wp), intent(in), optional :: expansions(:, :)
-      !! (n_slots, sets) thermal strains with each set of `others`; those of the model by default [-]
+      !! (n_slots, sets) thermal strains with each set of `others`, by default those of the model
+      !! [-]
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:), after(:)
     logical, allocatable :: gone(:)

@@ -419,9 +419,9 @@ contains
   end subroutine settle_account
 
   !> Displacements of the other instant of a pairing; where the work of constrained components or
-  !> temperatures is summed with another offset, these in a second set. They are made only where they are needed, at
-  !> `slots` and at the ends of their bonds: the rest of `others` is left as it is allocated, so
-  !> that a step in which few bonds break pays for these alone.
+  !> temperatures is summed with another offset, these in a second set. They are made only where
+  !> they are needed, at `slots` and at the ends of their bonds: the rest of `others` is left as it
+  !> is allocated, so that a step in which few bonds break pays for these alone.
   subroutine displacements_at(system, t, pairing, slots, others)
     type(system_type), intent(in) :: system
     real(wp), intent(in) :: t                            !! of the present displacements [s]

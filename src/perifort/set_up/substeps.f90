@@ -95,8 +95,8 @@ contains
       i = torn_grip(system, family)
       if (i > 0) then
         call refuse('boundary', i, '', 'moved points whose bonds take substeps and can break', &
-          & 'the work of what moves them is counted in whole steps; put them into a &no_fail zone, '// &
-          & 'or let cells become finer elsewhere')
+          & 'the work of what moves them is counted in whole steps; put them into a &no_fail '// &
+          & 'zone, or let cells become finer elsewhere')
         return
       end if
     class default
