@@ -22,9 +22,9 @@ module test_set_up_horizons
   use pd_set_up_prepare, only: prepare, set_up_type
   use perifort, only: answer_type, fault_type => error_type, read_scene_text, run_options_type, &
     & run_scene, scene_type
-  use runs, only: ready_text
+  use runs, only: ready_text, refuse_text => refuse
   use testdrive, only: check, error_type, new_unittest, test_failed, unittest_type
-  use test_scene_expect, only: expect_fault, expect_parts, line
+  use test_scene_expect, only: expect_fault, line
   implicit none (type, external)
   private
   public :: collect_set_up_horizons
@@ -867,18 +867,13 @@ contains
 
   contains
 
+    !> `instead`: what the message must advise.
     subroutine refuse(text, parts, instead)
       character(*), intent(in) :: text, parts
       character(*), intent(in), optional :: instead
-      type(scene_type) :: scene
-      type(set_up_type) :: set_up
-      type(fault_type), allocatable :: fault
 
-      if (allocated(error)) return
-      call read_scene_text(text, '', scene, fault)
-      if (.not. allocated(fault)) call prepare(scene, set_up, fault)
-      call expect_parts(error, fault, parts)
-      if (present(instead)) call expect_parts(error, fault, instead)
+      call refuse_text(error, text, parts)
+      if (present(instead)) call refuse_text(error, text, instead)
     end subroutine refuse
 
   end subroutine test_refusals
