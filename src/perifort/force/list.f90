@@ -90,21 +90,9 @@ contains
       call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       strain = little
-      if (family%fixed_order) then
-        call sum_lanes(family, model, options, workspace, loops, for_theta, work, strain, sums)
-        if (model%breaking .and. strain /= little) call mark_cluster(model, work, strained)
-      else
-        call sum_up(family, model, options, workspace, loops, work, strain, sums)
-      end if
+      call sum_cluster(family, model, options, workspace, loops, for_theta, work, strain, sums, &
+        & strained)
       workspace%large(c) = strain
-      if (strain == beyond .and. .not. family%fixed_order) then
-        associate (e => family%start(c), n => work%n)
-          call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
-            & .false., work)
-        end associate
-        call cluster_theta(family, model, options, workspace, work, sums(:, 1))
-        if (model%breaking) call mark_cluster(model, work, strained)
-      end if
       do l = 1, lanes
         k = work%first + l - 1
         p(k) = p_of(model, k)*t_of(model, k)*sums(l, 1)
@@ -149,20 +137,8 @@ contains
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       ! the pass before has checked the strain
       strain = merge(workspace%large(c), little, options%dilatation)
-      if (family%fixed_order) then
-        call sum_lanes(family, model, options, workspace, loops, for_force, work, strain, sums)
-        if (model%breaking .and. strain /= little) call mark_cluster(model, work, strained)
-      else
-        call sum_up(family, model, options, workspace, loops, work, strain, sums)
-      end if
-      if (strain == beyond .and. .not. family%fixed_order) then
-        associate (e => family%start(c), n => work%n)
-          call fill_tables(family, model, workspace, family%intact(e:e + n - 1), &
-            & .false., work)
-        end associate
-        call cluster_force(family, model, options, workspace, work, sums)
-        if (model%breaking) call mark_cluster(model, work, strained)
-      end if
+      call sum_cluster(family, model, options, workspace, loops, for_force, work, strain, sums, &
+        & strained)
       do d = 1, model%dim
         force(work%first:work%first + lanes - 1, d) = sums(:, d)
       end do
@@ -242,6 +218,53 @@ contains
     if (loops%wide <= loops%narrow) loops%wide = 0.0_wp
   end subroutine new_loops
 
+  !> Sums of a cluster by whatever is valid for its strain, which is at least `strain`; on return
+  !> `strain` says how far it is strained. Slots beyond the loops are marked, if bonds can break.
+  subroutine sum_cluster(family, model, options, workspace, loops, pass, work, strain, sums, &
+    & strained)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
+    type(list_workspace_type), intent(in) :: workspace
+    type(loops_type), intent(in) :: loops
+    integer, intent(in) :: pass                !! `for_theta` or `for_force`
+    type(work_type), intent(inout) :: work
+    integer(i1), intent(inout) :: strain
+    real(wp), intent(inout) :: sums(lanes, 3)
+    integer(i1), intent(inout), contiguous :: strained(:)
+    logical :: general
+
+    if (family%fixed_order) then
+      call sum_lanes(family, model, options, workspace, loops, pass, work, strain, sums)
+      general = strain /= little
+    else
+      call sum_up(family, model, options, workspace, loops, work, strain, sums)
+      general = strain == beyond
+      if (general) call sum_generally(family, model, options, workspace, pass, work, sums)
+    end if
+    if (general .and. model%breaking) call mark_cluster(model, work, strained)
+  end subroutine sum_cluster
+
+  !> Sums of a cluster by the general formulas.
+  subroutine sum_generally(family, model, options, workspace, pass, work, sums)
+    type(list_family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    type(force_options_type), intent(in) :: options
+    type(list_workspace_type), intent(in) :: workspace
+    integer, intent(in) :: pass                !! `for_theta` or `for_force`
+    type(work_type), intent(inout) :: work
+    real(wp), intent(inout) :: sums(lanes, 3)
+
+    associate (e => family%start(work%cluster))
+      call fill_tables(family, model, workspace, family%intact(e:e + work%n - 1), .false., work)
+    end associate
+    if (pass == for_theta) then
+      call cluster_theta(family, model, options, workspace, work, sums(:, 1))
+    else
+      call cluster_force(family, model, options, workspace, work, sums)
+    end if
+  end subroutine sum_generally
+
   !> Sums of a cluster by the loops valid for its strain, which is at least `strain`; on return
   !> `strain` says which did, or that none does.
   subroutine sum_up(family, model, options, workspace, loops, work, strain, sums)
@@ -308,14 +331,7 @@ contains
     strain = iany(merge(lane_bit, 0_i1, general))
     if (strain == 0_i1) return
     of_lanes = 0.0_wp
-    associate (e => family%start(work%cluster))
-      call fill_tables(family, model, workspace, family%intact(e:e + work%n - 1), .false., work)
-    end associate
-    if (pass == for_theta) then
-      call cluster_theta(family, model, options, workspace, work, of_lanes(:, 1))
-    else
-      call cluster_force(family, model, options, workspace, work, of_lanes)
-    end if
+    call sum_generally(family, model, options, workspace, pass, work, of_lanes)
     do l = 1, lanes
       if (general(l)) sums(l, :) = of_lanes(l, :)
     end do
