@@ -8,7 +8,7 @@ module test_extremes_materials
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_account, only: energies_of, energies_type
   use pd_motion_system, only: evaluate
-  use pd_motion_explicit_time_step, only: stiffness_bound
+  use pd_force_bound, only: stiffness_bound
   use pd_scene_content_types, only: scene_type
   use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: at_point, box_scene, density_of_steel, diary_type, expect, expect_true, noise, &

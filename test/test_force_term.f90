@@ -7,13 +7,20 @@ module test_force_term
   use pd_base_error, only: fault_type => error_type, status_input, status_no_answer
   use pd_base_kinds, only: wp
   use pd_base_snapshot, only: snapshot_type
+  use pd_family_family, only: allocate_bonds, bonds_type
+  use pd_force_bonds, only: bond_term_type
+  use pd_force_forces, only: after_marks, up_to_marks
+  use pd_force_model, only: options_of
+  use pd_force_reference, only: point_force
+  use pd_force_tangent, only: central, tangent_type
   use pd_force_term, only: force_term_type, term_view_type, has_tangent, no_stiffness
   use pd_force_terms, only: term_list_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_keep, only: keep_system
+  use pd_motion_loads, only: other_terms
   use pd_motion_observer, only: instant_type, observer_type
   use pd_motion_static_relaxation, only: run_relaxation
-  use pd_motion_system, only: system_type
+  use pd_motion_system, only: ask_bonds, system_type, view_of
   use pd_scene_content_types, only: scene_type
   use pd_set_up_prepare, only: prepare, set_up_type
   use comparisons, only: expect_close, max_abs
@@ -123,7 +130,8 @@ contains
       & new_unittest('static equilibrium on springs, by both solvers', test_static), &
       & new_unittest('static equilibrium of two bodies with a link', test_static_link), &
       & new_unittest('a term without a tangent is refused by name', test_refusal), &
-      & new_unittest('a list sums its terms', test_list)]
+      & new_unittest('a list sums its terms', test_list), &
+      & new_unittest('the bonds are the first term of a system', test_bonds)]
   end subroutine collect_force_term
 
   ! ---------------------------------------------------------------- springs to the ground
@@ -631,7 +639,7 @@ contains
     if (allocated(error)) return
     volume = sum(set_up%system%body%volume, mask=set_up%system%body%point > 0)
     begin = density_of_steel*speed**2*volume/2
-    select type (term => set_up%system%terms%items(1)%term)
+    select type (term => set_up%system%terms%items(2)%term)
     type is (friction_type)
       slipped = term%slip(slot, 1)
     class default
@@ -1241,14 +1249,90 @@ contains
     call ready_with(scene, terms, set_up, error)
     if (allocated(error)) return
     associate (system => set_up%system)
-      call expect_true(error, system%terms%number() == 5 .and. system%terms%outside == 2, &
-        & 'the load of the scene is a term, too')
+      call expect_true(error, system%terms%number() == 6 .and. system%terms%outside == 2 &
+        & .and. system%terms%bonds == 1, 'bonds and the load of the scene are terms, too')
       allocate (bound(system%body%n_slots), source=0.0_wp)
       call bounds(system, bound)
       call expect_close(error, pack(bound, system%body%point > 0), 7.0_wp, 1.0e-14_wp, 'bound')
       call expect_close(error, pack(bound, system%body%point == 0), 0.0_wp, 0.0_wp, 'dead slots')
     end associate
   end subroutine test_list
+
+  !> A list is the sum of its bonds and of others where a view asks for the bonds, and of the others
+  !> alone where it does not. Forces are compared with those of the bonds one by one plus the
+  !> springs', the bound with a product, the product with the forces, which are linear in small
+  !> displacements but for 1e-7 of them, and the energy with half of their work.
+  subroutine test_bonds(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type), target :: set_up
+    type(term_list_type) :: terms
+    type(tangent_type) :: tangent
+    type(term_view_type) :: view
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: force(:, :), expected(:, :), w(:, :), kw(:, :), bound(:), energy(:)
+    real(wp) :: stored
+    integer :: k
+
+    call terms%add(ground(1.0e15_wp))
+    call plate_with(terms, set_up, error)
+    if (allocated(error)) return
+    associate (system => set_up%system)
+      select type (term => system%terms%items(1)%term)
+      type is (bond_term_type)
+        call expect_true(error, system%terms%bonds == 1 .and. term%sets, 'the bonds lead the list')
+      class default
+        call test_failed(error, 'the first term is another one')
+      end select
+      call expect_true(error, other_terms(system%terms) == 1 .and. system%terms%inside == 1, &
+        & 'numbers of terms')
+      call shake(system%body, no_gradient, 1.0e-7_wp*spacing, 3, system%state%u)
+      allocate (force, expected, w, kw, mold=system%state%u)
+      call view_of(system, 0.0_wp, view)
+      expected = 0.0_wp
+      call system%terms%add_force(view, expected)
+      call expect_close(error, expected, -1.0e15_wp*system%state%u, 0.0_wp, 'springs alone')
+
+      ! the second part of an evaluation completes the first, and needs its dilatation
+      call ask_bonds(system, view, up_to_marks)
+      force = 0.0_wp
+      call system%terms%add_force(view, force)
+      call ask_bonds(system, view, after_marks)
+      call system%terms%add_force(view, force)
+      call allocate_bonds(system%family, bonds)
+      do k = 1, system%body%n_slots
+        if (system%body%point(k) == 0) cycle
+        call system%family%bonds_of(k, bonds)
+        expected(k, :) = expected(k, :) + point_force(system%model, system%state%u, &
+          & system%state%p, k, bonds)
+      end do
+      call expect_close(error, force, expected, 1.0e-10_wp*max_abs(expected), 'bonds and springs')
+
+      w = 0.0_wp
+      call shake(system%body, no_gradient, 1.0_wp, 5, w)
+      tangent%difference = central
+      tangent%step = 1.0e-7_wp*spacing
+      tangent%options = options_of(system%model)
+      call ask_bonds(system, view, tangent=tangent)
+      kw = 0.0_wp
+      call system%terms%add_tangent(view, w, kw)
+      expected = kw
+      system%state%u = tangent%step*w
+      call system%terms%add_force(view, force)
+      call expect_close(error, -force/tangent%step, expected, 1.0e-6_wp*max_abs(expected), &
+        & 'product')
+
+      allocate (bound(system%body%n_slots), energy(system%body%n_slots), source=0.0_wp)
+      call system%terms%add_stiffness_bound(view, bound)
+      call expect_true(error, all(abs(kw) <= spread(bound, 2, system%body%dim)*max_abs(w)), &
+        & 'no product exceeds the bound')
+      call system%terms%add_energy(view, energy)
+      stored = sum(energy*system%body%volume)
+      call expect(error, system%terms%energy(view), stored, 1.0e-13_wp, 'energy')
+      ! of linear forces it is half of what they do on the way
+      call expect(error, stored, -sum(force*system%state%u*spread(system%body%volume, 2, &
+        & system%body%dim))/2, 1.0e-6_wp, 'work')
+    end associate
+  end subroutine test_bonds
 
   !> The bound of the stiffness of a system's terms.
   subroutine bounds(system, bound)

@@ -5,7 +5,7 @@ module test_motion_explicit_time_step
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_system, only: system_type, evaluate
-  use pd_motion_explicit_time_step, only: stiffness_bound
+  use pd_force_bound, only: stiffness_bound
   use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type

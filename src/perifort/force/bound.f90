@@ -1,18 +1,146 @@
-!> The bound M of a lattice's stiffness, summed from the weights of its blocks: the same number as
-!> from the bonds one by one, `lanes` slots at a time.
+!> The bound M of the bonds' stiffness: from the bonds one by one, and the same number for lattices
+!> from the weights of their blocks, `lanes` slots at a time.
 module pd_force_bound
   use pd_base_kinds, only: wp, i8
   use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type, share_halo
+  use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_lattice, only: lattice_family_type, grid_at
-  use pd_force_model, only: model_type, t_of
+  use pd_family_surface, only: bond_factor
+  use pd_force_generic_pass, only: generic_bound
+  use pd_force_model, only: bond_factors_of, model_type, q_of, t_of
   use pd_force_weights, only: allocate_weights, block_weights, half_of
-  use pd_force_workspace, only: lattice_workspace_type, weights_type
+  use pd_force_workspace, only: lattice_workspace_type, weights_type, workspace_type
   implicit none (type, external)
   private
-  public :: lattice_bound, lattice_printed_bound
+  public :: stiffness_bound, lattice_printed_bound
 
 contains
+
+  !> M_k [N/m4] of every slot, 0 for points without bonds:
+  !> sum_j [ (q_k+q_j) Gb + (m_k I_k + m_j I_j) Gd ] vc V_j/|xi|, m = 2 max(a,0) (d delta)^2,
+  !> I_k = sum_l Gd vc V_l/|xi|. The step sqrt(2 rho/M) and the relaxation's mass come from it.
+  subroutine stiffness_bound(body, family, model, workspace, bound)
+    type(body_type), intent(in) :: body       !! arranged in the slots of the family
+    class(family_type), intent(in) :: family  !! whole; broken bonds count as if they were intact
+    type(model_type), intent(in) :: model     !! with surface factors, if there are any
+    type(workspace_type), intent(in) :: workspace  !! of this family and model
+    real(wp), intent(inout), contiguous :: bound(:)  !! (n_slots) M_k [N/m4]
+    type(bonds_type) :: bonds
+    real(wp), allocatable :: inverse(:)
+    real(wp) :: n(body%dim)
+    integer :: k, i, j
+
+    if (model%generic) then
+      call generic_bound(family, model, workspace%generic, bound)
+      return
+    end if
+    select type (family)
+    type is (lattice_family_type)
+      ! the weights hold all that is needed, unless they are not made yet
+      if (allocated(workspace%lattice%table)) then
+        call lattice_bound(body, family, model, workspace%lattice, bound)
+        return
+      end if
+    class default  ! below, bond by bond, which suits any family
+      continue
+    end select
+    allocate (inverse(body%n_slots), source=0.0_wp)
+    if (model%dilatation) then
+      !$omp parallel default(none) shared(body, family, model, inverse) private(bonds, n, k, i, j)
+      call allocate_bonds(family, bonds)
+      !$omp do schedule(dynamic, 256)
+      do k = 1, body%n_slots
+        if (body%point(k) == 0) cycle
+        call family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          j = bonds%j(i)
+          n = bonds%xi(i, :)/bonds%length(i)
+          if (model%consistent) then
+            inverse(k) = inverse(k) + bond_size(model, k, i, .true.)*bonds%weight(i)/bonds%length(i)
+          else if (model%weighted) then
+            inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
+              & *law_factor(model, k, j, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
+          else
+            inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
+              & /bonds%length(i)
+          end if
+        end do
+        associate (m => model%materials(model%material(k)))
+          inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*t_of(model, k)**2
+        end associate
+      end do
+      !$omp end parallel
+      call share_halo(body, inverse)
+    end if
+    !$omp parallel default(none) shared(body, family, model, bound, inverse) &
+    !$omp private(bonds, n, k, i, j)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 256)
+    do k = 1, body%n_slots
+      bound(k) = 0.0_wp
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        j = bonds%j(i)
+        n = bonds%xi(i, :)/bonds%length(i)
+        if (model%consistent) then
+          bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j))*bond_size(model, k, i, .false.) &
+            & + (inverse(k) + inverse(j))*bond_size(model, k, i, .true.)) &
+            & *bonds%weight(i)/bonds%length(i)
+          cycle
+        end if
+        if (.not. model%weighted) then
+          bound(k) = bound(k) + ((model%materials(model%material(k))%q &
+            & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
+            & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j)) &
+            & *bonds%weight(i)/bonds%length(i)
+          cycle
+        end if
+        bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j)) &
+          & *surface_factor(model, model%S, n, k, j) &
+          & *law_factor(model, k, j, bonds%length(i), .false.) &
+          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j) &
+          & *law_factor(model, k, j, bonds%length(i), .true.))*bonds%weight(i)/bonds%length(i)
+      end do
+    end do
+    !$omp end parallel
+  end subroutine stiffness_bound
+
+  !> The size of Gd or Gb of the bond k-j along the unit vector n.
+  pure real(wp) function surface_factor(model, g, n, k, j)
+    type(model_type), intent(in) :: model
+    real(wp), allocatable, intent(in) :: g(:, :)
+    real(wp), intent(in) :: n(:)
+    integer, intent(in) :: k, j
+    surface_factor = 1.0_wp
+    if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :), model%axes))
+  end function surface_factor
+
+  !> The size of the consistent weight of the `i`-th bond of slot `k`.
+  pure real(wp) function bond_size(model, k, i, of_dilatation) result(weight)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, i
+    logical, intent(in) :: of_dilatation
+
+    associate (place => model%weights%before(k) + i)
+      weight = abs(merge(model%weights%Gd(place), model%weights%Gb(place), of_dilatation))
+    end associate
+  end function bond_size
+
+  !> The size of a law's factor of a bond: that of the dilatation or of the stretch.
+  pure real(wp) function law_factor(model, k, j, length, of_dilatation) result(factor)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k, j
+    real(wp), intent(in) :: length
+    logical, intent(in) :: of_dilatation
+    real(wp) :: gb, gd
+
+    factor = 1.0_wp
+    if (.not. model%weighted) return
+    call bond_factors_of(model, k, j, length, gb, gd)
+    factor = abs(merge(gd, gb, of_dilatation))
+  end function law_factor
 
   !> M_k of every slot [N/m4] (doc/theory.md, the time step), as if no bond were broken. Weights of
   !> either sign count with their size.

@@ -1,6 +1,6 @@
-!> Terms of the force: what acts on the points beside their bonds. Loads are terms, and so is
-!> whatever a program adds that uses the library: springs to the ground, dashpots, contact, gravity
-!> between bodies.
+!> Terms of the force: what acts on the points. The bonds are the first one, loads are terms, and so
+!> is whatever a program adds that uses the library: springs to the ground, dashpots, contact,
+!> gravity between bodies.
 !>
 !> A term extends `force_term_type` and says what force density it adds, what energy it stores, how
 !> stiff it is at most, what it has to keep for a restart, and what it is, in a line. It sees the
@@ -13,20 +13,37 @@
 module pd_force_term
   use pd_base_archive, only: archive_type
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_kinds, only: wp, i1, i4, i8
   use pd_body_body, only: body_type
   use pd_law_material, only: material_type
   use pd_family_family, only: family_type
+  use pd_force_forces, only: whole
+  use pd_force_model, only: force_options_type, model_type
   use pd_force_obstacle, only: obstacle_type
+  use pd_force_tangent, only: tangent_type
+  use pd_force_workspace, only: workspace_type
   implicit none (type, external)
   private
-  public :: force_term_type, term_view_type, density_of, name_of
+  public :: force_term_type, term_view_type, bonds_view_type, density_of, name_of
   public :: no_tangent, has_tangent, no_stiffness
 
   !> How the force of a term depends on displacements: somehow, and the term can't say how; with the
   !> tangent that `add_tangent` gives; not at all, as a load that depends on time alone, or a
   !> dashpot. Static equilibrium is not computed with terms of the first kind.
   integer, parameter :: no_tangent = 0, has_tangent = 1, no_stiffness = 2
+
+  !> What is asked of the bonds, and what their passes read and write. No other term looks at it.
+  type :: bonds_view_type
+    logical :: asked = .false.          !! else a list leaves them out
+    type(model_type), pointer :: model => null()          !! parameters of the slots
+    type(workspace_type), pointer :: workspace => null()  !! room of the passes
+    type(force_options_type) :: options                   !! what the forces take in
+    real(wp), pointer, contiguous :: p(:) => null()       !! 2 a d delta theta (n_slots)
+    integer(i1), pointer, contiguous :: strained(:) => null()  !! marks (n_slots)
+    integer :: part = whole             !! of an evaluation (`pd_force_forces`)
+    logical :: of_copies = .true.       !! the forces of copies of other processes' points, too
+    type(tangent_type), pointer :: tangent => null()      !! how a product is formed
+  end type bonds_view_type
 
   !> What a term sees. Nothing of it is the term's to change. Arrays are over slots; dead slots
   !> (`body%point` is 0) have no volume and stay zero.
@@ -44,6 +61,7 @@ module pd_force_term
     real(wp) :: time = 0.0_wp                       !! of the displacements [s]
     integer :: step = 0                             !! complete steps (iterations) then
     integer(i8) :: broken = 0_i8                    !! bonds that have broken until then
+    type(bonds_view_type) :: bonds                  !! what is asked of the term of the bonds
   end type term_view_type
 
   type, abstract :: force_term_type
@@ -53,6 +71,8 @@ module pd_force_term
     logical :: conservative = .true.     !! internal terms: the force is minus the gradient of the
                                          !! energy; what others do not store counts as dissipated
     integer :: tangent = no_tangent      !! `no_tangent`, `has_tangent` or `no_stiffness`
+    logical :: sets = .false.            !! it sets all slots instead of adding to them: the first
+                                         !! of its list
     logical :: summed_apart = .false.    !! whoever holds it sums the work of its few points
     logical :: has_partner = .false.     !! it acts between points and what is no point
     logical :: acts_on_few = .false.     !! `acting` tells on which points, internal terms alone

@@ -1,10 +1,12 @@
 !> The terms of a system (`pd_force_term`) in their order, and the account of their work.
 module pd_force_terms
   use pd_base_archive, only: archive_type
+  use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_order, only: place_in
   use pd_base_reduce, only: inner, sum_listed
   use pd_base_text, only: to_text
+  use pd_force_forces, only: up_to_marks
   use pd_force_term, only: force_term_type, name_of, no_stiffness, no_tangent, term_view_type
   implicit none (type, external)
   private
@@ -24,10 +26,12 @@ module pd_force_terms
     real(wp) :: lost = 0.0_wp                  !! of a term that is not conservative: it took [J]
   end type item_type
 
-  !> Terms in their order. It is a term itself: the sum of those that are not external.
+  !> Terms in their order. It is a term itself: the sum of those that are not external, the bonds
+  !> included where a view asks for them.
   type, extends(force_term_type) :: term_list_type
     type(item_type), allocatable :: items(:)   !! not allocated: none
-    integer :: inside = 0                      !! terms that are not external
+    integer :: bonds = 0                       !! 1 if the first term is that of the bonds
+    integer :: inside = 0                      !! other terms that are not external
     integer :: outside = 0                     !! external ones
     real(wp), allocatable :: force(:, :)       !! room for forces and energies of terms that act
                                                !! on few points, 0 between calls
@@ -55,12 +59,13 @@ module pd_force_terms
 
 contains
 
-  !> Add a term, as the last one. Of a list, its terms are added one by one.
+  !> Add a term, as the last one, or the bonds as the first. Of a list, its terms are added one by
+  !> one.
   recursive subroutine add(self, term)
-    class(term_list_type), intent(inout) :: self  !! the list, with the term at its end on return
+    class(term_list_type), intent(inout) :: self  !! the list, with the term on return
     class(force_term_type), intent(in) :: term   !! is copied
     type(item_type), allocatable :: items(:)
-    integer :: i, n
+    integer :: i, n, place
 
     select type (term)
     class is (term_list_type)
@@ -72,19 +77,35 @@ contains
       continue
     end select
     n = self%number()
+    place = n + 1
+    if (term%sets) then
+      if (self%bonds > 0) call internal_fault('two terms that set the force')
+      place = 1
+    end if
     allocate (items(n + 1))
+    allocate (items(place)%term, source=term)
     do i = 1, n
-      call move_alloc(self%items(i)%term, items(i)%term)
+      call move_alloc(self%items(i)%term, items(merge(i, i + 1, i < place))%term)
     end do
-    allocate (items(n + 1)%term, source=term)
     call move_alloc(items, self%items)
-    if (term%external) then
+    if (term%sets) then
+      self%bonds = 1
+    else if (term%external) then
       self%outside = self%outside + 1
     else
       self%inside = self%inside + 1
     end if
     self%conservative = self%conservative .and. (term%external .or. term%conservative)
   end subroutine add
+
+  !> The first term that acts at an instant: without the bonds where they are not asked for.
+  pure integer function first_of(self, view) result(first)
+    class(term_list_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+
+    first = 1
+    if (.not. view%bonds%asked) first = 1 + self%bonds
+  end function first_of
 
   !> How many terms there are.
   pure integer function number(self)
@@ -94,7 +115,8 @@ contains
     if (allocated(self%items)) number = size(self%items)
   end function number
 
-  !> The force density of the terms that are not external, added to `force`.
+  !> The force density of the terms that are not external, added to `force`; set, if the view asks
+  !> for the bonds. Of a part of their evaluation that has no forces yet they are all there is.
   subroutine add_force_of_list(self, view, force)
     class(term_list_type), intent(in) :: self  !! the list
     type(term_view_type), intent(in) :: view   !! the instant
@@ -102,9 +124,9 @@ contains
       !! (n_slots, dim) force density, added to [N/m3]
     integer :: i
 
-    if (self%inside == 0) return
-    do i = 1, self%number()
+    do i = first_of(self, view), self%number()
       if (.not. self%items(i)%term%external) call self%items(i)%term%add_force(view, force)
+      if (view%bonds%asked .and. view%bonds%part == up_to_marks) exit
     end do
   end subroutine add_force_of_list
 
@@ -121,33 +143,43 @@ contains
     end do
   end subroutine add_external
 
-  !> The energy density that the terms store which are not external.
+  !> The energy density that the terms store which are not external, added to `density`; set, if the
+  !> view asks for the bonds.
   subroutine add_energy_of_list(self, view, density)
     class(term_list_type), intent(in) :: self          !! the list
     type(term_view_type), intent(in) :: view           !! the instant
     real(wp), intent(inout), contiguous :: density(:)  !! (n_slots) energy density, added to [J/m3]
     integer :: i
 
-    if (self%inside == 0) return
-    do i = 1, self%number()
+    do i = first_of(self, view), self%number()
       if (.not. self%items(i)%term%external) call self%items(i)%term%add_energy(view, density)
     end do
   end subroutine add_energy_of_list
 
-  !> The energy that the terms store which are not external [J].
+  !> The energy that the terms store which are not external [J]. That of the bonds is summed on its
+  !> own: what others store beside it keeps its last digits.
   real(wp) function energy(self, view)
     class(term_list_type), intent(in) :: self  !! the list
     type(term_view_type), intent(in) :: view   !! the instant
     real(wp), allocatable :: density(:)
+    type(term_view_type) :: others
 
     energy = 0.0_wp
+    allocate (density(view%body%n_slots))
+    if (view%bonds%asked .and. self%bonds > 0) then
+      call self%items(1)%term%add_energy(view, density)
+      energy = inner(view%body%order, density, view%body%volume)
+    end if
     if (self%inside == 0) return
-    allocate (density(view%body%n_slots), source=0.0_wp)
-    call self%add_energy(view, density)
-    energy = inner(view%body%order, density, view%body%volume)
+    others = view
+    others%bonds%asked = .false.
+    density = 0.0_wp
+    call self%add_energy(others, density)
+    energy = energy + inner(view%body%order, density, view%body%volume)
   end function energy
 
-  !> Bounds of all terms, external ones included: they act on the motion as well.
+  !> Bounds of all terms, external ones included: they act on the motion as well. Set, if the view
+  !> asks for the bonds.
   subroutine add_bound_of_list(self, view, bound)
     class(term_list_type), intent(in) :: self  !! the list
     type(term_view_type), intent(in) :: view   !! the instant
@@ -155,7 +187,7 @@ contains
       !! (n_slots) bound of the stiffness, added to [N/m4]
     integer :: i
 
-    do i = 1, self%number()
+    do i = first_of(self, view), self%number()
       call self%items(i)%term%add_stiffness_bound(view, bound)
     end do
   end subroutine add_bound_of_list
@@ -173,7 +205,7 @@ contains
     end do
   end subroutine add_damping_of_list
 
-  !> What all terms resist, external ones included.
+  !> What all terms resist, external ones included. Set, if the view asks for the bonds.
   subroutine add_tangent_of_list(self, view, w, kw)
     class(term_list_type), intent(in) :: self    !! the list
     type(term_view_type), intent(in) :: view     !! the instant
@@ -182,7 +214,7 @@ contains
       !! (n_slots, dim) resistance to it, added to [N/m3]
     integer :: i
 
-    do i = 1, self%number()
+    do i = first_of(self, view), self%number()
       if (self%items(i)%term%tangent /= no_stiffness) &
         & call self%items(i)%term%add_tangent(view, w, kw)
     end do

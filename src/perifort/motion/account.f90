@@ -10,14 +10,15 @@ module pd_motion_account
   use pd_force_term, only: term_view_type
   use pd_motion_conditions, only: accelerations_of, advance_paths, motion_type
   use pd_motion_heating, only: apply_factors, apply_rate, is_timed
-  use pd_motion_loads, only: acts_along, density_of, load_of, load_type, number_of_loads
+  use pd_motion_loads, only: acts_along, density_of, load_of, load_type, number_of_loads, &
+    & other_terms
   use pd_motion_pose, only: moments_about
   use pd_motion_rigid_body, only: kinetic_of
-  use pd_motion_system, only: add_loads, apply_to_held, find_loaded, inverse_density, system_type, &
-    & view_of
+  use pd_motion_system, only: add_loads, apply_to_held, ask_bonds, find_loaded, inverse_density, &
+    & system_type, view_of
   implicit none (type, external)
   private
-  public :: account, energies_type, energies_of, stored_energy, velocities_now, rows_of_work
+  public :: account, energies_type, energies_of, velocities_now, rows_of_work
 
   !> Points of a load from which on threads share the sum of its work.
   integer, parameter :: worth_threads = 4096
@@ -97,7 +98,7 @@ contains
     end do
     call advance_paths(system%motions, t)
     if (system%model%generic) call commit(system)
-    if (system%terms%number() == number_of_loads(system%terms)) return
+    if (other_terms(system%terms) == 0) return
     call view_of(system, t, view)
     call system%terms%account(view, system%external_work, system%dissipated)
     call system%terms%advance(view)
@@ -238,15 +239,6 @@ contains
     energy = inner(system%body%order, density, system%body%volume)
   end function strain_energy
 
-  !> What the terms of the force store at the present displacements [J].
-  real(wp) function stored_energy(system) result(energy)
-    type(system_type), intent(in), target :: system  !! at the instant of its time
-    type(term_view_type) :: view
-
-    call view_of(system, system%time, view)
-    energy = system%terms%energy(view)
-  end function stored_energy
-
   !> The `work` of the `n`-th component since its last force and place. With `mass` and the imposed
   !> velocity `v` its gain in kinetic energy comes on top.
   pure subroutine add_work(system, n, first, work, u, force, mass, v)
@@ -383,12 +375,14 @@ contains
       !! its state stays as it is; its workspace changes
     real(wp), intent(in) :: v(:, :)               !! (n_slots, dim) [m/s]
     type(energies_type), intent(out) :: energies  !! those of this instant
+    type(term_view_type) :: view
     real(wp), allocatable :: density(:), mass(:)
     integer :: k, c
 
     allocate (density(system%body%n_slots), mass(system%body%n_slots))
-    energies%strain = strain_energy(system)
-    if (system%terms%inside > 0) energies%strain = energies%strain + stored_energy(system)
+    call view_of(system, system%time, view)
+    call ask_bonds(system, view)
+    energies%strain = system%terms%energy(view)
     !$omp parallel do schedule(static) default(none) shared(system, v, density, mass) private(k, c)
     do k = 1, system%body%n_slots
       mass(k) = system%body%volume(k)/inverse_density(system%model, k)

@@ -12,8 +12,8 @@ module pd_motion_loads
   use pd_motion_curve, only: curve_type
   implicit none (type, external)
   private
-  public :: load_type, add_loads_to, number_of_loads, load_of, add_part, acts_along, density_of, &
-    & renew_load
+  public :: load_type, add_loads_to, number_of_loads, load_of, other_terms, add_part, &
+    & acts_along, density_of, renew_load
 
   real(wp), parameter :: never = -huge(1.0_wp)
 
@@ -45,15 +45,15 @@ module pd_motion_loads
 
 contains
 
-  !> Put loads into a list of terms, before all others.
+  !> Put loads into a list of terms, before all others but the bonds.
   subroutine add_loads_to(terms, loads)
     type(term_list_type), intent(inout) :: terms
-      !! without terms other than loads; with these loads at its end on return
+      !! without terms other than bonds and loads; with these loads at its end on return
     type(load_type), intent(inout) :: loads(:)
       !! (any number) external, without stiffness and summed apart on return
     integer :: l, c, i
 
-    if (terms%number() > number_of_loads(terms)) call internal_fault('loads come first')
+    if (other_terms(terms) > 0) call internal_fault('loads come first')
     do l = 1, size(loads)
       do c = 1, size(loads(l)%density, 2)
         loads(l)%acts(c) = any(abs(loads(l)%density(:, c)) > 0.0_wp)
@@ -70,31 +70,38 @@ contains
     end do
   end subroutine add_loads_to
 
-  !> How many loads a list of terms begins with.
+  !> How many loads a list of terms has; they follow the bonds.
   pure integer function number_of_loads(terms) result(number)
-    type(term_list_type), intent(in) :: terms  !! with its loads first
+    type(term_list_type), intent(in) :: terms  !! with its loads before other terms
     integer :: i
 
     number = 0
     do i = 1, terms%number()
       select type (term => terms%items(i)%term)
       type is (load_type)
-        number = i
+        number = number + 1
       class default  ! another term
         continue
       end select
     end do
   end function number_of_loads
 
+  !> How many terms a list has that are neither the bonds nor loads.
+  pure integer function other_terms(terms) result(number)
+    type(term_list_type), intent(in) :: terms  !! with its loads before other terms
+
+    number = terms%number() - terms%bonds - number_of_loads(terms)
+  end function other_terms
+
   !> The `l`-th load of a list of terms. It is the term itself, not a copy.
   function load_of(terms, l) result(load)
-    type(term_list_type), intent(in), target :: terms  !! with its loads first
+    type(term_list_type), intent(in), target :: terms  !! with its loads before other terms
     integer, intent(in) :: l
       !! number of the load, from 1; that of another term is a fault of the program
     type(load_type), pointer :: load
 
     load => null()
-    select type (term => terms%items(l)%term)
+    select type (term => terms%items(terms%bonds + l)%term)
     type is (load_type)
       load => term
     class default

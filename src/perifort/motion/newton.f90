@@ -3,6 +3,7 @@
 module pd_motion_newton
   use pd_base_archive, only: archive_type, of_slots, same
   use pd_base_kinds, only: wp
+  use pd_force_tangent, only: tangent_type
   implicit none (type, external)
   private
   public :: newton_type, krylov_type, frame_type, ritz_type, sums_type, keep_newton
@@ -39,7 +40,8 @@ module pd_motion_newton
     real(wp), allocatable :: residual(:, :)   !! f + b on free components, else 0 [N/m3]
     real(wp), allocatable :: direction(:, :)  !! of the next iteration, small [m]
     real(wp), allocatable :: origin(:, :)     !! the displacements where the solve began [m]
-    real(wp), allocatable :: forces(:, :)     !! unprojected, there, if `deformed` [N/m3]
+    type(tangent_type) :: tangent             !! of the products; if `deformed` with the unprojected
+                                              !! forces there
     real(wp) :: scale = 1.0_wp                !! of the directions
     real(wp) :: largest = 0.0_wp              !! component of the direction [m]
     real(wp) :: rho = 0.0_wp                  !! residual . preconditioned residual
@@ -51,7 +53,6 @@ module pd_motion_newton
     ! made anew wherever the solve continues
     real(wp), allocatable :: inverse(:, :)    !! the preconditioner: 1/mass, 0 where held [m4/N]
     real(wp), allocatable :: product(:, :)    !! stiffness times direction [N/m3]
-    real(wp), allocatable :: moved(:, :)      !! displacements of a difference [m]
     real(wp), allocatable :: mass(:, :)       !! what `inverse` is of, where there are pins [N/m4]
     type(frame_type), allocatable :: frames(:)  !! (motions) of pins at the origin
     real(wp), allocatable :: on_slow(:)       !! the residual on the functions of the coarse part,
@@ -93,7 +94,7 @@ contains
       call archive%keep('residual force', krylov%residual)
       call archive%keep('direction', krylov%direction)
       call archive%keep('origin', krylov%origin)
-      call archive%keep('forces at the origin', krylov%forces)
+      call archive%keep('forces at the origin', krylov%tangent%forces)
       call archive%over(same)
       call archive%keep('residual of pins', krylov%of_pins)
       call archive%keep('scale', krylov%scale)

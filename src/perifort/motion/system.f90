@@ -10,11 +10,13 @@ module pd_motion_system
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
   use pd_force_breaking, only: strained_slots, break_bonds, stretch_ratios
   use pd_force_generic_pass, only: renew_pulls
-  use pd_force_forces, only: arriving_force, internal_force, whole, up_to_marks, after_marks
+  use pd_force_bonds, only: new_bond_term
+  use pd_force_forces, only: whole, up_to_marks, after_marks
   use pd_force_model, only: model_type, options_of, p_of
   use pd_force_obstacle, only: obstacle_type
   use pd_force_reference, only: point_dilatation, point_force
-  use pd_force_term, only: term_view_type
+  use pd_force_tangent, only: tangent_type
+  use pd_force_term, only: bonds_view_type, term_view_type
   use pd_force_terms, only: term_list_type
   use pd_force_workspace, only: workspace_type
   use pd_motion_conditions, only: motion_type, impose, remember_start, free_component, &
@@ -30,7 +32,7 @@ module pd_motion_system
   private
   public :: system_type, state_type, pairing_type, start_system, bring_temperature, evaluate, &
     & renew_forces, renew_conditions, explain_condition, break_now, break_batch, break_marked, &
-    & greatest_ratio, settle_account, add_loads, inverse_density, view_of, find_loaded, &
+    & greatest_ratio, settle_account, add_loads, inverse_density, view_of, ask_bonds, find_loaded, &
     & apply_to_held
 
   !> What moves. All arrays are over slots; dead slots stay zero.
@@ -50,7 +52,7 @@ module pd_motion_system
     type(workspace_type) :: workspace           !! what the force loops keep, of this model
     type(state_type) :: state
     type(motion_type), allocatable :: motions(:)
-    type(term_list_type) :: terms               !! what acts beside the bonds: loads first
+    type(term_list_type) :: terms               !! what acts: the bonds, then loads, then others
     type(rigid_body_type), allocatable :: rigid_bodies(:)  !! of given shapes
     type(obstacle_type), allocatable :: obstacles(:)       !! their surfaces, as the terms see them
     type(heating_type) :: heating               !! temperature changes that vary in time
@@ -98,10 +100,12 @@ contains
   !> Make a system ready at t = 0: `u` and `v` hold the initial state, conditions are in place.
   subroutine start_system(system)
     type(system_type), intent(inout), target :: system
-      !! with body, family, model, conditions, `u` and `v`; gets room for forces and marks
+      !! with body, family, model, conditions, terms, `u` and `v`; gets the term of its bonds, and
+      !! room for forces and marks
     type(term_view_type) :: view
     integer :: n
 
+    call system%terms%add(new_bond_term())
     n = system%body%n_slots
     if (.not. allocated(system%motions)) allocate (system%motions(0))
     if (.not. allocated(system%rigid_bodies)) allocate (system%rigid_bodies(0))
@@ -122,7 +126,8 @@ contains
   end subroutine start_system
 
   !> What the terms of the force see of a system at time `t` of its displacements, or of `u` in
-  !> their place. Valid as long as the system stays where it is in memory.
+  !> their place; nothing is asked of the bonds. Valid as long as the system stays where it is in
+  !> memory.
   subroutine view_of(system, t, view, u)
     type(system_type), intent(in), target :: system
       !! must not move in memory while the view is used
@@ -141,6 +146,33 @@ contains
     view%step = max(0, system%memory%step)
     view%broken = system%broken
   end subroutine view_of
+
+  !> Ask a view for the bonds as well: for their forces, as the model has them, at the view's
+  !> displacements, which give the state its dilatation and the system its marks, for their energy,
+  !> bound, or product with the `tangent`.
+  subroutine ask_bonds(system, view, part, of_copies, tangent)
+    type(system_type), intent(inout), target :: system
+      !! must not move in memory while the view is used
+    type(term_view_type), intent(inout) :: view  !! of this system
+    integer, intent(in), optional :: part        !! of an evaluation; `whole` by default
+    logical, intent(in), optional :: of_copies
+      !! forces of copies of other processes' points are asked for; they are by default
+    type(tangent_type), intent(inout), target, optional :: tangent
+      !! how a product is formed; no product is asked for by default
+
+    view%bonds = bonds_view_type()
+    associate (bonds => view%bonds)
+      bonds%asked = .true.
+      bonds%model => system%model
+      bonds%workspace => system%workspace
+      bonds%options = options_of(system%model)
+      bonds%p => system%state%p
+      bonds%strained => system%strained
+      if (present(part)) bonds%part = part
+      if (present(of_copies)) bonds%of_copies = of_copies
+      if (present(tangent)) bonds%tangent => tangent
+    end associate
+  end subroutine ask_bonds
 
   !> Make the rigid bodies of pins, in their places of the initial displacements and with the
   !> momentum of the initial velocities.
@@ -246,37 +278,25 @@ contains
   !> The internal forces at the present displacements and time `t` into the system's state: those of
   !> the bonds, as the model has them, and of the terms that are not external. Nothing is imposed
   !> and no bond breaks. Of an evaluation's `part`s (`pd_force_forces`) it makes the whole by
-  !> default; terms come last.
+  !> default; other terms act with the last one.
   subroutine renew_forces(system, t, part)
     type(system_type), intent(inout), target :: system
       !! its displacements stay as they are; forces, dilatation and marks change
     real(wp), intent(in) :: t  !! [s]
     integer, intent(in), optional :: part  !! `whole`, `up_to_marks` or `after_marks`
     type(term_view_type) :: view
-    logical :: of_copies
-    integer :: now
+    logical :: of_copies, others
 
     system%time = t
     ! explicit steps take displacements of copies from their owners before each evaluation; their
     ! forces are needed for the energy of bonds that break after the forces alone
     of_copies = system%static .or. system%break_late
-    now = whole
-    if (present(part)) now = part
-    associate (state => system%state)
-      if (associated(system%body%order%ranks) .and. now /= after_marks) then
-        call start_halo(system%body, state%u)
-        call arriving_force(system%body, system%family, system%model, options_of(system%model), &
-          & system%workspace, state%u, state%p, state%force, system%strained, now, of_copies)
-      else
-        call internal_force(system%body, system%family, system%model, options_of(system%model), &
-          & system%workspace, state%u, state%p, state%force, system%strained, now, of_copies)
-      end if
-    end associate
-    if (system%terms%inside == 0 .or. now == up_to_marks) return
     call view_of(system, t, view)
-    call system%terms%search(view)
+    call ask_bonds(system, view, part, of_copies)
+    others = system%terms%inside > 0 .and. view%bonds%part /= up_to_marks
+    if (others) call system%terms%search(view)
     call system%terms%add_force(view, system%state%force)
-    if (of_copies) call share_halo(system%body, system%state%force)
+    if (others .and. of_copies) call share_halo(system%body, system%state%force)
   end subroutine renew_forces
 
   !> Bring conditions that are expressions of t to time `t`. The first value that is not finite is

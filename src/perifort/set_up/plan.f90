@@ -13,9 +13,9 @@ module pd_set_up_plan
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
     & stable_step_of, may_be_unstable, lowest_eigenvalue
   use pd_force_term, only: term_view_type
-  use pd_motion_loads, only: number_of_loads
-  use pd_motion_system, only: system_type, inverse_density, view_of
-  use pd_motion_explicit_time_step, only: stiffness_bound, stable_step, printed_step, book_step, &
+  use pd_motion_loads, only: other_terms
+  use pd_motion_system, only: ask_bonds, inverse_density, system_type, view_of
+  use pd_motion_explicit_time_step, only: stable_step, printed_step, book_step, &
     & chapter_stiffness, constant_stiffness, integrator_limit, damped_step
   implicit none (type, external)
   private
@@ -53,11 +53,10 @@ contains
     real(wp), allocatable :: bound(:), rows(:)
     real(wp) :: stiffness, damping  ! of the terms of the force, over the density
 
-    allocate (bound(system%body%n_slots))
-    call stiffness_bound(system%body, system%family, system%model, system%workspace, bound)
+    call bound_terms(system, bound, rows, stiffness, damping)
     plan%relaxes = scene%time%method == 'relaxation'
     plan%integrator = trim(scene%time%integrator)
-    if (.not. any_of_ranks(system%body%order, any(bound > 0.0_wp))) then
+    if (.not. any_of_ranks(system%body%order, any(bound > rows/2))) then
       call scene_fault(error, scene, 'horizon', 1, merge('length', 'ratio ', &
         & is_set(scene%horizon%length)), &
         & 'no point of the scene has a neighbour within the horizon: there is nothing to compute', &
@@ -72,7 +71,6 @@ contains
         & "use more elements across its thinnest part, or surface_correction = 'energy'")
       return
     end if
-    call add_terms(system, bound, rows, stiffness, damping)
     if (plan%relaxes) then
       call plan_relaxation(scene, system, bound, rows, plan%relaxation)
       plan%steps = plan%relaxation%load_steps
@@ -144,33 +142,36 @@ contains
     plan%limit = step
   end subroutine measure_limit
 
-  !> Add the stiffness of the terms of the force to the `bound` of the bonds. Its rows sum up to
-  !> twice that of 7.25.
-  subroutine add_terms(system, bound, rows, stiffness, damping)
-    type(system_type), intent(in), target :: system
-    real(wp), intent(inout) :: bound(:)     !! (n_slots) [N/m4]
-    real(wp), allocatable, intent(out) :: rows(:)  !! of the terms alone (n_slots) [N/m4]
-    real(wp), intent(out) :: stiffness      !! the largest of the terms over the density [1/s2]
-    real(wp), intent(out) :: damping        !! the largest rate at which they slow down [1/s]
+  !> The bound M of 7.25 of all terms of the force, half of what a row of the stiffness sums up to,
+  !> and what terms beside the bonds do to it.
+  subroutine bound_terms(system, bound, rows, stiffness, damping)
+    type(system_type), intent(inout), target :: system  !! left as it is
+    real(wp), allocatable, intent(out) :: bound(:)  !! (n_slots) M_k [N/m4]
+    real(wp), allocatable, intent(out) :: rows(:)
+      !! (n_slots) bound of the stiffness of the terms beside the bonds [N/m4]
+    real(wp), intent(out) :: stiffness  !! the largest of these over the density [1/s2]
+    real(wp), intent(out) :: damping    !! the largest rate at which they slow down [1/s]
     real(wp), allocatable :: rates(:)
     type(term_view_type) :: view
     integer :: k
 
     stiffness = 0.0_wp
     damping = 0.0_wp
-    allocate (rows(size(bound)), source=0.0_wp)
-    if (system%terms%number() == number_of_loads(system%terms)) return
-    allocate (rates(size(bound)), source=0.0_wp)
+    allocate (bound(system%body%n_slots), rows(system%body%n_slots), source=0.0_wp)
     call view_of(system, 0.0_wp, view)
-    call system%terms%add_stiffness_bound(view, rows)
+    if (other_terms(system%terms) > 0) call system%terms%add_stiffness_bound(view, rows)
+    call ask_bonds(system, view)
+    call system%terms%add_stiffness_bound(view, bound)
+    bound = bound/2
+    if (other_terms(system%terms) == 0) return
+    allocate (rates(size(bound)), source=0.0_wp)
     call system%terms%add_damping_bound(view, rates)
     do k = 1, size(bound)
       if (system%body%point(k) == 0) cycle
-      bound(k) = bound(k) + rows(k)/2
       stiffness = max(stiffness, rows(k)*inverse_density(system%model, k))
       damping = max(damping, rates(k)*inverse_density(system%model, k))
     end do
-  end subroutine add_terms
+  end subroutine bound_terms
 
   !> The fictitious mass of every component, for a step of 1.
   subroutine plan_relaxation(scene, system, bound, rows, relaxation)

@@ -28,7 +28,7 @@ module pd_set_up_prepare
   use pd_force_model, only: give_horizons, new_model
   use pd_force_terms, only: term_list_type
   use pd_motion_loads, only: add_loads_to, load_type
-  use pd_motion_system, only: system_type, start_system, explain_condition
+  use pd_motion_system, only: explain_condition, start_system, system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: has_refinement, scene_type
   use pd_scene_format_file, only: resolve_path

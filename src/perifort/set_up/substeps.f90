@@ -7,7 +7,7 @@ module pd_set_up_substeps
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_force_model, only: no_fail
   use pd_motion_conditions, only: moves
-  use pd_motion_loads, only: number_of_loads
+  use pd_motion_loads, only: other_terms
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: is_set, scene_type
@@ -53,7 +53,7 @@ contains
         & 'the motion of rigid bodies is integrated in whole steps')
     else if (size(scene%contacts) > 0) then
       call refuse('contact', 1, '', '&contact', 'its forces have no level')
-    else if (system%terms%number() > number_of_loads(system%terms)) then
+    else if (other_terms(system%terms) > 0) then
       call refuse('time', 1, 'substeps', 'terms of the force', 'they have no level')
     else if (allocated(system%heating%curves)) then
       call refuse('initial', 1, 'temperature_change', 'a temperature that varies in time', &

@@ -17,7 +17,7 @@ module pd_motion_static_balance
   use pd_motion_static_residual, only: relaxation_type, squared_force
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
   use pd_force_term, only: term_view_type
-  use pd_motion_system, only: system_type, add_loads, view_of
+  use pd_motion_system, only: add_loads, ask_bonds, system_type, view_of
   use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
@@ -339,8 +339,8 @@ contains
     integer :: i, k, p
 
     allocate (energy(system%body%n_slots), source=0.0_wp)
-    call energy_pass(system%family, system%model, system%workspace, system%state%u, energy)
     call view_of(system, system%time, view)
+    call ask_bonds(system, view)
     call system%terms%add_energy(view, energy)
     do p = 1, size(balance%piece)
       call new_running(running)

@@ -10,7 +10,7 @@ module pd_motion_static_events
   use pd_motion_conditions, only: free_component, moved_by_displacement, motion_type
   use pd_motion_curve, only: curve_type
   use pd_motion_heating, only: is_timed
-  use pd_motion_loads, only: load_type, load_of, number_of_loads
+  use pd_motion_loads, only: load_type, load_of, number_of_loads, other_terms
   use pd_motion_memory, only: memory_type, not_begun
   use pd_motion_observer, only: observer_type, instant_type, add_note
   use pd_motion_static_equilibrium, only: find_equilibrium, check_terms, turn_where_free, settle
@@ -301,7 +301,7 @@ contains
       if (reason == '' .and. .not. is_proportional(load%curve)) &
         & reason = 'a load is not proportional to t'
     end do
-    do i = number_of_loads(system%terms) + 1, system%terms%number()
+    do i = system%terms%number() - other_terms(system%terms) + 1, system%terms%number()
       select type (term => system%terms%items(i)%term)
       type is (springs_type)
         continue

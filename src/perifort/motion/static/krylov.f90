@@ -8,15 +8,16 @@ module pd_motion_static_krylov
     & new_running, new_sums, running_type, total_of, total_of_running, summed_type => sums_type
   use pd_body_body, only: owned, share_halo
   use pd_force_model, only: force_options_type, options_of
+  use pd_force_tangent, only: about_undeformed, one_sided
+  use pd_force_term, only: term_view_type
   use pd_motion_coarse, only: add_slow, coarse_type, restrict_to, solve_for
-  use pd_motion_loads, only: number_of_loads
+  use pd_motion_loads, only: other_terms
   use pd_motion_newton, only: krylov_type, ritz_type, sums_type
   use pd_motion_pins, only: has_pins
   use pd_motion_static_coarsen, only: make_coarse
   use pd_motion_static_pins, only: add_drive, aim_pins, drive_pins, frame_pins, go_pins
-  use pd_force_term, only: term_view_type
-  use pd_motion_system, only: system_type, add_loads, view_of
-  use pd_motion_tangent, only: about_undeformed, forces_at, one_sided, tangent_product, tangent_type
+  use pd_motion_system, only: add_loads, ask_bonds, system_type, view_of
+  use pd_motion_tangent, only: forces_at
   implicit none (type, external)
   private
   public :: make_room, make_coarse_part, linearise, take_residual, first_direction
@@ -278,8 +279,9 @@ contains
     krylov%deformed = deformed
     if (size(krylov%of_pins) > 0) call frame_pins(system, krylov%mass, krylov%origin, krylov%frames)
     if (.not. deformed) return
-    if (.not. allocated(krylov%forces)) allocate (krylov%forces, mold=krylov%origin)
-    call forces_at(system, krylov%origin, krylov%forces, forces_of(system, deformed))
+    if (.not. allocated(krylov%tangent%forces)) &
+      & allocate (krylov%tangent%forces, mold=krylov%origin)
+    call forces_at(system, krylov%origin, krylov%tangent%forces, forces_of(system, deformed))
   end subroutine linearise
 
   !> What the forces take in whose tangent is the stiffness. Those of a deformed body have the
@@ -303,25 +305,23 @@ contains
     type(system_type), intent(inout), target :: system
       !! its state stays as it is; its workspace changes
     type(krylov_type), intent(inout), target :: krylov  !! with the direction; gets the product
-    type(tangent_type) :: tangent
     type(term_view_type) :: view
 
-    tangent%options = forces_of(system, krylov%deformed)
-    if (krylov%deformed) then
-      tangent%difference = one_sided
-      tangent%step = difference_size*system%family%rule%delta/krylov%largest
-      call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
-        & krylov%moved, krylov%forces)
-    else
-      ! directions are so small that they need no other factor
-      tangent%difference = about_undeformed
-      call tangent_product(system, tangent, krylov%origin, krylov%direction, krylov%product, &
-        & krylov%moved)
-    end if
-    if (system%terms%number() == number_of_loads(system%terms)) return
+    associate (tangent => krylov%tangent)
+      tangent%options = forces_of(system, krylov%deformed)
+      if (krylov%deformed) then
+        tangent%difference = one_sided
+        tangent%step = difference_size*system%family%rule%delta/krylov%largest
+      else
+        ! directions are so small that they need no other factor
+        tangent%difference = about_undeformed
+        tangent%step = 1.0_wp
+      end if
+    end associate
     call view_of(system, system%time, view, krylov%origin)
+    call ask_bonds(system, view, tangent=krylov%tangent)
     call system%terms%add_tangent(view, krylov%direction, krylov%product)
-    call share_halo(system%body, krylov%product)
+    if (other_terms(system%terms) > 0) call share_halo(system%body, krylov%product)
   end subroutine apply_stiffness
 
   !> Go `length` along the direction: displacements, the forces that follow linearly, the residual,

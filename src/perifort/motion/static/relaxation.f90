@@ -131,7 +131,7 @@ contains
     end if
     allocate (system%memory%newton)
     associate (memory => system%memory, krylov => system%memory%newton%krylov)
-      allocate (krylov%residual, krylov%direction, krylov%origin, krylov%forces, &
+      allocate (krylov%residual, krylov%direction, krylov%origin, krylov%tangent%forces, &
         & memory%newton%best, mold=system%state%u)
       allocate (krylov%of_pins(6, merge(size(system%motions), 0, has_pins(system))))
       if (relaxation%load_steps > 1) allocate (memory%trend, memory%start, mold=system%state%u)

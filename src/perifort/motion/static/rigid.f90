@@ -12,7 +12,7 @@ module pd_motion_static_rigid
   use pd_force_term, only: term_view_type
   use pd_motion_conditions, only: free_component
   use pd_motion_pins, only: held_but_for_pins
-  use pd_motion_loads, only: load_of, load_type, number_of_loads
+  use pd_motion_loads, only: load_of, load_type, number_of_loads, other_terms
   use pd_motion_system, only: system_type, add_loads, view_of
   implicit none (type, external)
   private
@@ -121,7 +121,7 @@ contains
     integer :: i, n, k, c, p
 
     allocate (resistance(6, 6, rigid%pieces%number), source=0.0_wp)
-    if (system%terms%number() == number_of_loads(system%terms)) return
+    if (other_terms(system%terms) == 0) return
     call view_of(system, system%time, view)
     allocate (rows(system%body%n_slots), source=0.0_wp)
     call system%terms%add_stiffness_bound(view, rows)

@@ -5,7 +5,7 @@ module pd_motion_static_start
   use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, largest_of_ranks
   use pd_base_text, only: to_text
   use pd_motion_conditions, only: impose
-  use pd_motion_loads, only: number_of_loads
+  use pd_motion_loads, only: other_terms
   use pd_motion_static_pieces, only: piece_text
   use pd_motion_static_rigid, only: rigid_type, fit_rigid_motion
   use pd_motion_system, only: system_type, add_loads
@@ -119,7 +119,7 @@ contains
 
     allocate (acted(rigid%pieces%number), source=.false.)
     ! the equilibrium of a piece depends on the terms of the force
-    if (system%terms%number() > number_of_loads(system%terms)) acted = .true.
+    if (other_terms(system%terms) > 0) acted = .true.
     allocate (loads(system%body%n_slots, system%body%dim), source=0.0_wp)
     call add_loads(system, t, 1.0_wp, .false., loads)
     do k = 1, system%body%n_slots

@@ -8,6 +8,7 @@ module pd_study_limits_limits
   use pd_base_clock, only: duration_text, wall_time
   use pd_base_error, only: error_type, fail, status_no_answer
   use pd_base_text, only: newline, to_text, with_unit
+  use pd_force_bound, only: stiffness_bound
   use pd_output_fields_check, only: check_names
   use pd_output_report_begin, only: fields_of, run_options_type
   use pd_set_up_prepare, only: prepare, set_up_type
@@ -16,7 +17,7 @@ module pd_study_limits_limits
     & stable_step_of
   use pd_motion_system, only: system_type, inverse_density
   use pd_motion_tangent, only: apply_tangent
-  use pd_motion_explicit_time_step, only: printed_stiffness, stiffness_bound
+  use pd_motion_explicit_time_step, only: printed_stiffness
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type
   use pd_study_limits_drift, only: study_drift
