@@ -8,10 +8,11 @@ module pd_force_list
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
   use pd_force_general, only: mark_slot
-  use pd_force_list_fast, only: all_tables, choose_loop, for_energy, for_force, for_theta, &
-    & no_tables, pass_loop, task_type, weights_alone
+  use pd_force_list_fast, only: choose_loop
   use pd_force_list_general, only: work_type, fill_tables, cluster_theta, cluster_force, &
     & cluster_energy, take_given, take_up
+  use pd_force_list_loop, only: all_tables, for_energy, for_force, for_theta, no_tables, &
+    & pass_loop, task_type, weights_alone
   use pd_force_list_points, only: new_task, plain_task, survey
   use pd_force_list_tables, only: make_tables
   use pd_force_model, only: early, force_options_type, model_type, options_of, p_of, t_of

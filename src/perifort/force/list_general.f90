@@ -7,7 +7,7 @@ module pd_force_list_general
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
   use pd_family_volume, only: volume_none, volume_exact
-  use pd_force_list_fast, only: least
+  use pd_force_list_loop, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
   use pd_force_model, only: bond_factors_of, force_options_type, model_type
   use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p

@@ -8,7 +8,7 @@ module pd_force_list_points
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
   use pd_family_volume, only: volume_none, volume_linear, volume_linear_extended, volume_exact
-  use pd_force_list_fast, only: task_type, no_correction, one_spacing, own_spacing, &
+  use pd_force_list_loop, only: task_type, no_correction, one_spacing, own_spacing, &
     & stored_fraction
   use pd_force_model, only: force_options_type, model_type, q_of
   use pd_force_workspace, only: list_workspace_type
