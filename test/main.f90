@@ -30,6 +30,7 @@ program main
   use test_law_softening, only: collect_law_softening
   use test_law_strength, only: collect_law_strength
   use test_law_plastic, only: collect_law_plastic
+  use test_law_plastic_large, only: collect_law_plastic_large
   use test_body_mesh_elements, only: collect_body_mesh_elements
   use test_body_mesh_inside, only: collect_body_mesh_inside
   use test_body_mesh_part, only: collect_body_mesh_part
@@ -170,6 +171,7 @@ program main
   call register('law_softening', collect_law_softening)
   call register('law_strength', collect_law_strength)
   call register('law_plastic', collect_law_plastic)
+  call register('law_plastic_large', collect_law_plastic_large)
   call register('body_mesh_elements', collect_body_mesh_elements)
   call register('body_mesh_inside', collect_body_mesh_inside)
   call register('body_mesh_part', collect_body_mesh_part)

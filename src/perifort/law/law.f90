@@ -57,6 +57,7 @@ module pd_law_law
     logical :: bond_based = .false.              !! it holds for one Poisson's ratio
     logical :: corrected = .true.                !! it takes surface factors, if there are any
     logical :: plastic = .false.                 !! what it dissipates is plastic energy
+    logical :: large_strains = .false.           !! it holds for bonds strained by any amount
     logical :: softens = .false.                 !! `bond_damage` is not 0 for some intact bonds
     integer :: bond_history = 0                  !! reals of history of a bond
     integer :: point_history = 0                 !! reals of history of a point

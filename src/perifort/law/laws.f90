@@ -5,6 +5,7 @@ module pd_law_laws
   use pd_law_law, only: bond_law_type, law_name_length, parameter_type
   use pd_law_lps, only: lps_law
   use pd_law_lps_plastic, only: lps_plastic_law
+  use pd_law_lps_plastic_large, only: lps_plastic_large_law
   use pd_law_softening, only: softening_law
   use pd_law_weighted, only: bond_based_law, state_based_law
   implicit none (type, external)
@@ -36,6 +37,7 @@ contains
     call table%add(bond_based_law())
     call table%add(lps_law())
     call table%add(lps_plastic_law())
+    call table%add(lps_plastic_large_law())
     call table%add(softening_law())
   end function all_laws
 

@@ -22,13 +22,16 @@
 !> A whole family has <v, v> = m, and its deviatoric force alpha omega d is t_d of Mitchell. The
 !> rest of x, along v, carries force where bonds are broken: there the law is still `lps` before it
 !> yields, and an isotropic expansion never yields.
+!>
+!> Extensions and dilatation are those of small strains. A law for large ones has others
+!> (`pd_law_lps_plastic_large`); `measure` is all by which it differs.
 module pd_law_lps_plastic
   use pd_base_kinds, only: wp
   use pd_law_law, only: law_bonds_type, parameter_type
   use pd_law_lps, only: lps_law, lps_law_type, weighted_volume
   implicit none (type, external)
   private
-  public :: lps_plastic_law_type, lps_plastic_law
+  public :: lps_plastic_law_type, lps_plastic_law, plastic_state_type
 
   integer, parameter :: plastic = 1   !! history of a bond: e_p [m]
   integer, parameter :: reached = 2   !! and e at the last commit [m]
@@ -36,20 +39,24 @@ module pd_law_lps_plastic
   integer, parameter :: volume_m = 2  !! constant of a point: m [m5]
 
   type, extends(lps_law_type) :: lps_plastic_law_type
+    integer :: volume_constant = volume_m  !! which constant of a point is m
   contains
     procedure :: begin
     procedure :: forces
     procedure :: energy
     procedure :: commit
     procedure :: refusal
+    procedure :: measure
   end type lps_plastic_law_type
 
   !> The state of a point at its stretches. Arrays hold its bonds; all are 0 where one is broken.
-  type :: state_type
+  type :: plastic_state_type
     real(wp), allocatable :: weight(:)    !! omega vc V_j [m3]
     real(wp), allocatable :: omega(:)     !! omega [-]
     real(wp), allocatable :: along(:)     !! v [m]
     real(wp), allocatable :: extension(:) !! e [m]
+    real(wp), allocatable :: slope(:)     !! de/d|y| [-]
+    real(wp), allocatable :: widening(:)  !! dtheta/d|y|, over (3/m) omega v vc V_j [-]
     real(wp), allocatable :: deviator(:)  !! d before flow [m]
     real(wp) :: m = 0.0_wp                !! of the whole family [m5]
     real(wp) :: intact = 0.0_wp           !! <v, v> [m5]
@@ -58,7 +65,7 @@ module pd_law_lps_plastic
     real(wp) :: left = 1.0_wp             !! d after flow, over d before it [-]
     real(wp) :: equivalent = 0.0_wp       !! sigma_eq before flow [Pa]
     real(wp) :: flow = 0.0_wp             !! d ebar [-]
-  end type state_type
+  end type plastic_state_type
 
 contains
 
@@ -91,17 +98,18 @@ contains
     bonds%constants(volume_m) = weighted_volume(self, bonds)
   end subroutine begin
 
-  !> 3 kappa theta omega v/m + alpha omega (d + part (1 - <v, v>/m) v), d after flow.
+  !> 3 kappa theta omega v/m + alpha omega (d + part (1 - <v, v>/m) v), d after flow, each as its
+  !> measure goes with |y|.
   pure subroutine forces(self, bonds, pull)
     class(lps_plastic_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(in) :: bonds        !! of the point, with its history
     real(wp), intent(out) :: pull(:)                 !! (n) [N/m6]
-    type(state_type) :: now
+    type(plastic_state_type) :: now
 
     call find_state(self, bonds, now)
     associate (n => bonds%n)
-      pull(:n) = now%omega*((3*self%material%bulk_modulus*now%theta/now%m)*now%along &
-        & + alpha(self, now)*(now%left*now%deviator + now%part*free(now)*now%along))
+      pull(:n) = now%omega*((3*self%material%bulk_modulus*now%theta/now%m)*now%widening*now%along &
+        & + alpha(self, now)*(now%left*now%deviator + now%part*free(now)*now%along)*now%slope)
     end associate
   end subroutine forces
 
@@ -109,7 +117,7 @@ contains
   pure real(wp) function energy(self, bonds)
     class(lps_plastic_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(in) :: bonds        !! of the point, with its history
-    type(state_type) :: now
+    type(plastic_state_type) :: now
 
     call find_state(self, bonds, now)
     energy = self%material%bulk_modulus*now%theta**2/2 + alpha(self, now)/2*(now%left**2 &
@@ -124,7 +132,7 @@ contains
     class(lps_plastic_law_type), intent(in) :: self  !! the law
     type(law_bonds_type), intent(inout) :: bonds     !! of the point; its history is set
     real(wp), intent(out) :: dissipated              !! since the history before [J/m3]
-    type(state_type) :: now
+    type(plastic_state_type) :: now
     real(wp) :: flow(bonds%n)
 
     call find_state(self, bonds, now)
@@ -152,22 +160,24 @@ contains
   pure subroutine find_state(self, bonds, now)
     class(lps_plastic_law_type), intent(in) :: self
     type(law_bonds_type), intent(in) :: bonds
-    type(state_type), intent(out) :: now
+    type(plastic_state_type), intent(out) :: now
     real(wp) :: limit
     integer :: i
 
     now%m = bonds%constants(volume_m)
     allocate (now%weight(bonds%n), now%omega(bonds%n), now%along(bonds%n), &
-      & now%extension(bonds%n), now%deviator(bonds%n), source=0.0_wp)
+      & now%extension(bonds%n), now%deviator(bonds%n), now%slope(bonds%n), &
+      & now%widening(bonds%n), source=0.0_wp)
     do i = 1, bonds%n
       if (bonds%volume(i) <= 0.0_wp) cycle
       now%omega(i) = self%omega(bonds%length(i)/self%delta)
       now%weight(i) = now%omega(i)*bonds%volume(i)
       now%along(i) = bonds%projection(i)*bonds%length(i)
-      now%extension(i) = bonds%stretch(i)*bonds%length(i)
-      now%deviator(i) = now%extension(i) - bonds%history(plastic, i)
     end do
-    now%theta = 3/now%m*sum(now%weight*now%along*now%extension)
+    call self%measure(bonds, now)
+    do i = 1, bonds%n
+      if (bonds%volume(i) > 0.0_wp) now%deviator(i) = now%extension(i) - bonds%history(plastic, i)
+    end do
     now%intact = sum(now%weight*now%along**2)
     if (now%intact > 0.0_wp) now%part = sum(now%weight*now%along*now%deviator)/now%intact
     now%deviator = now%deviator - now%part*now%along
@@ -180,16 +190,34 @@ contains
     end associate
   end subroutine find_state
 
+  !> Extensions and dilatation from the stretches, and how they go with the bonds' lengths: of small
+  !> strains e = s |xi| and theta = (3/m) <v, e>.
+  pure subroutine measure(self, bonds, now)
+    class(lps_plastic_law_type), intent(in) :: self  !! the law
+    type(law_bonds_type), intent(in) :: bonds        !! of the point
+    type(plastic_state_type), intent(inout) :: now   !! with m, weights and v
+    integer :: i
+
+    associate (unused => self)
+    end associate
+    do i = 1, bonds%n
+      if (bonds%volume(i) > 0.0_wp) now%extension(i) = bonds%stretch(i)*bonds%length(i)
+    end do
+    now%slope = 1.0_wp
+    now%widening = 1.0_wp
+    now%theta = 3/now%m*sum(now%weight*now%along*now%extension)
+  end subroutine measure
+
   !> The stiffness of the deviatoric force [N/m7].
   pure real(wp) function alpha(self, now)
     class(lps_plastic_law_type), intent(in) :: self
-    type(state_type), intent(in) :: now
+    type(plastic_state_type), intent(in) :: now
     alpha = 15*self%material%shear_modulus/now%m
   end function alpha
 
   !> 1 - <v, v>/m: 0 but for rounding in a whole family.
   pure real(wp) function free(now)
-    type(state_type), intent(in) :: now
+    type(plastic_state_type), intent(in) :: now
     free = 1 - now%intact/now%m
   end function free
 

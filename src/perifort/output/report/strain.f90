@@ -32,6 +32,7 @@ contains
     stretch = 0.0_wp
     do i = 1, system%body%n_points
       k = system%body%slot(i)
+      if (holds_then(system, k)) cycle
       if (energy(k) < suspicious*large_strain**2/2 &
         & *system%model%materials(system%body%material(k))%youngs_modulus) cycle
       this = greatest_stretch(system, k)
@@ -42,5 +43,15 @@ contains
       point = i
     end do
   end subroutine find_large_strains
+
+  !> Whether the bond law of a slot is one for large strains.
+  pure logical function holds_then(system, k)
+    type(system_type), intent(in) :: system
+    integer, intent(in) :: k
+
+    holds_then = .false.
+    if (allocated(system%model%laws)) &
+      & holds_then = system%model%laws(system%body%material(k))%law%large_strains
+  end function holds_then
 
 end module pd_output_report_strain

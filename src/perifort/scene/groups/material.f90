@@ -53,7 +53,7 @@ contains
       & "; bond_based and softening hold for one Poisson's ratio only", word=.true.)
     call keys%key('influence', group%influence, 'influence function omega(|xi|): delta/|xi|, '// &
       & '1, 1 - |xi|/delta or exp(-(|xi|/delta)^2)', allowed=influence_names, &
-      & default="lps: 'constant'; lps_plastic: 'linear'; else 'inverse'")
+      & default="lps: 'constant'; lps_plastic, lps_plastic_large: 'linear'; else 'inverse'")
     call keys%key('youngs_modulus', group%youngs_modulus, 'Pa', "Young's modulus E", &
       & required=.true., above=0.0_wp)
     call keys%key('poissons_ratio', group%poissons_ratio, '-', "Poisson's ratio nu, below 1/2 "// &
