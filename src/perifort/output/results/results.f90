@@ -13,10 +13,8 @@
 !> `close` none the less: it leaves the files as they were at the last complete output. Where there
 !> are none, the folder is removed again if `create` made it.
 !>
-!> Several ranks share the rows of the points (`pd_output_results_rows`), and all make the same
-!> calls, each with its own rows. The first one has the files. Rows of the HDF5 file are written by
-!> their ranks if the HDF5 library is a parallel one; else, and for `.vtu` files, the first rank
-!> gets them in turns, as many at a time as it has itself.
+!> Several ranks share the rows of the points (`pd_output_results_shared`), and all make the same
+!> calls, each with its own rows. The first one has the files.
 !>
 !> Without a folder nothing is written. The history is in memory in any case; with `keep_outputs` so
 !> are the fields of the last output, and `answer` gives both.
@@ -35,9 +33,9 @@ module pd_output_results_results
   use pd_output_results_history, only: csv_type, history_type
   use pd_output_results_lines, only: lines_type
   use pd_output_results_rows, only: all_rows, rows_type
+  use pd_output_results_shared, only: shared_type
   use pd_output_results_sink, only: sink_type
   use pd_output_results_profiles, only: add_profile, head_of_profile
-  use pd_output_results_together, only: can_write_together
   use pd_output_results_types, only: column_type, field_type, kept_type, label_length, line_type
   use pd_output_results_vtkhdf, only: byte_points, real_points, short_points, vtkhdf_file
   use pd_output_results_surfaces, only: remove_surfaces, surface_series, triangles_type
@@ -47,13 +45,6 @@ module pd_output_results_results
   implicit none (type, external)
   private
   public :: results_type, column_type, field_type, label_length
-
-  !> An array over the points that waits to be written by all ranks.
-  type :: waiting_type
-    character(:), allocatable :: name
-    integer :: kind_of_points = 0
-    real(wp), allocatable :: values(:)  !! (rows of this rank)
-  end type waiting_type
 
   !> The results of one run.
   type :: results_type
@@ -74,9 +65,7 @@ module pd_output_results_results
     type(line_type), allocatable :: lines(:)
     type(lines_type), allocatable :: profiles(:)        !! their tables
     type(values_type), allocatable :: waiting(:)        !! their values of the output under way
-    type(rows_type) :: rows              !! of the points, that this rank writes
-    real(wp), allocatable :: here(:, :)  !! positions of their points, while they are needed
-    type(waiting_type), allocatable :: of_points(:)     !! arrays that all ranks have to write
+    type(shared_type) :: shared          !! rows of the points, and how ranks write them
     integer :: planned_outputs = 0
     integer :: outputs = 0               !! complete ones
     character(:), allocatable :: warnings       !! a line for each
@@ -85,9 +74,6 @@ module pd_output_results_results
     logical :: in_output = .false.
     logical :: use_vtkhdf = .false., use_xdmf = .false., use_vtu = .false.
     logical :: use_surfaces = .false.
-    logical :: together = .false.        !! all ranks write rows of the HDF5 file
-    logical :: hdf5_in_turns = .false.   !! the first rank writes those of all into that file, ..
-    logical :: vtu_in_turns = .false.    !! and into .vtu files
     logical :: open = .false.
     logical :: started = .false.         !! the files have their names
     logical :: resumed = .false.         !! they are those of a run that continues
@@ -168,10 +154,10 @@ contains
 
     call check_description(positions, fields, columns, precision, format, error)
     if (allocated(error)) return
-    self%rows = all_rows(size(positions, 1))
-    if (present(rows)) self%rows = rows
+    self%shared%rows = all_rows(size(positions, 1))
+    if (present(rows)) self%shared%rows = rows
     self%resumed = .false.
-    self%in_files = directory /= '' .and. self%rows%on_first
+    self%in_files = directory /= '' .and. self%shared%rows%on_first
     if (self%in_files) then
       if (present(kept)) self%resumed = existing_results(directory, stem) /= ''
       if (.not. self%resumed) call refuse_existing(directory, stem, overwrite, error)
@@ -192,10 +178,12 @@ contains
     single = lower_case(precision) == 'single'
     self%use_vtkhdf = self%in_files .and. lower_case(format) /= 'vtu'
     self%use_vtu = self%in_files .and. lower_case(format) /= 'vtkhdf'
-    allocate (self%of_points(0))
-    if (directory /= '' .and. self%rows%divided()) call share_files(self, directory, format, &
-      & fields, single)
-    if (self%use_vtu .or. self%rows%divided()) self%here = positions
+    self%shared%has_hdf5 = self%use_vtkhdf
+    self%shared%has_vtu = self%use_vtu
+    if (directory /= '' .and. self%shared%divided()) call self%shared%share( &
+      & in_directory(directory, self%stem//'.vtkhdf'), format, fields, single, self%resumed, &
+      & self%vtkhdf)
+    if (self%use_vtu .or. self%shared%divided()) self%shared%here = positions
     ! room for one output at least; whether there are too many shows with the file
     self%use_xdmf = self%use_vtkhdf .and. has_list(stem, format, fields, 1)
     if (present(triangles)) self%use_surfaces = self%in_files .and. size(triangles%body) > 0
@@ -206,14 +194,14 @@ contains
       if (size(kept%rows, 1) == size(columns)) &
         & call self%history%restore(kept%rows, written=self%resumed)
     end if
-    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, int(self%rows%all), fields, &
+    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, int(self%shared%rows%all), fields, &
       & single)
     if (self%use_surfaces) call self%surfaces%create(self%directory, self%stem, triangles)
     if (self%use_xdmf) call self%xdmf%create(in_directory(directory, self%stem//'.xdmf'), &
-      & self%stem//'.vtkhdf', self%rows%all, fields, planned_outputs, single, cells)
+      & self%stem//'.vtkhdf', self%shared%rows%all, fields, planned_outputs, single, cells)
     if (self%resumed .and. self%in_files) then
       if (self%use_vtkhdf) call self%vtkhdf%resume(in_directory(directory, self%stem//'.vtkhdf'), &
-        & self%rows%all, fields, planned_outputs, columns, planned_rows, single, &
+        & self%shared%rows%all, fields, planned_outputs, columns, planned_rows, single, &
         & scene_text, kept, error, self%lines, cells)
       if (self%use_vtkhdf .and. .not. allocated(error)) &
         & call cut_back(self, kept%times, scene_text, command, version, error)
@@ -224,8 +212,8 @@ contains
       self%outputs = size(kept%times)
       self%started = .true.
     else if (self%use_vtkhdf) then
-      call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), self%rows%all, &
-        & positions(:merge(0, size(positions, 1), self%rows%divided()), :), fields, &
+      call self%vtkhdf%create(in_directory(directory, self%stem//'.vtkhdf'), self%shared%rows%all, &
+        & positions(:merge(0, size(positions, 1), self%shared%divided()), :), fields, &
         & planned_outputs, columns, planned_rows, single, scene_text, command, version, error, &
         & self%lines, cells)
       if (allocated(error)) then
@@ -236,27 +224,6 @@ contains
     end if
     self%open = .true.
   end subroutine create
-
-  !> How ranks write the files of the first one; all learn whether these go on from an earlier run.
-  subroutine share_files(self, directory, format, fields, single)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: directory, format
-    type(field_type), intent(in) :: fields(:)
-    logical, intent(in) :: single
-    real(wp) :: goes_on(1)
-    logical :: hdf5
-
-    hdf5 = lower_case(format) /= 'vtu'
-    self%together = hdf5 .and. can_write_together()
-    self%hdf5_in_turns = hdf5 .and. .not. self%together
-    self%vtu_in_turns = lower_case(format) /= 'vtkhdf'
-    goes_on = merge(1.0_wp, 0.0_wp, self%resumed)
-    call self%rows%ranks%take_largest(goes_on)
-    if (self%in_files) return
-    if (hdf5) call self%vtkhdf%attend(in_directory(directory, self%stem//'.vtkhdf'), &
-      & self%rows%all, fields, single)
-    self%resumed = goes_on(1) > 0.0_wp
-  end subroutine share_files
 
   !> Cut the HDF5 file to the outputs at `times`, and the list of its outputs before it, so that the
   !> list never has more of them than the file.
@@ -326,8 +293,8 @@ contains
     character(*), intent(in) :: name               !! of the array, below `/points`
     real(wp), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
-    if (self%rows%divided()) then
-      call put_rows_of_points(self, name, real_points, values, error)
+    if (self%shared%divided()) then
+      call self%shared%put_points(self%vtkhdf, name, real_points, values, error)
     else if (self%use_vtkhdf) then
       call self%vtkhdf%put_points(name, values, error)
     end if
@@ -341,8 +308,8 @@ contains
     character(*), intent(in) :: name                  !! of the array, below `/points`
     integer(i4), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
-    if (self%rows%divided()) then
-      call put_rows_of_points(self, name, short_points, real(values, wp), error)
+    if (self%shared%divided()) then
+      call self%shared%put_points(self%vtkhdf, name, short_points, real(values, wp), error)
     else if (self%use_vtkhdf) then
       call self%vtkhdf%put_points(name, values, error)
     end if
@@ -356,84 +323,22 @@ contains
     character(*), intent(in) :: name                  !! of the array, below `/points`
     integer(i1), contiguous, intent(in) :: values(:)  !! (n_points) in point order
     type(error_type), allocatable, intent(out) :: error
-    if (self%rows%divided()) then
-      call put_rows_of_points(self, name, byte_points, real(values, wp), error)
+    if (self%shared%divided()) then
+      call self%shared%put_points(self%vtkhdf, name, byte_points, real(values, wp), error)
     else if (self%use_vtkhdf) then
       call self%vtkhdf%put_points(name, values, error)
     end if
     if (allocated(error)) self%failed = .true.
   end subroutine put_points_i1
 
-  !> An array over the points of several ranks: the first one makes it. All write their rows when
-  !> the file is laid out, or the first one gets them now.
-  subroutine put_rows_of_points(self, name, kind_of_points, values, error)
-    class(results_type), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: kind_of_points
-    real(wp), intent(in) :: values(:)
-    type(error_type), allocatable, intent(out) :: error
-    type(waiting_type) :: waiting
-    real(wp), allocatable :: got(:, :)
-    integer(i8) :: first
-    integer :: turn
-
-    if (size(values) /= self%rows%n) then
-      call fail(error, 'points/'//trim(name)//' needs one value for each point')
-      return
-    end if
-    if (self%use_vtkhdf) call self%vtkhdf%make_points(name, kind_of_points, error)
-    if (allocated(error)) return
-    if (self%together) then
-      waiting%name = trim(name)
-      waiting%kind_of_points = kind_of_points
-      waiting%values = values
-      self%of_points = [self%of_points, waiting]
-    else if (self%hdf5_in_turns) then
-      do turn = 1, self%rows%turns()
-        call self%rows%take_turn(turn, reshape(values, [size(values), 1]), first, got)
-        if (self%use_vtkhdf) call self%vtkhdf%put_rows_of_points(name, kind_of_points, first, &
-          & got(:, 1), error)
-        if (allocated(error)) return
-      end do
-    end if
-  end subroutine put_rows_of_points
-
   !> On several ranks, after the last `put_points` and before the first output: write what the
   !> points are, unless the files go on from an earlier run.
   subroutine settle(self, error)
     class(results_type), intent(inout) :: self  !! created
     type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: got(:, :)
-    integer(i8) :: first
-    integer :: i, turn
 
-    if (self%together .and. .not. self%resumed) then
-      if (self%use_vtkhdf) call self%vtkhdf%seal(error)
-      if (allocated(error)) return
-      call self%rows%wait()
-      call self%vtkhdf%open_shared(.false., error)
-      if (.not. allocated(error)) call self%vtkhdf%put_geometry_of_rows(self%rows%before, &
-        & self%here, self%rows%most, error)
-      do i = 1, size(self%of_points)
-        if (allocated(error)) exit
-        associate (waiting => self%of_points(i))
-          call self%vtkhdf%put_rows_of_points(waiting%name, waiting%kind_of_points, &
-            & self%rows%before, waiting%values, error)
-        end associate
-      end do
-      if (.not. allocated(error)) call self%vtkhdf%close_shared(error)
-      deallocate (self%of_points)
-    else if (self%hdf5_in_turns .and. .not. self%resumed) then
-      do turn = 1, self%rows%turns()
-        call self%rows%take_turn(turn, self%here, first, got)
-        if (self%use_vtkhdf) call self%vtkhdf%put_geometry_of_rows(first, got, &
-          & size(got, 1, kind=i8), error)
-        if (allocated(error)) exit
-      end do
-    end if
+    call self%shared%settle(self%vtkhdf, self%resumed, error)
     if (allocated(error)) self%failed = .true.
-    if (.not. (self%use_vtu .or. self%vtu_in_turns) .and. allocated(self%here)) &
-      & deallocate (self%here)
   end subroutine settle
 
   !> Begin the output of the state at `time` [s]. An error if the results are not open, if another
@@ -453,58 +358,11 @@ contains
     if (.not. allocated(error)) call check_views(self)
     if (self%use_xdmf .and. .not. allocated(error)) call self%xdmf%begin_output(error)
     if (self%use_vtu .and. .not. allocated(error)) call self%vtu%begin_output(error)
-    if (.not. allocated(error)) call begin_rows(self, error)
+    if (.not. allocated(error)) call self%shared%begin_output(self%vtkhdf, self%vtu, &
+      & self%started .or. self%resumed, error)
     if (allocated(error)) call explain_output(self, error)
     self%in_output = .not. allocated(error)
   end subroutine begin_output
-
-  !> Begin the rows of an output: all ranks open the HDF5 file, whose records stay as they are from
-  !> now on, and `.vtu` files get the positions.
-  subroutine begin_rows(self, error)
-    class(results_type), intent(inout) :: self
-    type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: got(:, :)
-    integer(i8) :: first
-    integer :: turn
-
-    if (self%together) then
-      call self%rows%wait()
-      call self%vtkhdf%open_shared(self%started .or. self%resumed, error)
-      if (allocated(error)) return
-    end if
-    if (self%vtu_in_turns) then
-      do turn = 1, self%rows%turns()
-        call self%rows%take_turn(turn, self%here, first, got)
-        if (self%use_vtu) call self%vtu%put_positions(first, got, error)
-        if (allocated(error)) return
-      end do
-    else if (self%use_vtu) then
-      call self%vtu%put_positions(0_i8, self%here, error)
-    end if
-  end subroutine begin_rows
-
-  !> Write the rows of a field on several ranks.
-  subroutine put_rows(self, field, values, error)
-    class(results_type), intent(inout) :: self
-    integer, intent(in) :: field
-    real(wp), intent(in) :: values(:, :)  !! (rows of this rank, components)
-    type(error_type), allocatable, intent(out) :: error
-    real(wp), allocatable :: got(:, :)
-    integer(i8) :: first
-    integer :: turn
-
-    if (self%together) call self%vtkhdf%put_rows(field, self%outputs, self%rows%before, values, &
-      & self%rows%most, error)
-    if (allocated(error) .or. .not. (self%hdf5_in_turns .or. self%vtu_in_turns)) return
-    do turn = 1, self%rows%turns()
-      call self%rows%take_turn(turn, values, first, got)
-      if (self%use_vtkhdf .and. self%hdf5_in_turns) call self%vtkhdf%put_rows(field, self%outputs, &
-        & first, got, size(got, 1, kind=i8), error)
-      if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, first, got, &
-        & error)
-      if (allocated(error)) return
-    end do
-  end subroutine put_rows
 
   !> A field of one component, by its number. An error outside an output, for a field given twice or
   !> of another shape, or if it cannot be written.
@@ -516,8 +374,9 @@ contains
 
     call check_field(self, field, size(values), 1, error)
     if (allocated(error)) return
-    if (self%rows%divided()) then
-      call put_rows(self, field, reshape(values, [size(values), 1]), error)
+    if (self%shared%divided()) then
+      call self%shared%put_field(self%vtkhdf, self%vtu, field, self%outputs, &
+        & reshape(values, [size(values), 1]), error)
     else
       if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
       if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, 0_i8, &
@@ -539,8 +398,8 @@ contains
 
     call check_field(self, field, size(values, 1), size(values, 2), error)
     if (allocated(error)) return
-    if (self%rows%divided()) then
-      call put_rows(self, field, values, error)
+    if (self%shared%divided()) then
+      call self%shared%put_field(self%vtkhdf, self%vtu, field, self%outputs, values, error)
     else
       if (self%use_vtkhdf) call self%vtkhdf%put_field(field, values, error)
       if (self%use_vtu .and. .not. allocated(error)) call self%vtu%put_field(field, 0_i8, values, &
@@ -657,8 +516,8 @@ contains
       call fail(error, 'these results have no field '//to_text(field))
     else if (self%given(field)) then
       call fail(error, 'field '//trim(self%fields(field)%name)//' is given twice in one output')
-    else if (points /= self%rows%n .or. components /= self%fields(field)%components) then
-      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%rows%n) &
+    else if (points /= self%shared%rows%n .or. components /= self%fields(field)%components) then
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%shared%rows%n) &
         & //' x '//to_text(self%fields(field)%components)//', not '//to_text(points)//' x ' &
         & //to_text(components))
     end if
@@ -692,13 +551,10 @@ contains
       return
     end if
     ! the output counts when all ranks have written their rows
-    if (self%together) then
-      call self%vtkhdf%close_shared(error)
-      if (allocated(error)) then
-        call explain_output(self, error)
-        return
-      end if
-      call self%rows%wait()
+    call self%shared%end_output(self%vtkhdf, error)
+    if (allocated(error)) then
+      call explain_output(self, error)
+      return
     end if
     ! rows first: a file that counts this output holds the history up to it
     call self%history%take(table)
@@ -893,7 +749,7 @@ contains
     integer(i8) :: bytes
 
     bytes = 0
-    if (self%use_vtkhdf .or. self%together) bytes = self%vtkhdf%output_bytes()
+    if (self%use_vtkhdf .or. self%shared%together) bytes = self%vtkhdf%output_bytes()
     if (self%use_vtu) bytes = bytes + self%vtu%output_bytes()
     if (self%use_surfaces) bytes = bytes + self%surfaces%output_bytes()
     call explain_need(self, 'output '//to_text(self%outputs + 1)//' at '// &
@@ -922,7 +778,7 @@ contains
 
     if (.not. (self%open .and. self%started)) return
     ! what a rank has written may lie in the memory of its machine
-    if (self%together .and. .not. self%in_files) then
+    if (self%shared%together .and. .not. self%in_files) then
       call sync_path(in_directory(self%directory, self%stem//'.vtkhdf'), error)
       return
     end if
@@ -962,10 +818,7 @@ contains
     class(results_type), intent(in) :: self  !! the results
     character(:), allocatable :: text
 
-    text = ''
-    if (self%together) text = 'all ranks'
-    if (self%hdf5_in_turns .or. (self%vtu_in_turns .and. .not. self%together)) &
-      & text = 'the first rank'
+    text = self%shared%written_by()
   end function written_by
 
   !> From now on keep the fields of each output in memory until the next one is complete.
