@@ -28,8 +28,11 @@ module pd_law_lps_plastic_large
   contains
     procedure :: measure
     procedure :: dilatation
+    procedure :: stiffness
   end type lps_plastic_large_law_type
 
+  !> Length over the undeformed one down to which the bound of the stiffness holds.
+  real(wp), parameter :: pressed = 0.8_wp
   !> Shorter bonds have the forces of this length over the undeformed one, which are finite.
   real(wp), parameter :: shortest = 0.02_wp
 
@@ -84,6 +87,19 @@ contains
     change = change/bonds%constants(self%volume_constant)
     theta = -change/(1 + change)
   end function dilatation
+
+  !> The bound of `lps`, raised for pressed bonds: of a body that is flattened at its volume the
+  !> stiffness of the shortest bonds grows as lambda^-6.3, which the part lambda^-4 of the change of
+  !> volume makes. No bound holds for bonds of any length: where many are shorter than `pressed`,
+  !> steps are to be shorter, too.
+  pure subroutine stiffness(self, bonds, bound)
+    class(lps_plastic_large_law_type), intent(in) :: self  !! the law
+    type(law_bonds_type), intent(in) :: bonds              !! of the point, whole
+    real(wp), intent(out) :: bound(:)                      !! (n) [N/m7]
+
+    call self%lps_plastic_law_type%stiffness(bonds, bound)
+    bound(:bonds%n) = bound(:bonds%n)*pressed**(-6.5_wp)
+  end subroutine stiffness
 
   !> lambda^-3 - 1, with all digits near 1.
   pure real(wp) function cubic(lambda)

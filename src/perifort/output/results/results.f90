@@ -194,8 +194,8 @@ contains
       if (size(kept%rows, 1) == size(columns)) &
         & call self%history%restore(kept%rows, written=self%resumed)
     end if
-    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, int(self%shared%rows%all), fields, &
-      & single)
+    if (self%use_vtu) call self%vtu%create(self%directory, self%stem, int(self%shared%rows%all), &
+      & fields, single)
     if (self%use_surfaces) call self%surfaces%create(self%directory, self%stem, triangles)
     if (self%use_xdmf) call self%xdmf%create(in_directory(directory, self%stem//'.xdmf'), &
       & self%stem//'.vtkhdf', self%shared%rows%all, fields, planned_outputs, single, cells)
@@ -517,9 +517,9 @@ contains
     else if (self%given(field)) then
       call fail(error, 'field '//trim(self%fields(field)%name)//' is given twice in one output')
     else if (points /= self%shared%rows%n .or. components /= self%fields(field)%components) then
-      call fail(error, 'field '//trim(self%fields(field)%name)//' is '//to_text(self%shared%rows%n) &
-        & //' x '//to_text(self%fields(field)%components)//', not '//to_text(points)//' x ' &
-        & //to_text(components))
+      call fail(error, 'field '//trim(self%fields(field)%name)//' is '// &
+        & to_text(self%shared%rows%n)//' x '//to_text(self%fields(field)%components)//', not '// &
+        & to_text(points)//' x '//to_text(components))
     end if
   end subroutine check_field
 
