@@ -1,6 +1,6 @@
 !> The terms of a system (`pd_force_term`) in their order, and the account of their work.
 module pd_force_terms
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, of_slots, same
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_order, only: place_in
@@ -402,8 +402,10 @@ contains
         if (item%term%acts_on_few) then
           call keep_few(archive, item, 'of term '//to_text(i))
         else
+          call archive%over(of_slots)
           call archive%keep('last place of term '//to_text(i), item%last_u)
           call archive%keep('last force of term '//to_text(i), item%last_force)
+          call archive%over(same)
         end if
         call archive%keep('last energy of term '//to_text(i), item%last_energy)
         call archive%keep('loss of term '//to_text(i), item%lost)

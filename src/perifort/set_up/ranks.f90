@@ -48,27 +48,11 @@ contains
       & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
     do i = 1, size(scene%boundaries)
       if (scene%boundaries(i)%motion == 'pin') call refuse('boundary', i, 'motion', 'a pin')
-      if (scene%boundaries(i)%absorbing) &
-        & call refuse('boundary', i, 'absorbing', 'an absorbing boundary')
-    end do
-    do i = 1, size(scene%loads)
-      if (any(is_set(scene%loads(i)%stiffness))) call refuse('load', i, 'stiffness_x', 'springs')
-    end do
-    do i = 1, size(scene%initial)
-      if (scene%initial(i)%file /= '') call refuse('initial', i, 'file', 'a file of initial values')
-      if (is_set(scene%initial(i)%temperature_change) .or. &
-        & scene%initial(i)%temperature_text /= '') call refuse('initial', i, &
-        & 'temperature_change', 'a temperature change')
     end do
     if (size(scene%rigids) > 0) call refuse('rigid', 1, '', '&rigid')
     if (size(scene%contacts) > 0) call refuse('contact', 1, '', '&contact')
     if (size(scene%tips) > 0) call refuse('tip', 1, '', '&tip')
-    if (size(scene%sections) > 0) call refuse('section', 1, '', '&section')
-    if (size(scene%lines) > 0) call refuse('line', 1, '', '&line')
     if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
-    do i = 1, size(scene%probes)
-      if (scene%probes(i)%interpolate) call refuse('probe', i, 'interpolate', 'interpolation')
-    end do
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
     if (scene%output%fragments) call refuse('output', 1, 'fragments', 'fragments')
     if (allocated(scene%output%fields)) then
