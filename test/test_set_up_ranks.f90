@@ -10,7 +10,7 @@ module test_set_up_ranks
   private
   public :: collect_set_up_ranks
 
-  integer, parameter :: kinds = 14   !! of scenes that are refused
+  integer, parameter :: kinds = 13   !! of scenes that are refused
 
 contains
 
@@ -69,28 +69,25 @@ contains
       name = 'a pin'
       scene%boundaries(1)%motion = 'pin'
     case (7)
-      name = '&rigid'
-      deallocate (scene%rigids)
-      allocate (scene%rigids(1))
-    case (8)
-      name = '&contact'
+      name = 'contact of points with points'
       deallocate (scene%contacts)
       allocate (scene%contacts(1))
-    case (9)
+      scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) :: 'all']
+    case (8)
       name = '&tip'
       deallocate (scene%tips)
       allocate (scene%tips(1))
-    case (10)
+    case (9)
       name = '&j_integral'
       deallocate (scene%j_integrals)
       allocate (scene%j_integrals(1))
-    case (11)
+    case (10)
       name = 'fragments'
       scene%output%fragments = .true.
-    case (12)
+    case (11)
       name = "the field 'fragment'"
       scene%output%fields = [character(len(scene%output%fields)) :: 'damage', 'fragment']
-    case (13)
+    case (12)
       name = '&refine'
       allocate (scene%refines(1))
     case default
@@ -121,6 +118,11 @@ contains
     scene%probes(1)%interpolate = .true.
     deallocate (scene%sections, scene%lines)
     allocate (scene%sections(1), scene%lines(1))
+    deallocate (scene%rigids, scene%contacts)
+    allocate (scene%rigids(1), scene%contacts(1))
+    scene%bodies(1)%name = 'block'
+    scene%rigids(1)%name = 'ball'
+    scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) :: 'block', 'ball']
     call check_ranks(scene, fault)
     call expect_true(error, .not. allocated(fault), 'an explicit run is refused')
     scene%time%method = 'relaxation'

@@ -78,6 +78,43 @@ MEASURES = """
 &output every = 40, history_every = 5, fields = 'displacement', 'damage', precision = 'double' /
 """
 
+# A spinning ball that hits a corner of a plate, on one rank alone, a punch of facets that is pressed
+# in, and a floor.
+BALL = """
+&scene dimension = 3, gravity = 0.0, 0.0, -9.81 /
+&body name = 'plate', lower = 0.0, 0.0, 0.0, upper = 0.06, 0.04, 0.01, points = 24, 16, 4 /
+&material youngs_modulus = 2.0e10, poissons_ratio = 0.25, density = 2200.0, critical_stretch = 2.0e-3 /
+&rigid name = 'ball', shape = 'sphere', centre = 0.012, 0.01, 0.01505, radius = 5.0e-3, density = 7800.0,
+  velocity_x = 5.0, velocity_z = -60.0, spin_y = 900.0 /
+&rigid name = 'floor', shape = 'half_space', centre = 0.0, 0.0, -0.00001, normal = 0.0, 0.0, 1.0 /
+&rigid name = 'punch', shape = 'surface', surface = 'punch.stl', scale = 1.0e-3, displacement_x = 0.0,
+  displacement_y = 0.0, displacement_z = '-20*t', rotation = 'held' /
+&contact between = 'plate', 'ball', friction = 0.3, restitution = 0.7 /
+&contact between = 'plate', 'floor', friction = 0.1 /
+&contact between = 'plate', 'punch', stiffness = 3.0, damping = 0.2 /
+&time TIME /
+&output every = 50, history_every = 5, fields = 'displacement', 'velocity', 'damage', precision = 'double' /
+"""
+
+# Two bodies of points that never meet, between cylinders and a box that turns freely, in the plane.
+ROLLS = """
+&scene dimension = 2, thickness = 0.01 /
+&body name = 'one', lower = 0.0, 0.0, upper = 0.3, 0.1, points = 48, 16 /
+&body name = 'two', lower = 0.35, 0.0, upper = 0.5, 0.1, points = 24, 16 /
+&material model = 'state_based', youngs_modulus = 2.0e9, poissons_ratio = 0.3, density = 1200.0 /
+&horizon ratio = 3.015 /
+&rigid name = 'left', shape = 'sphere', centre = 0.05, -0.0201, radius = 0.02, rotation = 'imposed',
+  spin_z = '3000*(1 + t/1e-4)', displacement_x = 0.0, displacement_y = '2*t' /
+&rigid name = 'box', shape = 'box', centre = 0.31, 0.131, edges = 0.16, 0.05, 0.0, angle = 5.0, density = 5000.0,
+  velocity_y = -30.0 /
+&contact between = 'one', 'left', friction = 0.5, damping = 0.1 /
+&contact between = 'one', 'box', friction = 0.2 /
+&contact between = 'two', 'box' /
+&time TIME /
+&output every = 60, history_every = 5, fields = 'displacement', 'velocity', precision = 'double' /
+"""
+RIGID = ("contact_energy", "friction_work", "contact_dissipation")
+
 
 class Scene:
     """A scene, what stands in place of its words, and what is asked of it."""
@@ -110,7 +147,15 @@ OWN = [
     Scene("measures at rest", MEASURES.replace("velocity_x = -4.0", "displacement_x = -1.0e-5")
           .replace("velocity_x = 4.0, velocity_y = 1.0", "displacement_x = 2.0e-5"),
           {"TIME": STATIC + ", growth = 'load_steps'"}, short=False, tolerance=1e-6),
+    Scene("ball", BALL, {"TIME": "steps = 300"}, pieces=True, surfaces=True,
+          changes=(*RIGID, "ball_force_x", "ball_moment_y", "floor_force_z", "punch_force_z", "broken_bonds")),
+    Scene("rolls", ROLLS, {"TIME": "steps = 300"}, pieces=True, surfaces=True,
+          changes=(*RIGID, "left_moment_z", "box_rotation_z", "box_force_y")),
 ]
+
+# A wedge that points down on the plate, in mm.
+CORNERS = np.array([[40, 10, 16], [52, 10, 16], [46, 10, 10.05], [40, 30, 16], [52, 30, 16], [46, 30, 10.05]], float)
+FACETS = ((0, 1, 2), (3, 5, 4), (0, 3, 4), (0, 4, 1), (0, 2, 5), (0, 5, 3), (1, 4, 5), (1, 5, 2))
 
 
 def write_files(folder):
@@ -120,3 +165,12 @@ def write_files(folder):
     np.savetxt(folder / "start.txt", values,
                header="displacement_x displacement_y velocity_y temperature_change", comments="",
                fmt="%.17g")
+    lines = ["solid punch"]
+    middle = CORNERS.mean(axis=0)
+    for facet in FACETS:
+        a, b, c = CORNERS[list(facet)]
+        if np.dot(np.cross(b - a, c - a), a - middle) < 0:
+            b, c = c, b
+        lines += ["facet normal 0 0 0", "outer loop",
+                  *(f"vertex {x:g} {y:g} {z:g}" for x, y, z in (a, b, c)), "endloop", "endfacet"]
+    (folder / "punch.stl").write_text("\n".join([*lines, "endsolid punch", ""]), encoding="utf-8")

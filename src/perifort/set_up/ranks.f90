@@ -15,6 +15,7 @@ module pd_set_up_ranks
   use pd_family_volume, only: reach, volume_rule_type
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: has_refinement, scene_type, is_set
+  use pd_set_up_terms, only: sides_of_contact
   implicit none (type, external)
   private
   public :: check_ranks, divide_body, divide_survey, find_lowest, work_of_body, join_ranks, &
@@ -49,8 +50,10 @@ contains
     do i = 1, size(scene%boundaries)
       if (scene%boundaries(i)%motion == 'pin') call refuse('boundary', i, 'motion', 'a pin')
     end do
-    if (size(scene%rigids) > 0) call refuse('rigid', 1, '', '&rigid')
-    if (size(scene%contacts) > 0) call refuse('contact', 1, '', '&contact')
+    do i = 1, size(scene%contacts)
+      if (any(sides_of_contact(scene, i) > 0)) call refuse('contact', i, '', &
+        & 'contact of points with points')
+    end do
     if (size(scene%tips) > 0) call refuse('tip', 1, '', '&tip')
     if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
