@@ -299,8 +299,8 @@ def same_surfaces(one, other):
     """Whether two runs have the same files of rigid bodies' surfaces, at least two, and the same list
     of them.
     """
-    names = sorted(p.name for p in one.iterdir() if ".rigid" in p.name)
-    return len(names) > 2 and names == sorted(p.name for p in other.iterdir() if ".rigid" in p.name) \
+    names = sorted(p.name for p in one.glob("*_rigid*"))
+    return len(names) > 2 and names == sorted(p.name for p in other.glob("*_rigid*")) \
         and all((one / n).read_bytes() == (other / n).read_bytes() for n in names)
 
 
