@@ -52,7 +52,6 @@ module pd_force_touch
     real(wp), allocatable :: begins(:)       !! gap at which each is pushed [m]
     integer(i8) :: points = 0_i8             !! that may touch, of all ranks; of these
     real(wp) :: least = 0.0_wp               !! the smallest spacing [m]
-    real(wp) :: largest = 0.0_wp             !! the largest volume [m3]
     real(wp) :: first = 0.0_wp               !! the largest gap at which one is pushed [m]
     real(wp) :: delta = 1.0_wp               !! horizon, if points do not have their own [m]
     real(wp) :: ratio = 0.0_wp               !! horizon over spacing of each point; 0: one horizon
@@ -107,7 +106,6 @@ contains
     touch%numbers = number_at(body, int(touch%slots))
     touch%points = count_of_ranks(body%order, size(touch%slots, kind=i8))
     touch%least = -largest_of_ranks(body%order, -minval(body%spacing(touch%slots)))
-    touch%largest = largest_of_ranks(body%order, maxval(body%volume(touch%slots)))
     touch%begins = usual_distance*body%spacing(touch%slots)
     if (rule%distance > 0.0_wp) touch%begins = rule%distance
     touch%acts_on_few = .true.
@@ -455,7 +453,7 @@ contains
     real(wp) :: ratio
     integer :: i, k
 
-    if (self%part == of_friction .or. size(self%slots) == 0) return
+    if (self%part == of_friction .or. self%points == 0_i8) return
     ratio = mass_ratio(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
@@ -464,18 +462,23 @@ contains
   end subroutine add_stiffness_bound
 
   !> The volume of all points that may touch at once over the mass that they move, and turn [m3/kg].
+  !> All ranks call it together.
   real(wp) function mass_ratio(self, view) result(ratio)
     type(touch_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
-    real(wp) :: arm
+    real(wp) :: least, largest, arm
 
     ratio = 0.0_wp
     associate (obstacle => view%obstacles(self%obstacle), body => view%body)
       if (.not. max(obstacle%per_mass, obstacle%per_inertia) > 0.0_wp) return
+      least = minval(body%spacing(self%slots))
+      least = -largest_of_ranks(body%order, -least)
       arm = norm2(obstacle%half) + self%first
-      ratio = crowded*surface_of(obstacle, self%first)/self%least**(body%dim - 1)
+      ratio = crowded*surface_of(obstacle, self%first)/least**(body%dim - 1)
       ratio = min(ratio, real(self%points, wp))
-      ratio = ratio*self%largest*(obstacle%per_mass + arm**2*obstacle%per_inertia)
+      largest = maxval(body%volume(self%slots))
+      largest = largest_of_ranks(body%order, largest)
+      ratio = ratio*largest*(obstacle%per_mass + arm**2*obstacle%per_inertia)
     end associate
   end function mass_ratio
 
@@ -490,7 +493,7 @@ contains
 
     part = self%rule%damping
     if (self%part == of_friction) part = slope
-    if (.not. part > 0.0_wp .or. size(self%slots) == 0) return
+    if (.not. part > 0.0_wp .or. self%points == 0_i8) return
     ratio = mass_ratio(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
