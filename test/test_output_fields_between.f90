@@ -7,7 +7,7 @@ module test_output_fields_between
   use pd_base_kinds, only: wp, i8
   use pd_driver, only: run_scene
   use pd_motion_system, only: system_type
-  use pd_output_fields_between, only: stencil_at, stencil_type, values_between
+  use pd_output_fields_between, only: find_spots, spots_type, values_at_spots
   use pd_output_fields_field, only: moment_type
   use pd_output_fields_table, only: all_fields, field_table_type
   use pd_output_measures_probe, only: nearest_slot
@@ -66,7 +66,7 @@ contains
     real(wp), intent(in) :: position(:)
     real(wp), allocatable, intent(out) :: values(:)
     type(field_table_type) :: table
-    type(stencil_type) :: stencil(1)
+    type(spots_type) :: spots
     type(moment_type) :: now
     real(wp), allocatable :: all(:, :)
     real(wp) :: place(3)
@@ -76,9 +76,10 @@ contains
     now%v => system%state%v
     place = 0.0_wp
     place(:size(position)) = position
-    call stencil_at(system, int(nearest_slot(system%body, place)), position, stencil(1))
+    call find_spots(system, [int(nearest_slot(system%body, place))], [.true.], &
+      & reshape(position, [1, size(position)]), spots)
     allocate (all(size(position), 1))
-    call values_between(table%field('displacement'), now, stencil, all)
+    call values_at_spots(table%field('displacement'), now, spots, all)
     values = all(:, 1)
   end subroutine displacement_at
 

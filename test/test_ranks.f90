@@ -15,6 +15,9 @@ module test_ranks
   use pd_family_cracks, only: cut_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_force_breaking, only: damage_of
+  use pd_force_dashpots, only: dashpots_type, new_dashpots
+  use pd_force_springs, only: new_springs, springs_type
+  use pd_force_term, only: force_term_type
   use pd_force_model, only: new_model
   use pd_force_weights, only: build_weights
   use pd_motion_conditions, only: motion_type
@@ -85,6 +88,7 @@ contains
       & new_unittest('an explicit run', test_explicit), &
       & new_unittest('an explicit run in space', test_block), &
       & new_unittest('a growing crack', test_crack), &
+      & new_unittest('springs and dashpots', test_terms), &
       & new_unittest('dynamic relaxation', test_relaxation), &
       & new_unittest('dynamic relaxation of a bar', test_bar), &
       & new_unittest('conjugate gradients', test_gradients)]
@@ -585,6 +589,24 @@ contains
     call compare(scene, 3, 'velocity_verlet', error, breaks=.true.)
   end subroutine test_crack
 
+  !> A side on springs, and one that takes in waves; then springs in static equilibrium.
+  subroutine test_terms(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call plate(scene)
+    scene%header%precision = 'double'
+    scene%boundaries(1)%name = ''
+    scene%boundaries(1)%absorbing = .true.
+    scene%boundaries(2)%velocity(2) = 2.0_wp
+    scene%loads(1)%stiffness(:2) = [4.0e8_wp, 1.0e8_wp]
+    scene%time%steps = 60
+    call compare(scene, 3, 'forward_backward', error, dissipates=.true.)
+    call pulled_plate(scene)
+    scene%loads(1)%stiffness(:2) = [4.0e8_wp, 1.0e8_wp]
+    call compare(scene, 2, 'relaxation', error)
+  end subroutine test_terms
+
   !> With 1000 points and more one process that may differ from ranks would have a coarse part in
   !> its preconditioner, which they do not have.
   subroutine pulled_plate(scene)
@@ -633,13 +655,14 @@ contains
   end subroutine test_bar
 
   !> Run a scene on one rank, and on some.
-  subroutine compare(scene, ranks, method, error, breaks, overlaps)
+  subroutine compare(scene, ranks, method, error, breaks, overlaps, dissipates)
     type(scene_type), intent(in) :: scene
     integer, intent(in) :: ranks
     character(*), intent(in) :: method
     type(error_type), allocatable, intent(inout) :: error
     logical, intent(in), optional :: breaks    !! bonds must break
     logical, intent(in), optional :: overlaps  !! blocks must be computed while copies arrive
+    logical, intent(in), optional :: dissipates  !! energy must be lost
     type(set_up_type) :: set_up
     type(part_type) :: one
     type(part_type), target :: parts(ranks)
@@ -695,6 +718,8 @@ contains
     if (allocated(error)) return
     call expect_true(error, one%system%external_work > 0.0_wp .and. one%diary%n > 1, &
       & 'nothing happened')
+    if (present(dissipates)) call expect_true(error, one%system%dissipated > 0.0_wp, &
+      & 'nothing is dissipated')
     if (present(breaks)) call expect_true(error, one%system%broken > 20_i8, 'the crack stands')
     do r = 1, ranks
       if (present(overlaps)) call expect_overlap(parts(r)%system, error)
@@ -838,6 +863,9 @@ contains
         call take_load(load_of(whole%terms, m), loads(m))
       end do
       call add_loads_to(system%terms, loads)
+      do m = whole%terms%bonds + size(loads) + 1, whole%terms%number()
+        call take_term(whole%terms%items(m)%term)
+      end do
       system%break_late = whole%break_late
       call start_system(system)
       if (.not. allocated(set_up%plan%relaxation%mass)) return
@@ -865,6 +893,25 @@ contains
       slots = here(set_up%system%body%point(of_whole%slots))
       motion%slots = pack(slots, slots > 0)
     end subroutine take_motion
+
+    subroutine take_term(of_whole)
+      class(force_term_type), intent(in) :: of_whole
+      integer(i4), allocatable :: slots(:)
+      integer :: k
+
+      select type (of_whole)
+      type is (springs_type)
+        slots = here(set_up%system%body%point(of_whole%slots))
+        call part%system%terms%add(new_springs(pack(slots, slots > 0), &
+          & of_whole%stiffness(:set_up%system%body%dim)))
+      type is (dashpots_type)
+        slots = here(set_up%system%body%point(of_whole%slots))
+        call part%system%terms%add(new_dashpots(pack(slots, slots > 0), &
+          & of_whole%damping(pack([(k, k=1, size(slots))], slots > 0), :)))
+      class default
+        call test_failed(error, 'a term that parts cannot have')
+      end select
+    end subroutine take_term
 
     subroutine take_load(of_whole, load)
       type(load_type), intent(in) :: of_whole

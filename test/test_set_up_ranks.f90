@@ -10,7 +10,7 @@ module test_set_up_ranks
   private
   public :: collect_set_up_ranks
 
-  integer, parameter :: kinds = 22   !! of scenes that are refused
+  integer, parameter :: kinds = 13   !! of scenes that are refused
 
 contains
 
@@ -69,54 +69,25 @@ contains
       name = 'a pin'
       scene%boundaries(1)%motion = 'pin'
     case (7)
-      name = 'an absorbing boundary'
-      scene%boundaries(1)%absorbing = .true.
-    case (8)
-      name = 'springs'
-      scene%loads(1)%stiffness(2) = 1.0_wp
-    case (9)
-      name = 'a file of initial values'
-      scene%initial(1)%file = 'state.txt'
-    case (10)
-      name = 'a temperature change'
-      scene%initial(1)%temperature_change = 10.0_wp
-    case (11)
-      name = 'a temperature change'
-      scene%initial(1)%temperature_text = 't'
-    case (12)
-      name = '&rigid'
-      deallocate (scene%rigids)
-      allocate (scene%rigids(1))
-    case (13)
-      name = '&contact'
+      name = 'contact of points with points'
       deallocate (scene%contacts)
       allocate (scene%contacts(1))
-    case (14)
+      scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) :: 'all']
+    case (8)
       name = '&tip'
       deallocate (scene%tips)
       allocate (scene%tips(1))
-    case (15)
-      name = '&section'
-      deallocate (scene%sections)
-      allocate (scene%sections(1))
-    case (16)
-      name = '&line'
-      deallocate (scene%lines)
-      allocate (scene%lines(1))
-    case (17)
+    case (9)
       name = '&j_integral'
       deallocate (scene%j_integrals)
       allocate (scene%j_integrals(1))
-    case (18)
-      name = 'interpolation'
-      scene%probes(1)%interpolate = .true.
-    case (19)
+    case (10)
       name = 'fragments'
       scene%output%fragments = .true.
-    case (20)
+    case (11)
       name = "the field 'fragment'"
       scene%output%fields = [character(len(scene%output%fields)) :: 'damage', 'fragment']
-    case (21)
+    case (12)
       name = '&refine'
       allocate (scene%refines(1))
     case default
@@ -125,8 +96,8 @@ contains
     end select
   end subroutine refused_scene
 
-  !> Explicit runs with cracks, boundaries, loads and probes; static equilibrium, also with bonds
-  !> that break in load steps.
+  !> Explicit runs with cracks, boundaries, loads, heat and probes; static equilibrium, also with
+  !> bonds that break in load steps.
   subroutine test_allowed(error)
     type(error_type), allocatable, intent(out) :: error
     type(scene_type) :: scene
@@ -134,11 +105,24 @@ contains
 
     call box_scene([10, 10], 0.1_wp, 0.3_wp, scene)
     deallocate (scene%boundaries, scene%loads, scene%initial, scene%probes, scene%cracks)
-    allocate (scene%boundaries(2), scene%loads(1), scene%initial(1), scene%probes(1))
+    allocate (scene%boundaries(2), scene%loads(1), scene%initial(3), scene%probes(1))
     allocate (scene%cracks(1))
     scene%materials(1)%critical_stretch = 0.01_wp
     scene%materials(1)%scatter = 10.0_wp
     scene%horizon%surface_correction = 'energy'
+    scene%boundaries(1)%absorbing = .true.
+    scene%loads(1)%stiffness(2) = 1.0_wp
+    scene%initial(1)%file = 'state.txt'
+    scene%initial(2)%temperature_change = 10.0_wp
+    scene%initial(3)%temperature_text = 't'
+    scene%probes(1)%interpolate = .true.
+    deallocate (scene%sections, scene%lines)
+    allocate (scene%sections(1), scene%lines(1))
+    deallocate (scene%rigids, scene%contacts)
+    allocate (scene%rigids(1), scene%contacts(1))
+    scene%bodies(1)%name = 'block'
+    scene%rigids(1)%name = 'ball'
+    scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) :: 'block', 'ball']
     call check_ranks(scene, fault)
     call expect_true(error, .not. allocated(fault), 'an explicit run is refused')
     scene%time%method = 'relaxation'

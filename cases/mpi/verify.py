@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 
 import scaling
+import scenes
 from common import Case, change
 
 PARALLEL = os.environ.get("PERIFORT_MPI", "")
@@ -217,16 +218,58 @@ def compare_scenes(case, ranks):
         compare_bits(case, write_cloud(case, words), f"cloud, {name}", ranks, *options)
 
 
-def compare_bits(case, path, name, ranks, *options):
-    """Runs with --reproducible, whose bonds break if `broken_bonds` is in their history."""
+def compare_own(case, ranks):
+    """Scenes of what acts beside bonds and of what measures: the same bits, also in pieces on other
+    numbers of ranks, and the same displacements without --reproducible.
+    """
+    case.out.mkdir(parents=True, exist_ok=True)
+    scenes.write_files(case.out)
+    for scene in scenes.OWN:
+        if case.options.short and not scene.short:
+            continue
+        path = case.out / (re.sub(r"\W+", "_", scene.name) + ".nml")
+        path.write_text(scene.text, encoding="utf-8")
+        whole = compare_bits(case, path, scene.name, ranks, surfaces=scene.surfaces)
+        table = np.genfromtxt(whole / "history.csv", delimiter=",", names=True)
+        for column in scene.changes:
+            case.equal(f"{scene.name}: {column} changes", np.ptp(table[column]) > 0, True)
+        if scene.pieces:
+            go_on(case, scene.name, path, whole, int(table["step"][-1]))
+        one = case.complete(path, 1)
+        for n in ranks:
+            found = difference_of_fields(one, case.complete(path, n))
+            case.below(f"{scene.name}: {n} ranks, of the largest displacement", found, scene.tolerance)
+
+
+def go_on(case, name, path, whole, steps):
+    """A run in pieces on 3, 2, 1 and 3 ranks has the bits of that in one piece."""
+    pieces = path.with_name(f"{path.stem}.pieces")
+    shutil.rmtree(pieces, ignore_errors=True)
+    for i, (n, part) in enumerate(((3, 0.35), (2, 0.5), (1, 0.8), (3, 1))):
+        _, process = case.start(path, n, *ONE, "--set", f"time%steps={int(part * steps)}", "--set",
+                                "output%checkpoint_every=30", *(["--restart"] if i else []),
+                                folder=pieces, anew=False)
+        errors = process.communicate()[1]
+        if process.returncode:
+            sys.exit(f"error: {path} on {n} ranks ended with status {process.returncode}:\n{errors}")
+    case.equal(f"{name}, on 3, 2, 1, 3 ranks in turn: the same bits", same_bits(whole, pieces), True)
+
+
+def compare_bits(case, path, name, ranks, *options, surfaces=False):
+    """Runs with --reproducible, whose bonds break if `broken_bonds` is in their history; the folder
+    of that on one rank.
+    """
     one = case.complete(path, 1, *options, *ONE)
     for n in ranks:
         other = case.complete(path, n, *options, *ONE)
         case.equal(f"{name}: {n} ranks, the same bits", same_bits(one, other), True)
+        if surfaces:
+            case.equal(f"{name}: {n} ranks, the same surfaces", same_surfaces(one, other), True)
     table = np.genfromtxt(one / "history.csv", delimiter=",", names=True)
     column = [c for c in table.dtype.names if c.startswith("broken_bonds")]
     if column and "breaking" in name:
         case.equal(f"{name}: bonds break", table[column[0]][-1] > 0, True)
+    return one
 
 
 def write_cloud(case, words):
@@ -250,6 +293,15 @@ def same_series(one, other):
     """Whether two runs have the same `.vtu` files, at least two, and the same list of them."""
     names = sorted(p.name for p in one.glob("*.vtu")) + [p.name for p in one.glob("*.pvd")]
     return len(names) > 2 and all((one / n).read_bytes() == (other / n).read_bytes() for n in names)
+
+
+def same_surfaces(one, other):
+    """Whether two runs have the same files of rigid bodies' surfaces, at least two, and the same list
+    of them.
+    """
+    names = sorted(p.name for p in one.glob("*_rigid*"))
+    return len(names) > 2 and names == sorted(p.name for p in other.glob("*_rigid*")) \
+        and all((one / n).read_bytes() == (other / n).read_bytes() for n in names)
 
 
 def difference_of_fields(one, other):
@@ -510,6 +562,7 @@ def main():
         sys.exit("error: PERIFORT_MPI does not name the program with MPI; start this as ./pf verify mpi")
     ranks = [int(n) for n in (case.options.ranks or ("3" if case.options.short else "2,3,4,7")).split(",")]
     compare_scenes(case, ranks)
+    compare_own(case, ranks)
     check_messages(case, ranks)
     check_memory(case)
     check_regrouped(case)

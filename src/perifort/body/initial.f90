@@ -1,6 +1,6 @@
 !> Initial state (7.8): displacement, velocity and temperature change of every point.
 module pd_body_initial
-  use pd_base_kinds, only: wp, i2, i4
+  use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_error, only: error_type
   use pd_base_text, only: to_text
   use pd_scene_content_types, only: scene_type, is_given, is_set
@@ -8,7 +8,7 @@ module pd_body_initial
   use pd_scene_content_expressions, only: varies_in_time
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
-  use pd_body_body, only: body_type, scatter
+  use pd_body_body, only: body_type, number_at
   use pd_body_choice, only: values_on
   use pd_body_regions, only: region_mask
   implicit none (type, external)
@@ -113,16 +113,19 @@ contains
       & 'displacement_z', 'velocity_x', 'velocity_y', 'velocity_z', 'temperature_change']
     character(:), allocatable :: path
     type(table_type) :: table
+    integer(i8) :: points
     integer :: column, which
 
     path = resolve_path(trim(scene%initial(number)%file), scene%file)
     call read_table(path, table, error, allowed=pack(known, of_dimension(body%dim)))
     call place_fault(error, scene, 'initial', number, 'file')
     if (allocated(error)) return
-    if (size(table%values, 2) /= body%n_points) then
+    points = int(body%n_points, i8)
+    if (associated(body%order%ranks)) points = body%order%n_global
+    if (size(table%values, 2, kind=i8) /= points) then
       call scene_fault(error, scene, 'initial', number, 'file', 'the initial state in '//path// &
         & ' has '//to_text(size(table%values, 2))//' rows, but the scene has '// &
-        & to_text(body%n_points)//' points (layers included)', &
+        & to_text(points)//' points (layers included)', &
         & 'one row per point is expected, in the order of the results')
       return
     end if
@@ -130,15 +133,27 @@ contains
       which = findloc(known == table%names(column), .true., dim=1)
       select case (which)
       case (1:3)
-        call scatter(body, table%values(column, :), u(:, which))
+        call take_column(body, table%values(column, :), u(:, which))
       case (4:6)
-        call scatter(body, table%values(column, :), v(:, which - 3))
+        call take_column(body, table%values(column, :), v(:, which - 3))
       case default  ! the last of the known names
-        call scatter(body, table%values(column, :), temperature_change)
+        call take_column(body, table%values(column, :), temperature_change)
         where (body%point > 0) heated_by = int(number, i2)
       end select
     end do
   end subroutine state_from_file
+
+  !> Give every slot with a point, copies included, the value of its row.
+  pure subroutine take_column(body, of_rows, of_slots)
+    type(body_type), intent(in) :: body
+    real(wp), intent(in) :: of_rows(:)      !! (points of all ranks)
+    real(wp), intent(inout) :: of_slots(:)  !! (n_slots)
+    integer :: k
+
+    do k = 1, body%n_slots
+      if (body%point(k) > 0) of_slots(k) = of_rows(number_at(body, k))
+    end do
+  end subroutine take_column
 
   !> Which columns a dimension has.
   pure function of_dimension(dim) result(has)

@@ -220,6 +220,7 @@ contains
     logical, intent(in), optional :: listed(:)
       !! (n_points) points with bonds in the list of a composite family; absent: none
     logical, allocatable :: apart(:)
+    real(wp), allocatable :: spacing(:), volume(:)
     integer :: g, k
 
     if (present(key_bits)) family%key_bits = key_bits
@@ -230,8 +231,9 @@ contains
     if (family%mixed) family%block_length = 2*lanes
     family%rule = rule
     allocate (family%grids(0))
+    call find_cells(body, spacing, volume)
     do g = 1, size(body%grids)
-      if (any(body%grid == g)) call add_grid(body, g, family)
+      if (any(body%grid == g)) call add_grid(body, g, spacing(g), volume(g), family)
     end do
     family%most_bonds = maxval(family%grids%n)
     family%words = (family%most_bonds + word_bits - 1)/word_bits
@@ -264,20 +266,49 @@ contains
     call find_blocks(family)
   end subroutine use_double
 
+  !> Spacing and volume of the cells of each grid: those of its first point of all ranks, since
+  !> bodies on one grid may differ in the last digits. All ranks call it together.
+  subroutine find_cells(body, spacing, volume)
+    type(body_type), intent(in) :: body
+    real(wp), allocatable, intent(out) :: spacing(:), volume(:)  !! (grids) [m], [m3]; 0: no point
+    integer(i8) :: first, number
+    integer :: g, k, p
+
+    allocate (spacing(size(body%grids)), volume(size(body%grids)), source=0.0_wp)
+    do g = 1, size(body%grids)
+      first = huge(0)
+      k = 0
+      do p = 1, body%n_points
+        if (body%grid(p) /= g) cycle
+        number = p
+        if (allocated(body%number)) number = body%number(p)
+        if (number >= first) cycle
+        first = number
+        k = p
+      end do
+      ! numbers of points are exact as reals
+      if (-largest_of_ranks(body%order, -real(first, wp)) < real(first, wp)) k = 0
+      if (k > 0) spacing(g) = body%spacing(k)
+      if (k > 0) volume(g) = body%volume(k)
+      spacing(g) = largest_of_ranks(body%order, spacing(g))
+      volume(g) = largest_of_ranks(body%order, volume(g))
+    end do
+  end subroutine find_cells
+
   !> The table of offsets and the padded box of grid `g` of the body, behind the boxes that are
   !> there. The padding at the end of one row serves the beginning of the next as well, and so for
   !> planes. Rows are a multiple of a block long, so that all of them are cut into blocks alike.
-  subroutine add_grid(body, g, family)
+  subroutine add_grid(body, g, spacing, volume, family)
     type(body_type), intent(in) :: body
     integer, intent(in) :: g
+    real(wp), intent(in) :: spacing, volume   !! of its cells
     type(lattice_family_type), intent(inout) :: family
     type(offsets_type) :: grid
-    integer :: cells(3), k, c, o
+    integer :: cells(3), c, o
     integer(i8) :: margin
 
-    k = findloc(body%grid == g, .true., dim=1)
-    grid%spacing = body%spacing(k)
-    grid%cell_volume = body%volume(k)
+    grid%spacing = spacing
+    grid%cell_volume = volume
     cells = extent(body, g)
     grid%alignment = family%block_length
     if (allocated(body%grids(g)%lowest)) call fix_box(body, g, grid, cells)

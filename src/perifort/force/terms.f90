@@ -1,11 +1,12 @@
 !> The terms of a system (`pd_force_term`) in their order, and the account of their work.
 module pd_force_terms
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, joined, of_slots, same
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i4, i8
-  use pd_base_order, only: place_in
+  use pd_base_order, only: ascending_order, owned_point, place_in
   use pd_base_reduce, only: inner, sum_listed
   use pd_base_text, only: to_text
+  use pd_body_body, only: body_type, number_at
   use pd_force_forces, only: up_to_marks
   use pd_force_term, only: force_term_type, name_of, no_stiffness, no_tangent, term_view_type
   implicit none (type, external)
@@ -17,9 +18,10 @@ module pd_force_terms
     class(force_term_type), allocatable :: term
     real(wp), allocatable :: last_u(:, :)      !! displacements and forces at the last instant
     real(wp), allocatable :: last_force(:, :)  !! that was accounted [m], [N/m3]
-    integer(i4), allocatable :: slots(:)       !! of a term that acts on few points: instead of
-    real(wp), allocatable :: few(:, :)         !! these where it acted then, its forces there
-                                               !! (slots, dim) [N/m3]
+    integer(i8), allocatable :: numbers(:)     !! of a term that acts on few points: instead of
+    integer(i4), allocatable :: slots(:)       !! these the points on which it acted then, by their
+    real(wp), allocatable :: few(:, :)         !! numbers and slots, its forces there (slots, dim)
+                                               !! [N/m3]
     real(wp), allocatable :: few_u(:, :)       !! and displacements (slots, dim) [m]
     real(wp) :: last_time = 0.0_wp             !! and the time [s]
     real(wp) :: last_energy = 0.0_wp           !! that it stored then [J]
@@ -331,11 +333,13 @@ contains
       self%density(slots) = 0.0_wp
       few_u = view%u(slots, :)
       if (allocated(item%few)) then
+        if (.not. allocated(item%slots)) call find_slots(item, body)
         work = half_work(item%slots, item%few, view%u(item%slots, :) - item%few_u) &
           & + half_work(slots, few, few_u - places_before(item, view, slots))
         lost = lost - work - (stored - item%last_energy)
         item%lost = item%lost - work - (stored - item%last_energy)
       end if
+      item%numbers = number_at(body, int(slots))
       call move_alloc(slots, item%slots)
       call move_alloc(few, item%few)
       call move_alloc(few_u, item%few_u)
@@ -402,8 +406,10 @@ contains
         if (item%term%acts_on_few) then
           call keep_few(archive, item, 'of term '//to_text(i))
         else
+          call archive%over(of_slots)
           call archive%keep('last place of term '//to_text(i), item%last_u)
           call archive%keep('last force of term '//to_text(i), item%last_force)
+          call archive%over(same)
         end if
         call archive%keep('last energy of term '//to_text(i), item%last_energy)
         call archive%keep('loss of term '//to_text(i), item%lost)
@@ -411,22 +417,67 @@ contains
     end do
   end subroutine keep_list
 
-  !> Keep where a term that acts on few points acted.
+  !> Keep where a term that acts on few points acted: of each point its number, then the forces and
+  !> displacements of each component.
   subroutine keep_few(archive, item, name)
     class(archive_type), intent(inout) :: archive
     type(item_type), intent(inout) :: item
     character(*), intent(in) :: name
-    integer(i8), allocatable :: slots(:, :)
+    integer(i8), allocatable :: numbers(:, :)
+    real(wp), allocatable :: values(:, :)
+    logical :: accounted
+    integer :: points, dim
 
+    accounted = allocated(item%few)
+    call archive%keep('account '//name, accounted)
     ! there may have been fewer or more of them
-    if (archive%reading .and. allocated(item%slots)) deallocate (item%slots, item%few, item%few_u)
-    if (allocated(item%slots)) slots = reshape(int(item%slots, i8), [size(item%slots), 1])
-    call archive%keep('slots '//name, slots)
-    if (allocated(slots)) item%slots = int(slots(:, 1), i4)
-    call archive%keep('places '//name, item%few_u)
-    call archive%keep('forces '//name, item%few)
+    if (archive%reading .and. allocated(item%few)) deallocate (item%numbers, item%few, item%few_u)
+    if (archive%reading .and. allocated(item%slots)) deallocate (item%slots)
+    if (.not. accounted) return
+    if (.not. archive%reading) then
+      points = size(item%numbers)
+      dim = size(item%few, 2)
+      numbers = reshape(item%numbers, [points, 1])
+      values = reshape(transpose(reshape([item%few, item%few_u], [points, 2*dim])), &
+        & [2*dim*points, 1])
+    end if
+    call archive%over(joined)
+    call archive%keep('points '//name, numbers)
+    call archive%keep('forces and places '//name, values)
+    call archive%over(same)
     call archive%keep('time '//name, item%last_time)
+    if (allocated(archive%error) .or. .not. archive%reading) return
+    points = size(numbers)
+    dim = size(values)/(2*max(1, points))
+    item%numbers = numbers(:, 1)
+    values = transpose(reshape(values, [2*dim, points]))
+    item%few = values(:, :dim)
+    item%few_u = values(:, dim + 1:)
   end subroutine keep_few
+
+  !> Find the points on which a term acted before a restart. Files of several ranks have them one
+  !> file behind the other, and those of other ranks, too.
+  subroutine find_slots(item, body)
+    type(item_type), intent(inout) :: item  !! as it was kept; its slots are found
+    type(body_type), intent(in) :: body
+    integer, allocatable :: order(:)
+    integer(i4), allocatable :: points(:)
+    integer :: i
+
+    order = ascending_order(item%numbers)
+    points = [(int(owned_point(body%order, item%numbers(order(i))), i4), i=1, size(order))]
+    order = pack(order, points > 0_i4)
+    points = pack(points, points > 0_i4)
+    item%slots = int(body%slot(points), i4)
+    item%numbers = item%numbers(order)
+    if (size(order) > 0) then
+      item%few = item%few(order, :)
+      item%few_u = item%few_u(order, :)
+    else
+      item%few = reshape([real(wp) ::], [0, body%dim])
+      item%few_u = item%few
+    end if
+  end subroutine find_slots
 
   !> The lines of all terms, each ended by a newline.
   function describe_list(self) result(text)

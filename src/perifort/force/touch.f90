@@ -9,13 +9,18 @@
 !> The points within D and a skin of the surface are listed. The distance of a point changes by no
 !> more than the point, the body's centre, and by rotation the body's material beside the point have
 !> moved: as long as these together are less than the skin, no other point can touch.
+!>
+!> Of several ranks each has its own points, and all have the body. They list anew together, so that
+!> lists do not depend on the ranks.
 module pd_force_touch
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, same
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i4
-  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_reduce, only: add_point, count_of_ranks, largest_of_ranks, new_running, &
+    & running_type, total_of_running
+  use pd_base_text, only: to_text
   use pd_base_vectors, only: cross
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, number_at
   use pd_force_contact_law, only: contact_rule_type, normal_force, of_friction, of_normal_force, &
     & slope
   use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
@@ -42,8 +47,12 @@ module pd_force_touch
     integer :: part = of_normal_force
     integer :: obstacle = 0                  !! number of the rigid body
     type(contact_rule_type) :: rule
-    integer(i4), allocatable :: slots(:)     !! points that may touch, in order
+    integer(i4), allocatable :: slots(:)     !! owned points that may touch, in order
+    integer(i8), allocatable :: numbers(:)   !! their numbers among the points of all ranks
     real(wp), allocatable :: begins(:)       !! gap at which each is pushed [m]
+    integer(i8) :: points = 0_i8             !! that may touch, of all ranks; of these
+    real(wp) :: least = 0.0_wp               !! the smallest spacing [m]
+    real(wp) :: first = 0.0_wp               !! the largest gap at which one is pushed [m]
     real(wp) :: delta = 1.0_wp               !! horizon, if points do not have their own [m]
     real(wp) :: ratio = 0.0_wp               !! horizon over spacing of each point; 0: one horizon
     real(wp) :: skin = 0.0_wp                !! [m]
@@ -51,7 +60,7 @@ module pd_force_touch
                                              !! the same rule, and takes what that has found
     integer, allocatable :: near(:)          !! which of the points were near at the last search
     type(obstacle_type) :: then              !! the surface then
-    real(wp) :: farthest = 0.0_wp            !! from its centre was a point then [m]
+    real(wp) :: farthest = 0.0_wp            !! from its centre was a point of any rank then [m]
     type(movement_type) :: movement          !! of the points since
   contains
     procedure :: add_force
@@ -68,7 +77,7 @@ module pd_force_touch
 
 contains
 
-  !> Contact of the points of some bodies with a rigid body.
+  !> Contact of the points of some bodies with a rigid body. All ranks call it together.
   subroutine new_touch(body, delta, ratio, rule, touches, obstacle, part, touch)
     type(body_type), intent(in) :: body             !! arranged in slots
     real(wp), intent(in) :: delta                   !! horizon, if points do not have their own [m]
@@ -91,11 +100,16 @@ contains
     touch%rule = rule
     touch%delta = delta
     touch%ratio = ratio
-    touch%slots = pack(body%slot, touches(body%body(body%slot)))
+    associate (owned => body%slot(:body%order%n_owned))
+      touch%slots = pack(owned, touches(body%body(owned)))
+    end associate
+    touch%numbers = number_at(body, int(touch%slots))
+    touch%points = count_of_ranks(body%order, size(touch%slots, kind=i8))
+    touch%least = -largest_of_ranks(body%order, -minval(body%spacing(touch%slots)))
     touch%begins = usual_distance*body%spacing(touch%slots)
     if (rule%distance > 0.0_wp) touch%begins = rule%distance
     touch%acts_on_few = .true.
-    if (size(touch%slots) > 0) touch%skin = skin*minval(body%spacing(touch%slots))
+    if (touch%points > 0_i8) touch%skin = skin*touch%least
     call new_movement(body, touch%slots, touch%movement)
   end subroutine new_touch
 
@@ -110,6 +124,7 @@ contains
       call find_gap(view%obstacles(self%obstacle), place_of(view, int(self%slots(i))), gap, normal)
       self%begins(i) = min(self%begins(i), gap)
     end do
+    self%first = largest_of_ranks(view%body%order, maxval(self%begins))
   end subroutine begin
 
   !> List the points near the surface anew if others may have come near.
@@ -131,31 +146,32 @@ contains
       end select
     else if (.not. still_holds(self, view)) then
       call find_near(self, view, self%near, self%farthest)
+      self%farthest = largest_of_ranks(view%body%order, self%farthest)
       call note_pose(view%obstacles(self%obstacle), self%then)
       call remember_places(self%movement, view%u)
     end if
     call note_instant(self%movement, view)
   end subroutine search
 
-  !> Whether no point is near that the last search has not found.
+  !> Whether no point of any rank is near that the last search has not found.
   logical function still_holds(self, view) result(holds)
     class(touch_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
     real(wp) :: way
 
     holds = .false.
-    if (.not. allocated(self%movement%u) .or. size(self%slots) == 0) return
+    if (.not. allocated(self%movement%u) .or. self%points == 0_i8) return
     associate (now => view%obstacles(self%obstacle))
       way = norm2(now%centre - self%then%centre)
       ! without a look at the points if the body alone has moved too far
       if (way >= self%skin) return
-      way = way + moved(self%movement, view%u)
-      way = way + turned_at_most(self%then, now, maxval(self%begins), self%farthest + way)
+      way = way + largest_of_ranks(view%body%order, moved(self%movement, view%u))
+      way = way + turned_at_most(self%then, now, self%first, self%farthest + way)
     end associate
     holds = way < but_rounding*self%skin
   end function still_holds
 
-  !> The points near the surface, and how far from the body's centre any point is.
+  !> The points near the surface, and how far from the body's centre any point of this rank is.
   subroutine find_near(self, view, near, farthest)
     class(touch_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
@@ -378,19 +394,19 @@ contains
     totals = total_of_running(view%body%order, running)
   end function loads_of
 
-  !> How many of the points that may touch a rigid body are within it, in all terms, and one of
-  !> them: the first.
+  !> How many of the points that may touch a rigid body are within it, in all terms and of all
+  !> ranks, and one of them: the first. All ranks call it together.
   subroutine points_within(terms, view, number, within, first)
     type(term_list_type), intent(in) :: terms   !! of a system
     type(term_view_type), intent(in) :: view    !! the start
     integer, intent(in) :: number               !! of the rigid body
-    integer, intent(out) :: within
-    integer, intent(out) :: first               !! slot, 0 if there is none
+    integer(i8), intent(out) :: within
+    integer(i8), intent(out) :: first           !! its number, 0 if there is none
     real(wp) :: gap, normal(3)
     integer :: t, i
 
-    within = 0
-    first = 0
+    within = 0_i8
+    first = huge(0)
     do t = 1, terms%number()
       select type (touch => terms%items(t)%term)
       type is (touch_type)
@@ -398,13 +414,17 @@ contains
         do i = 1, size(touch%slots)
           call find_gap(view%obstacles(number), place_of(view, int(touch%slots(i))), gap, normal)
           if (gap >= 0.0_wp) cycle
-          within = within + 1
-          if (first == 0) first = touch%slots(i)
+          within = within + 1_i8
+          first = min(first, touch%numbers(i))
         end do
       class default  ! it does not touch the body
         continue
       end select
     end do
+    within = count_of_ranks(view%body%order, within)
+    ! numbers of points are exact as reals
+    first = -nint(largest_of_ranks(view%body%order, -real(first, wp)), i8)
+    if (within == 0_i8) first = 0_i8
   end subroutine points_within
 
   !> Take from displacements since the last instant what the body's material has moved beside each
@@ -433,7 +453,7 @@ contains
     real(wp) :: ratio
     integer :: i, k
 
-    if (self%part == of_friction .or. size(self%slots) == 0) return
+    if (self%part == of_friction .or. self%points == 0_i8) return
     ratio = mass_ratio(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
@@ -442,20 +462,23 @@ contains
   end subroutine add_stiffness_bound
 
   !> The volume of all points that may touch at once over the mass that they move, and turn [m3/kg].
+  !> All ranks call it together.
   real(wp) function mass_ratio(self, view) result(ratio)
     type(touch_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
-    real(wp) :: least, arm
+    real(wp) :: least, largest, arm
 
     ratio = 0.0_wp
     associate (obstacle => view%obstacles(self%obstacle), body => view%body)
       if (.not. max(obstacle%per_mass, obstacle%per_inertia) > 0.0_wp) return
       least = minval(body%spacing(self%slots))
-      arm = norm2(obstacle%half) + maxval(self%begins)
-      ratio = crowded*surface_of(obstacle, maxval(self%begins))/least**(body%dim - 1)
-      ratio = min(ratio, real(size(self%slots), wp))
-      ratio = ratio*maxval(body%volume(self%slots))*(obstacle%per_mass &
-        & + arm**2*obstacle%per_inertia)
+      least = -largest_of_ranks(body%order, -least)
+      arm = norm2(obstacle%half) + self%first
+      ratio = crowded*surface_of(obstacle, self%first)/least**(body%dim - 1)
+      ratio = min(ratio, real(self%points, wp))
+      largest = maxval(body%volume(self%slots))
+      largest = largest_of_ranks(body%order, largest)
+      ratio = ratio*largest*(obstacle%per_mass + arm**2*obstacle%per_inertia)
     end associate
   end function mass_ratio
 
@@ -470,7 +493,7 @@ contains
 
     part = self%rule%damping
     if (self%part == of_friction) part = slope
-    if (.not. part > 0.0_wp .or. size(self%slots) == 0) return
+    if (.not. part > 0.0_wp .or. self%points == 0_i8) return
     ratio = mass_ratio(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
@@ -484,7 +507,11 @@ contains
     class(touch_type), intent(inout) :: self       !! the contact
     class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
 
+    call archive%name_rows(self%name//' with body '//to_text(self%obstacle), self%numbers, &
+      & spread(.true., 1, size(self%numbers)))
+    call archive%over(self%name//' with body '//to_text(self%obstacle))
     call archive%keep(self%name//' with a rigid body began', self%begins)
+    call archive%over(same)
   end subroutine keep
 
   !> The scene's own lines describe it.

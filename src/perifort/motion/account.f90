@@ -208,10 +208,12 @@ contains
       real(wp) :: h
 
       rate = 0.0_wp
-      call apply_rate(system%heating, i, t, 0.5_wp, system%model%expansion, h)
+      call apply_rate(system%body%order, system%heating, i, t, 0.5_wp, &
+        & system%model%expansion, h)
       if (h > 0.0_wp) then
         rate = strain_energy(system)
-        call apply_rate(system%heating, i, t, -0.5_wp, system%model%expansion, h)
+        call apply_rate(system%body%order, system%heating, i, t, -0.5_wp, &
+          & system%model%expansion, h)
         rate = (rate - strain_energy(system))/h
       end if
       call apply_factors(system%heating, system%heating%factors, system%model%expansion)

@@ -8,6 +8,8 @@ module pd_motion_heating
   use pd_base_archive, only: archive_type
   use pd_base_expression, only: derivative_in_time, expression_type
   use pd_base_field, only: field_type, field_values, new_field
+  use pd_base_order, only: order_type
+  use pd_base_reduce, only: any_of_ranks, largest_of_ranks
   use pd_motion_conditions, only: condition_fault, note_fault
   use pd_motion_curve, only: curve_type
   implicit none (type, external)
@@ -38,7 +40,9 @@ module pd_motion_heating
 contains
 
   !> Heating of a body whose model has been made with the full temperature changes.
-  subroutine new_heating(expansion, course, curves, heating, timed)
+  subroutine new_heating(order, expansion, course, curves, heating, timed)
+    type(order_type), intent(in) :: order          !! which ranks there are: all have a heating or
+                                                   !! none
     real(wp), intent(in) :: expansion(:)           !! alpha dT of each slot at factor 1 [-]
     integer(i2), intent(in) :: course(:)           !! number of the curve of each slot, or 0
     type(curve_type), intent(in) :: curves(:)      !! factors over time
@@ -52,6 +56,7 @@ contains
     do i = 1, size(curves)
       varies = varies .or. (any(course == i) .and. any(abs(curves(i)%values - 1) > 0.0_wp))
     end do
+    varies = any_of_ranks(order, varies)
     if (present(timed)) varies = varies .or. any(timed%is_there)
     if (.not. varies) return
     if (present(timed)) allocate (heating%timed, source=timed)
@@ -163,7 +168,8 @@ contains
 
   !> Thermal strains of course `i` a time `part` times `h` from those of time `t`, along their rate:
   !> `h` is chosen so that they change by little.
-  subroutine apply_rate(heating, i, t, part, expansion, h)
+  subroutine apply_rate(order, heating, i, t, part, expansion, h)
+    type(order_type), intent(in) :: order      !! which ranks there are: all call it
     type(heating_type), intent(in) :: heating  !! course `i` is an expression of t
     integer, intent(in) :: i                   !! number of the course
     real(wp), intent(in) :: t                  !! time [s]
@@ -179,9 +185,14 @@ contains
       call field_values(timed%value, t, values, at)
       call field_values(timed%rate, t, rates, at_rate)
       h = 0.0_wp
-      if (at > 0 .or. at_rate > 0 .or. size(rates) == 0) return
-      largest = maxval(abs(heating%full(timed%slots)*rates))
-      if (.not. largest > 0.0_wp) return
+      largest = 0.0_wp
+      if (at > 0 .or. at_rate > 0) then
+        largest = huge(largest)
+      else if (size(rates) > 0) then
+        largest = maxval(abs(heating%full(timed%slots)*rates))
+      end if
+      largest = largest_of_ranks(order, largest)
+      if (.not. (largest > 0.0_wp .and. largest < huge(largest))) return
       h = small/largest
       expansion(timed%slots) = heating%full(timed%slots)*(values + part*h*rates)
     end associate

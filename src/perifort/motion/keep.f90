@@ -14,7 +14,6 @@ module pd_motion_keep
   use pd_motion_account, only: rows_of_work
   use pd_motion_conditions, only: keep_paths, keep_poses
   use pd_motion_heating, only: keep_heating
-  use pd_motion_loads, only: other_terms
   use pd_motion_memory, only: keep_memory
   use pd_motion_rigid_body, only: keep_body
   use pd_motion_system, only: system_type
@@ -33,9 +32,8 @@ contains
     real(wp), allocatable :: reactions(:, :)
     integer :: m
 
-    if (archive%merges .and. (other_terms(system%terms) > 0 .or. &
-      & system%model%generic)) call fail(archive%error, 'what the terms of the force and laws '// &
-      & 'with a history keep is for the same number of ranks only')
+    if (archive%merges .and. system%model%generic) call fail(archive%error, 'what laws with a '// &
+      & 'history keep is for the same number of ranks only')
     call name_slots(archive, system%body)
     call archive%over(of_slots)
     call archive%keep('displacement', system%state%u)

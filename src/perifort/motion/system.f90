@@ -641,10 +641,10 @@ contains
       load%on_held = pack([(i, i=1, size(load%slots))], any(system%held(load%slots, :) == 1_i1, 2))
       if (size(load%on_held) > 0) system%loaded_and_held = .true.
     end do
-    system%loaded_and_held = any_of_ranks(system%body%order, system%loaded_and_held)
     ! other external terms may act anywhere
     if (system%terms%outside > number_of_loads(system%terms)) &
       & system%loaded_and_held = system%loaded_and_held .or. any(system%held == 1_i1)
+    system%loaded_and_held = any_of_ranks(system%body%order, system%loaded_and_held)
   end subroutine find_loaded
 
   !> Bring the system's `applied` to time `t`: the force density of loads and other external terms

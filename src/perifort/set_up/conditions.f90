@@ -180,9 +180,9 @@ contains
       end associate
     end do
     if (any(timed%is_there)) then
-      call new_heating(expansion, heated_by, curves, heating, timed)
+      call new_heating(body%order, expansion, heated_by, curves, heating, timed)
     else
-      call new_heating(expansion, heated_by, curves, heating)
+      call new_heating(body%order, expansion, heated_by, curves, heating)
     end if
   end subroutine heating_of_scene
 

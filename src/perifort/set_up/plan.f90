@@ -2,7 +2,7 @@
 module pd_set_up_plan
   use pd_base_kinds, only: wp
   use pd_base_error, only: error_type, internal_fault
-  use pd_base_reduce, only: any_of_ranks, least_over
+  use pd_base_reduce, only: any_of_ranks, largest_of_ranks, least_over
   use pd_base_text, only: to_text
   use pd_set_up_substeps, only: bound_by_levels
   use pd_scene_content_rules, only: scene_fault
@@ -171,6 +171,8 @@ contains
       stiffness = max(stiffness, rows(k)*inverse_density(system%model, k))
       damping = max(damping, rates(k)*inverse_density(system%model, k))
     end do
+    stiffness = largest_of_ranks(system%body%order, stiffness)
+    damping = largest_of_ranks(system%body%order, damping)
   end subroutine bound_terms
 
   !> The fictitious mass of every component, for a step of 1.

@@ -15,6 +15,7 @@ module pd_set_up_ranks
   use pd_family_volume, only: reach, volume_rule_type
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: has_refinement, scene_type, is_set
+  use pd_set_up_terms, only: sides_of_contact
   implicit none (type, external)
   private
   public :: check_ranks, divide_body, divide_survey, find_lowest, work_of_body, join_ranks, &
@@ -48,27 +49,13 @@ contains
       & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
     do i = 1, size(scene%boundaries)
       if (scene%boundaries(i)%motion == 'pin') call refuse('boundary', i, 'motion', 'a pin')
-      if (scene%boundaries(i)%absorbing) &
-        & call refuse('boundary', i, 'absorbing', 'an absorbing boundary')
     end do
-    do i = 1, size(scene%loads)
-      if (any(is_set(scene%loads(i)%stiffness))) call refuse('load', i, 'stiffness_x', 'springs')
+    do i = 1, size(scene%contacts)
+      if (any(sides_of_contact(scene, i) > 0)) call refuse('contact', i, '', &
+        & 'contact of points with points')
     end do
-    do i = 1, size(scene%initial)
-      if (scene%initial(i)%file /= '') call refuse('initial', i, 'file', 'a file of initial values')
-      if (is_set(scene%initial(i)%temperature_change) .or. &
-        & scene%initial(i)%temperature_text /= '') call refuse('initial', i, &
-        & 'temperature_change', 'a temperature change')
-    end do
-    if (size(scene%rigids) > 0) call refuse('rigid', 1, '', '&rigid')
-    if (size(scene%contacts) > 0) call refuse('contact', 1, '', '&contact')
     if (size(scene%tips) > 0) call refuse('tip', 1, '', '&tip')
-    if (size(scene%sections) > 0) call refuse('section', 1, '', '&section')
-    if (size(scene%lines) > 0) call refuse('line', 1, '', '&line')
     if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
-    do i = 1, size(scene%probes)
-      if (scene%probes(i)%interpolate) call refuse('probe', i, 'interpolate', 'interpolation')
-    end do
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
     if (scene%output%fragments) call refuse('output', 1, 'fragments', 'fragments')
     if (allocated(scene%output%fields)) then

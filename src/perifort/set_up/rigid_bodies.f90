@@ -3,7 +3,7 @@ module pd_set_up_rigid_bodies
   use pd_base_error, only: error_type, internal_fault
   use pd_base_expression, only: derivative_in_time, expression_type
   use pd_base_field, only: new_field
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i8
   use pd_base_numbers, only: pi
   use pd_base_text, only: counted, to_text
   use pd_base_vectors, only: cross
@@ -240,16 +240,17 @@ contains
     type(system_type), intent(in), target :: system       !! begun
     type(error_type), allocatable, intent(out) :: error
     type(term_view_type) :: view
-    integer :: r, within, first
+    integer(i8) :: within, first
+    integer :: r
 
     if (size(scene%rigids) == 0) return
     call view_of(system, 0.0_wp, view)
     do r = 1, size(scene%rigids)
       call points_within(system%terms, view, r, within, first)
-      if (within == 0) cycle
-      call scene_fault(error, scene, 'rigid', r, 'centre', counted(within, 'point')// &
+      if (within == 0_i8) cycle
+      call scene_fault(error, scene, 'rigid', r, 'centre', counted(int(within), 'point')// &
         & " that may touch the rigid body '"//trim(scene%rigids(r)%name)// &
-        & "' are within it at the start", 'point '//to_text(int(system%body%point(first)))// &
+        & "' are within it at the start", 'point '//to_text(first)// &
         & ' is the first: points must be outside of its surface')
       return
     end do

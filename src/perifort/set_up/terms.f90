@@ -1,6 +1,7 @@
 !> What acts on a scene's points beside bonds and loads: gravity, springs, absorbing boundaries.
 module pd_set_up_terms
   use pd_base_kinds, only: wp
+  use pd_base_reduce, only: largest_of_ranks
   use pd_body_body, only: body_type
   use pd_body_waves, only: longitudinal_speed, shear_speed
   use pd_family_volume, only: volume_rule_type
@@ -83,8 +84,8 @@ contains
         axis = index('xyz', side(1:1))
         direction = merge(-1.0_wp, 1.0_wp, side(3:5) == 'min')
         allocate (damping(size(slots), body%dim))
-        outermost = maxval(direction*body%x(slots, axis))
-        width = outermost - minval(direction*body%x(slots, axis))
+        outermost = largest_of_ranks(body%order, maxval(direction*body%x(slots, axis)))
+        width = outermost + largest_of_ranks(body%order, maxval(-direction*body%x(slots, axis)))
         do i = 1, size(slots)
           k = slots(i)
           rows = nint(width/body%spacing(k)) + 1

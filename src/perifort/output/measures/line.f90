@@ -4,7 +4,7 @@ module pd_output_measures_line
   use pd_base_kinds, only: wp
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_body_body, only: body_type
-  use pd_output_fields_between, only: is_inside, stencil_at, stencil_type, values_between
+  use pd_output_fields_between, only: choose_ranks, find_spots, spots_type, values_at_spots
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_probe, only: nearest_slots
@@ -18,7 +18,8 @@ module pd_output_measures_line
   !> A line of a scene.
   type :: profile_type
     type(line_type) :: line                      !! how the results hold it
-    integer, allocatable :: nearest(:)           !! slot of the nearest point to each position
+    integer, allocatable :: nearest(:)           !! slot of the nearest owned point to each position
+    logical, allocatable :: here(:)              !! of all ranks this one has the nearest
     type(output_field_type), allocatable :: fields(:)
   end type profile_type
 
@@ -47,6 +48,7 @@ contains
           line%positions(p, :) = place(:d)
         end do
         profiles(i)%nearest = nearest_slots(body, line%positions)
+        call choose_ranks(body, profiles(i)%nearest, line%positions, profiles(i)%here)
         do f = 1, size(group%fields)
           profiles(i)%fields(f) = table%field(trim(group%fields(f)))
           associate (field => profiles(i)%fields(f), entry => line%fields(f))
@@ -70,32 +72,28 @@ contains
     type(profile_type), intent(in) :: profiles(:)
     type(moment_type), intent(in) :: now
     type(error_type), allocatable, intent(out) :: error
-    type(stencil_type), allocatable :: stencils(:)
+    type(spots_type) :: spots
     real(wp), allocatable :: values(:, :), table(:, :)
     integer :: i, p, f, first, n
 
     do i = 1, size(profiles)
       associate (line => profiles(i)%line, nearest => profiles(i)%nearest)
-        allocate (stencils(size(nearest)))
-        do p = 1, size(nearest)
-          call stencil_at(now%system, nearest(p), line%positions(p, :), stencils(p))
-        end do
+        call find_spots(now%system, nearest, profiles(i)%here, line%positions, spots)
         allocate (table(sum(line%fields%components), size(nearest)))
         first = 1
         do f = 1, size(line%fields)
           n = line%fields(f)%components
           allocate (values(n, size(nearest)))
-          call values_between(profiles(i)%fields(f), now, stencils, values)
+          call values_at_spots(profiles(i)%fields(f), now, spots, values)
           table(first:first + n - 1, :) = values
           first = first + n
           deallocate (values)
         end do
         do p = 1, size(nearest)
-          if (.not. is_inside(now%system, nearest(p), line%positions(p, :))) &
-            & table(:, p) = ieee_value(1.0_wp, ieee_quiet_nan)
+          if (.not. spots%inside(p)) table(:, p) = ieee_value(1.0_wp, ieee_quiet_nan)
         end do
         call results%put_line(i, table, error)
-        deallocate (stencils, table)
+        deallocate (table)
       end associate
       if (allocated(error)) return
     end do

@@ -9,7 +9,7 @@ module pd_output_measures_probe
   use pd_body_shapes, only: touch
   use pd_family_cells, only: cells_around, cells_type, sort_into_cells
   use pd_motion_system, only: system_type
-  use pd_output_fields_between, only: stencil_at, stencil_type, values_between
+  use pd_output_fields_between, only: find_spots, spots_type, values_at_spots
   use pd_output_fields_field, only: output_field_type
   use pd_output_fields_table, only: field_table_type
   use pd_output_measures_measure, only: measure_list_type, measure_type, row_source_type
@@ -82,7 +82,7 @@ contains
     end do
   end function nearest_slot
 
-  !> The slots of the points that are nearest to many places, as of `nearest_slot`.
+  !> The slots of the owned points that are nearest to many places, as of `nearest_slot`.
   function nearest_slots(body, places) result(slots)
     type(body_type), intent(in) :: body   !! points
     real(wp), intent(in) :: places(:, :)  !! (place, dim) where [m]
@@ -93,8 +93,10 @@ contains
     integer :: i, p, point
 
     allocate (slots(size(places, 1)))
-    width = 2*maxval(body%spacing(body%slot))
-    call sort_into_cells(body%x(body%slot, :), width, cells)
+    associate (owned => body%slot(:body%order%n_owned))
+      width = 2*maxval(body%spacing(owned))
+      call sort_into_cells(body%x(owned, :), width, cells)
+    end associate
     do p = 1, size(slots)
       call cells_around(cells, places(p, :), around)
       least = huge(least)
@@ -175,20 +177,22 @@ contains
     class(probe_measure_type), intent(inout) :: measure
     type(row_source_type), intent(in) :: now
     real(wp), intent(out) :: values(:)
-    type(stencil_type) :: stencil(1)
+    type(spots_type) :: spots
     real(wp), allocatable :: of_field(:, :)
     integer :: f, first
 
-    if (measure%interpolate) call stencil_at(now%system, int(measure%slot), &
-      & measure%place(:now%system%body%dim), stencil(1))
+    associate (dim => now%system%body%dim)
+      if (measure%interpolate) call find_spots(now%system, [int(measure%slot)], [measure%here], &
+        & reshape(measure%place(:dim), [1, dim]), spots)
+    end associate
     first = 1
     values = 0.0_wp
     do f = 1, size(measure%fields)
-      if (.not. measure%here) exit
+      if (.not. (measure%here .or. measure%interpolate)) exit
       associate (field => measure%fields(f))
         allocate (of_field(field%components(now%system%body%dim), 1))
         if (measure%interpolate) then
-          call values_between(field, now%moment_type, stencil, of_field)
+          call values_at_spots(field, now%moment_type, spots, of_field)
         else
           call field%values_at(now%moment_type, [int(measure%slot)], of_field)
         end if
@@ -197,6 +201,7 @@ contains
         deallocate (of_field)
       end associate
     end do
+    if (measure%interpolate) return
     ! the other ranks add zeros
     if (associated(now%system%body%order%ranks)) &
       & call now%system%body%order%ranks%add_all(values)

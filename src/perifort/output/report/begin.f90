@@ -4,6 +4,7 @@ module pd_output_report_begin
   use pd_base_clock, only: output_is_terminal
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_reduce, only: largest_of_ranks
   use pd_base_version, only: program_version
   use pd_body_refine, only: level_of
   use pd_scene_content_types, only: has_refinement, scene_type
@@ -67,6 +68,7 @@ contains
     type(field_table_type) :: table
     type(error_type), allocatable :: ignored
     character(:), allocatable :: command
+    real(wp) :: low(3), high(3)
     integer :: f, c
 
     if (restart%found) kept = restart%about%kept
@@ -91,7 +93,11 @@ contains
         call gather(body, body%volume, volume)
         call cells_of(body%parts, positions, volume, cells)
       end if
-      call recorder%surfaces%begin(system, minval(positions, dim=1), maxval(positions, dim=1))
+      do c = 1, 3
+        low(c) = -largest_of_ranks(body%order, -minval(positions(:, c)))
+        high(c) = largest_of_ranks(body%order, maxval(positions(:, c)))
+      end do
+      call recorder%surfaces%begin(system, low, high)
       command = text_of(options%command)
       call recorder%results%create(directory, stem, positions, &
         & [(recorder%fields(f)%in_file(body%dim), f=1, size(recorder%fields))], &
