@@ -11,7 +11,7 @@ module pd_motion_explicit_spectrum
   use pd_base_numbers, only: pi
   use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, bring_noise
   use pd_body_body, only: owned
-  use pd_law_material, only: material_type
+  use pd_law_material, only: material_type, several_stiffnesses
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: bond_factors_of, force_options_type, model_type, options_of, q_of, t_of
@@ -193,10 +193,12 @@ contains
 
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
   !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0;
-  !> and with consistent weights on a mesh, some of which are far below 0.
+  !> and with consistent weights on a mesh or of materials of different stiffness, some of which are
+  !> far below 0.
   pure logical function may_be_unstable(system)
     type(system_type), intent(in) :: system  !! with its model
-    may_be_unstable = (system%model%consistent .and. size(system%body%parts) > 0) .or. &
+    may_be_unstable = (system%model%consistent .and. (size(system%body%parts) > 0 .or. &
+      & several_stiffnesses(system%model%materials))) .or. &
       & (system%model%dilatation .and. system%model%surface .and. &
       & any(system%model%materials%a < 0.0_wp .and. &
       & system%model%materials%poissons_ratio < suspicious_ratio))

@@ -6,7 +6,7 @@ module pd_set_up_consistent_rules
   use pd_body_body, only: body_type
   use pd_body_mesh_part, only: count_pieces, count_twins
   use pd_body_meshes, only: balance_surface
-  use pd_law_material, only: material_type
+  use pd_law_material, only: material_type, several_stiffnesses
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: has_cut_cells, is_set, scene_type
@@ -14,8 +14,6 @@ module pd_set_up_consistent_rules
   implicit none (type, external)
   private
   public :: check_consistent, prepare_surface, weigh_bonds
-
-  real(wp), parameter :: same = 1.0e-12_wp  !! part of a modulus that may differ
 
 contains
 
@@ -59,15 +57,11 @@ contains
         & "its weights are known for the chapter's laws with influence = 'inverse'")
       return
     end do
-    do i = 2, size(scene%materials)
-      associate (one => system%model%materials(1), other => system%model%materials(i))
-        if (abs(one%shear_modulus - other%shear_modulus) <= same*one%shear_modulus &
-          & .and. abs(one%bulk_modulus - other%bulk_modulus) <= same*one%bulk_modulus) cycle
-      end associate
-      call refuse('material', i, '', 'materials of different stiffness', &
-        & 'weights at their interface may leave a body that gives way')
+    if (size(system%body%parts) > 0 .and. several_stiffnesses(system%model%materials)) then
+      call refuse('material', 2, '', 'materials of different stiffness in a mesh', &
+        & 'the areas of the facets between them are not shared')
       return
-    end do
+    end if
     if (scene%header%precision == 'mixed') then
       call refuse('scene', 1, 'precision', "precision = 'mixed'", &
         & 'its conditions hold to rounding in double precision')
