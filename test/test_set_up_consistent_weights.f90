@@ -5,6 +5,7 @@ module test_set_up_consistent_weights
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: allocate_points, body_type
   use pd_body_meshes, only: surface_areas
+  use pd_body_side_areas, only: total_areas
   use pd_family_areas, only: area_vectors
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_linear, volume_rule_type
@@ -46,6 +47,8 @@ contains
       & test_uniform), &
       & new_unittest('long: uniform strains of bodies of two materials', test_two_materials), &
       & new_unittest('two materials in series', test_series), &
+      & new_unittest('grids of several spacings and offsets that touch', test_grids), &
+      & new_unittest('loads on sides and held layers of refined plates', test_refined), &
       & new_unittest('a rotated strip of points without a lattice', test_clouds), &
       & new_unittest('meshes of every shape in the plane', test_meshes), &
       & new_unittest('a pulled mesh is strained uniformly', test_pulled_mesh), &
@@ -171,7 +174,7 @@ contains
         call area_vectors(system%body, system%family, m%shear_modulus, of_stretch, alone)
         call area_vectors(system%body, system%family, [sign(1.0_wp, m(1)%a)], of_dilatation, alone)
         call weights_of_areas(system%body, system%family, m, of_stretch, of_dilatation, .true., &
-          & .false., weights, b, d, fault)
+          & [.false., .false.], weights, b, d, fault)
         if (allocated(fault)) then
           call test_failed(error, fault%message)
           return
@@ -250,7 +253,11 @@ contains
     allocate (p(merge(system%body%n_slots, 0, system%model%dilatation)), source=0.0_wp)
     allocate (energy(system%body%n_slots), strained(0))
     associate (body => system%body, m => system%model%materials)
-      if (size(body%parts) > 0) then
+      if (allocated(body%sides)) then
+        of_mu = total_areas(body%sides, body%n_slots, body%dim)
+        of_lambda = maxval(lame_of(m, body%dim))*of_mu
+        of_mu = maxval(shear_of(m, body%dim))*of_mu
+      else if (size(body%parts) > 0) then
         call surface_areas(body, of_mu, fault)
         of_lambda = maxval(lame_of(m, body%dim))*of_mu
         of_mu = maxval(shear_of(m, body%dim))*of_mu
@@ -492,6 +499,125 @@ contains
     if (dim == 1) mu = m%youngs_modulus/2
   end function shear_of
 
+  !> A scene of dimension `dim` at rest with bodies, and what else is in `groups`, by its text.
+  function grid_scene(dim, groups) result(text)
+    integer, intent(in) :: dim
+    character(*), intent(in) :: groups
+    character(:), allocatable :: text
+    text = '&scene dimension = '//achar(iachar('0') + dim)//' thickness = 0.002 area = 3e-4 /'// &
+      & lf//"&material name = 'steel' youngs_modulus = 2e11 density = 7800 poissons_ratio = 0.3 /" &
+      & //lf// &
+      & "&time method = 'relaxation' /"//lf// &
+      & "&relaxation solver = 'conjugate_gradient' tolerance = 1e-12 /"//lf//groups//lf
+  end function grid_scene
+
+  !> Uniform strains where grids touch: refined in part, at an edge and inside; spacings of 1:2 with
+  !> a horizon each, and with one; cells offset by half a cell, whose faces cover one another in
+  !> part. The balanced areas have the moments of the body, and hardly differ from 1.5 and -0.5.
+  !> Bodies that do not touch have none, and are as before.
+  subroutine test_grids(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = '&body lower = 0, 0 upper = 0.16, 0.12 points = 16, 12 /', &
+      & weighted = "&horizon surface_correction = 'consistent' /", &
+      & coarse = "&body name = 'a' lower = 0, 0 upper = 0.08, 0.12 points = 8, 12 /"//lf, &
+      & fine = "&body name = 'b' lower = 0.08, 0 upper = 0.16, 0.12 points = 16, 24 /"//lf, &
+      & offset = "&body name = 'b' lower = 0.08, 0.005 upper = 0.16, 0.115 points = 8, 11 /"//lf, &
+      & apart = "&body name = 'b' lower = 0.09, 0 upper = 0.17, 0.12 points = 16, 24 /"//lf
+    character(200) :: groups(8)
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: area(:, :), moment(:, :)
+    integer :: i, c, d, dim
+
+    groups = [character(200) :: &
+      & '&body lower = 0 upper = 0.2 points = 20 /'//lf//"&refine where = 'x > 0.1' /"//weighted, &
+      & plate//lf//"&refine where = 'x > 0.08' /"//weighted, &
+      & plate//lf//"&refine shape = 'cylinder' centre = 0.07, 0 radius = 0.045 /"//weighted, &
+      & plate//lf//"&refine shape = 'box' lower = 0.05, 0.03 upper = 0.1, 0.08 /"//weighted, &
+      & coarse//fine//weighted, &
+      & coarse//fine//"&horizon surface_correction = 'consistent' length = 0.03015 /", &
+      & coarse//offset//weighted, &
+      & '&body lower = 0, 0, 0 upper = 0.06, 0.04, 0.04 points = 6, 4, 4 /'//lf// &
+      & "&refine where = 'x > 0.03' /"//weighted]
+    do i = 1, size(groups)
+      dim = merge(1, merge(3, 2, i == 8), i == 1)
+      call ready_of_text(grid_scene(dim, trim(groups(i))), set_up, fault)
+      if (allocated(fault)) then
+        call test_failed(error, 'grids '//text_of(real(i, wp))//': '//fault%message)
+        return
+      end if
+      call expect_true(error, allocated(set_up%system%body%sides), 'no sides')
+      if (allocated(error)) return
+      call strain_all(set_up%system, 'grids '//text_of(real(i, wp)), error)
+      if (allocated(error)) return
+      associate (body => set_up%system%body)
+        area = total_areas(body%sides, body%n_slots, dim)
+        moment = matmul(transpose(area), body%x)
+        do c = 1, dim
+          call expect(error, sum(area(:, c)), 0.0_wp, 1.0e-9_wp*sum(abs(area)), 'sum of areas')
+          do d = 1, dim
+            call expect(error, moment(c, d), merge(sum(body%volume), 0.0_wp, c == d), &
+              & 1.0e-9_wp*sum(body%volume), 'areas and positions')
+          end do
+        end do
+        ! in the middle of a coarse face
+        if (i /= 2) cycle
+        c = at_point(body, [0.005_wp, 0.055_wp])
+        call expect_close(error, area(c, :), [-1.5_wp, 0.0_wp]*spacing*2.0e-3_wp, &
+          & 0.4_wp*spacing*2.0e-3_wp, 'at a face')
+      end associate
+    end do
+    call ready_of_text(grid_scene(2, coarse//apart// &
+      & "&horizon surface_correction = 'consistent' length = 0.03015 /"), set_up, fault)
+    call expect_true(error, .not. allocated(set_up%system%body%sides), 'bodies apart have sides')
+  end subroutine test_grids
+
+  !> A refined plate under pressures and forces on its sides, and with held layers.
+  subroutine test_refined(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: plate = &
+      & '&body lower = 0, 0 upper = 0.16, 0.12 points = 16, 12 /'//lf// &
+      & "&refine where = 'x > 0.08' /"//lf//"&horizon surface_correction = 'consistent' /"//lf, &
+      & strain = "displacement_x = '1e-11*x' displacement_y = '-0.3e-11*y' /"//lf
+    type(set_up_type) :: set_up
+    type(scene_type) :: scene
+    type(fault_type), allocatable :: fault
+    integer :: i
+
+    do i = 1, 3
+      if (i == 1) call read_scene_text(grid_scene(2, plate// &
+        & "&load side = 'x_min' pressure = -2 /"//lf//"&load side = 'x_max' pressure = -2 /"), &
+        & 'grids', scene, fault)
+      if (i == 2) call read_scene_text(grid_scene(2, plate// &
+        & "&load side = 'x_min' force_x = -4.8e-4 /"//lf// &
+        & "&load side = 'x_max' force_x = '4.8e-4' /"), 'grids', scene, fault)
+      if (i == 3) call read_scene_text(grid_scene(2, plate//"&boundary side = 'x_min' "//strain// &
+        & "&boundary side = 'x_max' "//strain), 'grids', scene, fault)
+      if (allocated(fault)) then
+        call test_failed(error, fault%message)
+        return
+      end if
+      call uniform_at_rest(scene, [zeta, -0.3_wp*zeta], 'refined '//text_of(real(i, wp)), error)
+      if (allocated(error)) return
+    end do
+    ! a side under a layer has no free face
+    call ready_of_text(grid_scene(2, plate//"&boundary side = 'x_min' "//strain// &
+      & "&load side = 'x_min' pressure = -2 /"), set_up, fault)
+    call expect_true(error, allocated(fault), 'not refused: a load under a layer')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'have no free face') > 0, fault%message)
+    ! several materials between grids
+    call ready_of_text(grid_scene(2, &
+      & "&material name = 'soft' youngs_modulus = 1e11 density = 1 poissons_ratio = 0.3 /"//lf// &
+      & "&body name = 'a' material = 'soft' lower = 0, 0 upper = 0.08, 0.12 points = 8, 12 /"// &
+      & lf//"&body name = 'b' material = 'steel' lower = 0.08, 0 upper = 0.16, 0.12 "// &
+      & 'points = 16, 24 /'//lf//"&horizon surface_correction = 'consistent' /"), set_up, fault)
+    call expect_true(error, allocated(fault), 'not refused: several materials')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'materials of different stiffness on lattices') &
+      & > 0, fault%message)
+  end subroutine test_refined
+
   !> A strip at 30 degrees to the axes, as a cloud, with the areas of the straight strip turned with
   !> it.
   subroutine test_clouds(error)
@@ -536,7 +662,7 @@ contains
     allocate (theta(body%n_slots))
     a(body%slot, :) = matmul(area, transpose(R(:2, :2)))
     call weights_of_areas(body, family, [material], material%shear_modulus*a, &
-      & sign(1.0_wp, material%a)*a, .false., .true., model%weights, b, d, fault)
+      & sign(1.0_wp, material%a)*a, .false., [.true., .true.], model%weights, b, d, fault)
     if (allocated(fault)) then
       call test_failed(error, fault%message)
       return
