@@ -50,6 +50,7 @@ contains
       & new_unittest('grids of several spacings and offsets that touch', test_grids), &
       & new_unittest('loads on sides and held layers of refined plates', test_refined), &
       & new_unittest('a rotated strip of points without a lattice', test_clouds), &
+      & new_unittest('clouds whose surface areas are found', test_outlines), &
       & new_unittest('meshes of every shape in the plane', test_meshes), &
       & new_unittest('a pulled mesh is strained uniformly', test_pulled_mesh), &
       & new_unittest('what consistent weights do not serve of meshes is refused', &
@@ -614,9 +615,120 @@ contains
       & 'points = 16, 24 /'//lf//"&horizon surface_correction = 'consistent' /"), set_up, fault)
     call expect_true(error, allocated(fault), 'not refused: several materials')
     if (allocated(error)) return
-    call expect_true(error, index(fault%message, 'materials of different stiffness on lattices') &
+    call expect_true(error, index(fault%message, 'materials of different stiffness in clouds') &
       & > 0, fault%message)
   end subroutine test_refined
+
+  !> Uniform strains of clouds: a bar, a strip at 30 degrees, a plate with a hole and a block, of
+  !> points that are off their places by up to 0.3 of a spacing, with volumes of 0.8 to 1.2 cells;
+  !> their areas have the moments of the body, and the sum of their outward parts is that of a
+  !> side. The centres of tetrahedra four cells across have weights that leave the body unstable,
+  !> and are refused.
+  subroutine test_outlines(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: dims(*) = [1, 2, 2, 3, 3]
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    real(wp), allocatable :: area(:, :), moment(:, :)
+    integer :: i, c, d
+
+    do i = 1, size(dims)
+      call put_cloud(i)
+      call ready_of_text(grid_scene(dims(i), "&body file = 'consistent.txt' /"//lf// &
+        & "&horizon surface_correction = 'consistent' /"), set_up, fault)
+      if (i == 5) then
+        call expect_true(error, allocated(fault), 'not refused: tetrahedra')
+        if (allocated(error)) return
+        call expect_true(error, index(fault%message, 'makes this body unstable') > 0, fault%message)
+        exit
+      end if
+      if (allocated(fault)) then
+        call test_failed(error, 'cloud '//text_of(real(i, wp))//': '//fault%message)
+        return
+      end if
+      call strain_all(set_up%system, 'cloud '//text_of(real(i, wp)), error)
+      if (allocated(error)) return
+      associate (body => set_up%system%body)
+        area = total_areas(body%sides, body%n_slots, body%dim)
+        moment = matmul(transpose(area), body%x)
+        do c = 1, body%dim
+          call expect(error, sum(area(:, c)), 0.0_wp, 1.0e-9_wp*sum(abs(area)), 'sum of areas')
+          do d = 1, body%dim
+            call expect(error, moment(c, d), merge(sum(body%volume), 0.0_wp, c == d), &
+              & 1.0e-9_wp*sum(body%volume), 'areas and positions')
+          end do
+        end do
+        ! the right side of the plate with a hole and half of the hole
+        if (i /= 3) cycle
+        call expect(error, sum(area(:, 1), mask=body%x(:, 1) > 0.15_wp), 0.14_wp*2.0e-3_wp, &
+          & 0.05_wp*0.14_wp*2.0e-3_wp, 'the right side')
+      end associate
+    end do
+    call put_cloud(2)
+    call ready_of_text(grid_scene(2, "&body name = 'a' file = 'consistent.txt' /"//lf// &
+      & "&body name = 'b' lower = 1, 0 upper = 1.1, 0.1 points = 10, 10 /"//lf// &
+      & "&horizon surface_correction = 'consistent' /"), set_up, fault)
+    call expect_true(error, allocated(fault), 'not refused: a cloud beside a lattice')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'a cloud beside other bodies') > 0, fault%message)
+    call write_file('consistent.txt', '0 0 0 1'//lf//'1 0 0 1'//lf//'0 1 0 9'//lf)
+    call ready_of_text(grid_scene(2, "&body file = 'consistent.txt' /"//lf// &
+      & "&horizon surface_correction = 'consistent' /"), set_up, fault)
+    call expect_true(error, allocated(fault), 'not refused: uneven spacings')
+    if (allocated(error)) return
+    call expect_true(error, index(fault%message, 'a cloud whose spacings differ') > 0, &
+      & fault%message)
+  end subroutine test_outlines
+
+  !> Write cloud `number` as build/consistent.txt.
+  subroutine put_cloud(number)
+    integer, intent(in) :: number
+    real(wp), parameter :: turn(2, 2) = reshape([0.866025403784438647_wp, 0.5_wp, -0.5_wp, &
+      & 0.866025403784438647_wp], [2, 2])
+    integer, parameter :: cells(3, 5) = reshape([20, 1, 1, 18, 12, 1, 20, 14, 1, 8, 6, 6, &
+      & 4, 4, 4], [3, 5]), order(3, 6) = reshape([1, 2, 3, 1, 3, 2, 2, 1, 3, 2, 3, 1, 3, 1, 2, &
+      & 3, 2, 1], [3, 6]), dims(5) = [1, 2, 2, 3, 3]
+    character(:), allocatable :: text
+    character(100) :: line
+    real(wp) :: x(3), corner(3), depth
+    integer :: i, j, k, c, t, seed
+
+    text = ''
+    seed = 7
+    depth = 1.0_wp
+    if (dims(number) == 2) depth = 2.0e-3_wp
+    if (dims(number) == 1) depth = 3.0e-4_wp
+    do k = 1, cells(3, number)
+      do j = 1, cells(2, number)
+        do i = 1, cells(1, number)
+          do t = 1, merge(6, 1, number == 5)
+            x = [i, j, k] - 0.5_wp
+            if (number == 5) then
+              ! the centre of a tetrahedron between two corners of the cell
+              x = [i, j, k] - 1.0_wp
+              corner = x
+              do c = 1, 3
+                corner(order(c, t)) = corner(order(c, t)) + 1
+                x = x + (corner - [i, j, k] + 1)/4
+              end do
+            else
+              do c = 1, dims(number)
+                x(c) = x(c) + merge(0.2_wp, 0.3_wp, number == 4)*noise(seed)
+              end do
+            end if
+            if (number == 3 .and. norm2(x(:2) - [10, 7]) < 3.5_wp) cycle
+            x(dims(number) + 1:) = 0.0_wp
+            x = spacing*x
+            if (number == 2) x(:2) = matmul(turn, x(:2))
+            write (line, '(4(es24.16, 1x))') x, depth*spacing**dims(number)*merge(1/6.0_wp, &
+              & 1 + 0.2_wp*noise(seed), number == 5)
+            text = text//trim(line)//lf
+          end do
+        end do
+      end do
+    end do
+    call write_file('consistent.txt', text)
+  end subroutine put_cloud
 
   !> A strip at 30 degrees to the axes, as a cloud, with the areas of the straight strip turned with
   !> it.

@@ -36,23 +36,15 @@ contains
     real(wp), allocatable :: multiplier(:), values(:, :)
     real(wp) :: origin(size(x, 2)), scale, total
     logical :: linear
-    integer :: dim, n, k, s, e
+    integer, parameter :: passes = 3
+    integer :: dim, n, s, pass
 
     dim = size(x, 2)
     n = number_of_fields(dim)
     allocate (w(dim, n), divergence(n), matrix(n, n), right(n), multiplier(n))
     call frame_of(x, volume, origin, scale)
     total = sum(volume)/scale
-    right = 0.0_wp
-    do k = 1, size(volume)
-      if (.not. volume(k) > 0.0_wp) cycle
-      call fields_at((x(k, :) - origin)/scale, w, divergence)
-      right = right + volume(k)/scale*divergence
-    end do
-    do e = 1, size(sides%slot)
-      call fields_at((x(sides%slot(e), :) - origin)/scale, w, divergence)
-      right = right - matmul(sides%area(:, e), w)
-    end do
+    call find_missing(right)
     linear = maxval(abs(right(:dim*(dim + 1)))) <= flat*total
     do
       matrix = 0.0_wp
@@ -67,12 +59,35 @@ contains
       linear = .false.
     end do
     if (.not. found) return
-    do s = 1, size(sides%axis)
-      call fields_of_side(s, values)
-      call change_side(s, matmul(values, multiplier))
+    ! what rounding leaves of the sums would stay in the conditions on weights
+    do pass = 1, passes
+      do s = 1, size(sides%axis)
+        call fields_of_side(s, values)
+        call change_side(s, matmul(values, multiplier))
+      end do
+      if (pass == passes) exit
+      call find_missing(missing)
+      call solve_moments(matrix, missing, multiplier)
     end do
 
   contains
+
+    !> What the areas miss of each sum.
+    subroutine find_missing(right)
+      real(wp), intent(out) :: right(:)
+      integer :: k, e
+
+      right = 0.0_wp
+      do k = 1, size(volume)
+        if (.not. volume(k) > 0.0_wp) cycle
+        call fields_at((x(k, :) - origin)/scale, w, divergence)
+        right = right + volume(k)/scale*divergence
+      end do
+      do e = 1, size(sides%slot)
+        call fields_at((x(sides%slot(e), :) - origin)/scale, w, divergence)
+        right = right - matmul(sides%area(:, e), w)
+      end do
+    end subroutine find_missing
 
     !> What a unit of each multiplier changes the entries of a side by, over the root of the face:
     !> (entries, fields), for a side without axis its components one after another.

@@ -10,6 +10,7 @@ module pd_set_up_consistent_rules
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
   use pd_family_free_faces, only: find_sides, grids_touch
+  use pd_family_outline, only: cloud_side, uneven
   use pd_law_material, only: material_type, several_stiffnesses
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
@@ -50,8 +51,18 @@ contains
         return
       end if
       if (scene%bodies(i)%file == '') cycle
-      call refuse('body', i, 'file', 'a cloud', 'the surface areas of its points are not known')
-      return
+      if (size(scene%bodies) > 1) then
+        call refuse('body', i, 'file', 'a cloud beside other bodies', &
+          & 'the surface between bodies that touch is not known')
+        return
+      end if
+      associate (h => system%body%spacing, there => system%body%point > 0)
+        if (maxval(h, mask=there) > uneven*minval(h, mask=there)) then
+          call refuse('body', i, 'file', 'a cloud whose spacings differ by more than '// &
+            & to_text(uneven), 'its outline is found with one spacing')
+          return
+        end if
+      end associate
     end do
     do i = 1, size(system%model%laws)
       associate (law => system%model%laws(i)%law)
@@ -115,21 +126,29 @@ contains
       call place_fault(error, scene, 'body', 1, 'mesh')
       return
     end if
-    if (.not. grids_touch(body, family) .and. family%rule%ratio <= 0.0_wp) return
+    if (scene%bodies(1)%file == '') then
+      if (.not. grids_touch(body, family) .and. family%rule%ratio <= 0.0_wp) return
+    end if
     if (several_stiffnesses(materials)) then
       call scene_fault(error, scene, 'material', 2, '', &
         & "surface_correction = 'consistent' does not serve materials of different stiffness "// &
-        & 'on lattices of different spacings or offsets', 'the surface between them is not '// &
-        & "known; give surface_correction = 'energy' or 'none'")
+        & 'in clouds, or on lattices of different spacings or offsets', 'the surface between '// &
+        & "them is not known; give surface_correction = 'energy' or 'none'")
       return
     end if
-    call find_sides(body, family, sides, alone)
+    alone = 0
+    found = .true.
+    if (scene%bodies(1)%file == '') then
+      call find_sides(body, family, sides, alone)
+    else
+      call cloud_side(body, sides, found)
+    end if
     if (alone > 0) then
       call fail(error, alone_text(body, alone), group='horizon', number=1)
       call place_fault(error, scene, 'horizon', 1, 'surface_correction')
       return
     end if
-    call balance_sides(body%x, body%volume, sides, found)
+    if (found) call balance_sides(body%x, body%volume, sides, found)
     if (.not. found) then
       call scene_fault(error, scene, 'horizon', 1, 'surface_correction', 'no surface areas of '// &
         & "these points have the moments that surface_correction = 'consistent' needs", &
