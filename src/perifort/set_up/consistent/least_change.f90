@@ -66,12 +66,11 @@ contains
       ! without a solution the multipliers grow and the error stays
       history(newton) = residual
       if (newton > patience) then
-        if (residual > 0.5_wp*history(newton - patience)) return
-      end if
-      ! many thousand points that all differ leave more rounding
-      if (newton > 2 .and. size(levels) > 0) then
-        found = residual <= rounding .and. residual > 0.5_wp*history(newton - 2)
-        if (found) return
+        if (residual > 0.5_wp*history(newton - patience)) then
+          ! thousands of points that all differ leave more rounding
+          found = size(levels) > 0 .and. residual <= rounding
+          return
+        end if
       end if
       if (low > unbounded .and. iterations > most_of_bound) return
       free = t + 1 > low
