@@ -47,7 +47,7 @@ contains
       & test_uniform), &
       & new_unittest('long: uniform strains of bodies of two materials', test_two_materials), &
       & new_unittest('two materials in series', test_series), &
-      & new_unittest('grids of several spacings and offsets that touch', test_grids), &
+      & new_unittest('long: grids of several spacings and offsets that touch', test_grids), &
       & new_unittest('loads on sides and held layers of refined plates', test_refined), &
       & new_unittest('a rotated strip of points without a lattice', test_clouds), &
       & new_unittest('clouds whose surface areas are found', test_outlines), &
