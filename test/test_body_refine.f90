@@ -460,8 +460,6 @@ contains
       & '&refine in a scene whose body number 1 is no lattice|cut them out of a box by &keep')
     call refuse(error, plate//relaxes//"&refine shape = 'sphere' centre = 5, 0 radius = 0.5 /", &
       & '&refine number 1 refines no cell')
-    call refuse(error, plate//relaxes//ball//"&horizon surface_correction = 'consistent' /", &
-      & "&refine does not serve surface_correction = 'consistent'")
     call refuse(error, '&scene dimension = 3 /'//line//solid//relaxes// &
       & '&body lower = 3*0 upper = 3*1 points = 3*20 /'//line//"&refine where = '1' levels = 6 /", &
       & 'refined cells make more than 1000000000 points')

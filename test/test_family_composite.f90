@@ -105,7 +105,6 @@ contains
     call expect_kind(error, scene, .false., '2 grids')
     call two_bodies(2, .false., scene)
     scene%horizon%length = 3.015_wp*spacing
-    scene%bodies%points(2) = [2, 4]
     scene%horizon%surface_correction = 'consistent'
     call expect_kind(error, scene, .false., &
       & "no composite family: surface_correction = 'consistent'")

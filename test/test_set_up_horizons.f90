@@ -854,16 +854,11 @@ contains
       & "&horizon local does not serve model = 'lps'")
     call refuse(grids(8, "model = 'softening' critical_stretch = 0.01 "// &
       & 'peak_stretch = 0.005', '', relaxes), "&horizon local does not serve model = 'softening'")
-    call refuse(grids(8, solid, "surface_correction = 'consistent'", relaxes), &
-      & "&horizon local does not serve surface_correction = 'consistent'")
     call refuse(grids(8, solid, '', relaxes// &
       & "&relaxation solver = 'dynamic_relaxation' density_matrix = 'chapter' /"), &
       & "&horizon local does not serve density_matrix = 'chapter'")
     call refuse(grids(8, solid, "family = 'lattice'", relaxes), &
       & 'bonds join bodies on different grids')
-    call refuse(own_grids("&horizon surface_correction = 'consistent' /"//line//relaxes), &
-      & 'lattices of different spacings have horizons of their own, which do not serve '// &
-      & "surface_correction = 'consistent'", '&horizon length gives all points one horizon')
 
   contains
 

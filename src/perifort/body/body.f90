@@ -12,6 +12,7 @@ module pd_body_body
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_order, only: exchange, number_points, order_type, owns
   use pd_body_mesh_part, only: part_type
+  use pd_body_side_areas, only: side_areas_type
   use pd_body_surface_surface, only: surface_type
   implicit none (type, external)
   private
@@ -67,6 +68,8 @@ module pd_body_body
     type(part_type), allocatable :: parts(:)  !! bodies that are meshes
     type(skin_type), allocatable :: skins(:)  !! bodies that fill surfaces
     type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)
+    type(side_areas_type), allocatable :: sides  !! of the arranged points, where weights of bonds
+                                                 !! need balanced ones
   end type body_type
 
   interface take

@@ -17,11 +17,13 @@ module pd_family_areas
 contains
 
   !> The sum over regions of value x outward area vectors of their points (n_slots, dim): a region
-  !> is all points of materials with the same value. A face of a region's cell without a neighbour
-  !> in the region gives 1.5 of its area to its point, -0.5 to the point behind. With one value of 1
-  !> these are the A_k of the body: sum A_k = 0, sum A_k x_k^T = volume x identity. Families must be
-  !> whole. `alone` is a slot with no neighbour on either side along an axis, whose faces have no
-  !> second point; 0 if there is none.
+  !> is all points of materials with the same value. A face of a cell without a neighbour gives 1.5
+  !> of its area to its point, -0.5 to the point behind. At a face between regions the difference of
+  !> their values acts in the same way on the points of both sides, parted by the sizes of the
+  !> values: mostly on the stiffer side.
+  !> With one value of 1 these are the A_k of the body: sum A_k = 0, sum A_k x_k^T = volume x
+  !> identity. Families must be whole. `alone` is a slot with no neighbour on either side along an
+  !> axis, whose faces have no second point; 0 if there is none.
   subroutine area_vectors(body, family, value, area, alone)
     type(body_type), intent(in) :: body       !! all on lattices, arranged in the family's slots
     class(family_type), intent(in) :: family  !! whole, with a reach of a spacing at least
@@ -30,7 +32,7 @@ contains
       !! (n_slots, dim) value x area [m2; m x thickness; cross section]
     integer, intent(out) :: alone             !! a slot without a second point, or 0
     type(bonds_type) :: bonds
-    real(wp) :: face
+    real(wp) :: face, part
     integer :: k, c, s, other, behind, next(-1:1, body%dim)
 
     alone = 0
@@ -44,15 +46,20 @@ contains
       do c = 1, body%dim
         do s = -1, 1, 2
           other = next(s, c)
+          part = value(body%material(k))
           if (other > 0) then
-            if (.not. abs(value(body%material(other)) - value(body%material(k))) > 0.0_wp) cycle
+            associate (here => body%material(k), there => body%material(other))
+              if (.not. abs(value(there) - value(here)) > 0.0_wp) cycle
+              part = (value(here) - value(there))*abs(value(here))/(abs(value(here)) &
+                & + abs(value(there)))
+            end associate
           end if
           behind = next(-s, c)
           if (behind == 0) then
             alone = k
             return
           end if
-          associate (outward => s*face*value(body%material(k)))
+          associate (outward => s*face*part)
             area(k, c) = area(k, c) + outermost_share*outward
             area(behind, c) = area(behind, c) + behind_share*outward
           end associate

@@ -57,7 +57,8 @@ contains
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
           if (model%consistent) then
-            inverse(k) = inverse(k) + bond_size(model, k, i, .true.)*bonds%weight(i)/bonds%length(i)
+            inverse(k) = inverse(k) + bond_size(model, k, i, .true.)*law_factor(model, k, j, &
+              & bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
           else if (model%weighted) then
             inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
               & *law_factor(model, k, j, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
@@ -86,7 +87,9 @@ contains
         n = bonds%xi(i, :)/bonds%length(i)
         if (model%consistent) then
           bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j))*bond_size(model, k, i, .false.) &
-            & + (inverse(k) + inverse(j))*bond_size(model, k, i, .true.)) &
+            & *law_factor(model, k, j, bonds%length(i), .false.) &
+            & + (inverse(k) + inverse(j))*bond_size(model, k, i, .true.) &
+            & *law_factor(model, k, j, bonds%length(i), .true.)) &
             & *bonds%weight(i)/bonds%length(i)
           cycle
         end if

@@ -6,7 +6,7 @@ module pd_law_material
   implicit none (type, external)
   private
   public :: material_type, new_material, critical_stretch_from_energy, &
-    & energy_from_critical_stretch, never
+    & energy_from_critical_stretch, several_stiffnesses, never
 
   real(wp), parameter :: never = huge(1.0_wp)  !! critical stretch of a material that cannot fail
 
@@ -94,6 +94,16 @@ contains
     m%t = m%d*delta
     m%p = 2*m%a*m%d*delta
   end function new_material
+
+  !> Whether materials differ in a modulus, by more than rounding.
+  pure logical function several_stiffnesses(materials) result(several)
+    type(material_type), intent(in) :: materials(:)  !! one at least
+    real(wp), parameter :: same = 1.0e-12_wp  !! part of a modulus that may differ
+    associate (one => materials(1))
+      several = any(abs(materials%shear_modulus - one%shear_modulus) > same*one%shear_modulus &
+        & .or. abs(materials%bulk_modulus - one%bulk_modulus) > same*one%bulk_modulus)
+    end associate
+  end function several_stiffnesses
 
   !> Critical stretch from the critical energy release rate Gc [J/m2] (doc/theory.md, 8).
   pure real(wp) function critical_stretch_from_energy(m, Gc, dim, delta) result(s_c)

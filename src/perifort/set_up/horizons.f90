@@ -49,10 +49,9 @@ contains
         & 'influence function in all materials, are known for the horizon of a bond')
       return
     end do
-    if (scene%horizon%surface_correction == 'consistent') then
-      call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'", &
-        & "the weights of bonds between different horizons are not solved for; give 'energy' "// &
-        & "or 'none'")
+    if (scene%horizon%surface_correction == 'consistent' .and. size(system%body%parts) > 0) then
+      call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent' of a "// &
+        & 'mesh', "the weights of its bonds are known for one horizon; give 'energy' or 'none'")
     else if (scene%time%method == 'relaxation' .and. &
       & scene%relaxation%density_matrix /= 'frame_invariant') then
       call refuse('relaxation', 1, 'density_matrix', "density_matrix = '"// &

@@ -34,8 +34,8 @@ contains
     type(load_type), allocatable, intent(out) :: loads(:)  !! (loads) in the order of the groups
     type(error_type), allocatable, intent(out) :: error
     logical, allocatable :: chosen(:)
-    real(wp), allocatable :: pressed(:, :), part(:), whole(:)
-    real(wp) :: volume
+    real(wp), allocatable :: pressed(:, :), part(:), whole(:), per_force(:)
+    real(wp) :: volume  ! or area
     integer :: l, c
 
     allocate (loads(size(scene%loads)))
@@ -63,15 +63,31 @@ contains
         end if
         volume = volume_of(body, load%slots)
         call share_side(scene, body, family, group, chosen, load%slots, part)
+        per_force = part*(1/volume)
+        if (allocated(body%sides) .and. group%side /= '') then
+          per_force = part/body%spacing(load%slots)
+          volume = sum(per_force*body%volume(load%slots))
+          if (.not. volume > 0.0_wp) then
+            call scene_fault(error, scene, 'load', l, 'side', "the points at side = '"// &
+              & trim(group%side)//"' have no free face: with surface_correction = 'consistent' "// &
+              & 'a load on a side acts on free ones', 'is there a layer or another body?')
+            return
+          end if
+          per_force = per_force/volume
+        end if
         whole = merge(1.0_wp, 0.0_wp, chosen(load%slots))
         allocate (load%density(size(load%slots), body%dim), source=0.0_wp)
         do c = 1, body%dim
           if (is_set(group%body_force(c))) load%density(:, c) = group%body_force(c)*whole
-          if (is_set(group%force(c))) load%density(:, c) = load%density(:, c) &
-            & + part*(group%force(c)/volume)
+          if (.not. is_set(group%force(c))) cycle
+          if (allocated(body%sides) .and. group%side /= '') then
+            load%density(:, c) = load%density(:, c) + per_force*group%force(c)
+          else
+            load%density(:, c) = load%density(:, c) + part*(group%force(c)/volume)
+          end if
         end do
         call by_side()
-        call load_by_expressions(scene, body, l, load, pressed, part*(1/volume), whole, error)
+        call load_by_expressions(scene, body, l, load, pressed, per_force, whole, error)
         if (allocated(error)) return
         load%curve = course(scene, group%ramp_time, group%times, group%values, timed_load(scene, &
           & group))
@@ -122,7 +138,7 @@ contains
     real(wp), allocatable, intent(out) :: part(:)        !! of each of them then [-]
     type(bonds_type) :: bonds
     real(wp), allocatable :: share(:)
-    integer :: i, k, axis, inward, next(-1:1, body%dim)
+    integer :: i, k, axis, inward, s, e, next(-1:1, body%dim)
 
     if (group%side == '' .or. scene%horizon%surface_correction /= 'consistent') then
       allocate (part(size(slots)), source=1.0_wp)
@@ -131,6 +147,21 @@ contains
     axis = index('xyz', group%side(1:1))
     inward = merge(1, -1, group%side(3:5) == 'min')
     allocate (share(body%n_slots), source=0.0_wp)
+    if (allocated(body%sides)) then
+      do s = 1, size(body%sides%axis)
+        associate (sides => body%sides)
+          if (sides%axis(s) /= axis .or. sides%outward(s) /= -inward) cycle
+          if (.not. side_chosen(body, s, chosen)) cycle
+          do e = sides%start(s), sides%start(s + 1) - 1
+            k = sides%slot(e)
+            share(k) = share(k) - inward*sides%area(axis, e)*body%spacing(k)/body%volume(k)
+          end do
+        end associate
+      end do
+      slots = slots_where(body, abs(share) > 0.0_wp .or. chosen)
+      part = share(slots)
+      return
+    end if
     call allocate_bonds(family, bonds)
     do i = 1, size(slots)
       k = slots(i)
@@ -146,6 +177,16 @@ contains
     slots = slots_where(body, abs(share) > 0.0_wp .or. chosen)
     part = share(slots)
   end subroutine share_side
+
+  !> Whether a side of the balanced areas is one that a load means: the outermost faces of a body
+  !> whose points are chosen.
+  pure logical function side_chosen(body, s, chosen)
+    type(body_type), intent(in) :: body
+    integer, intent(in) :: s              !! side
+    logical, intent(in) :: chosen(:)      !! slots of the outermost row
+    side_chosen = body%sides%outermost(s)
+    if (side_chosen) side_chosen = any(chosen .and. body%body == body%sides%body(s))
+  end function side_chosen
 
   !> A load on facets of a mesh: pressure along their normals, a total force by their areas; both
   !> act on the points that share the areas. An error is set if these cannot be found.

@@ -68,7 +68,10 @@ contains
       call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
         & "surface_correction = 'consistent' makes this body unstable: its stiffness has an "// &
         & 'eigenvalue of '//to_text(plan%lowest, 2)//' of the largest one', &
-        & "use more elements across its thinnest part, or surface_correction = 'energy'")
+        & trim(merge('use more elements across its thinnest part', merge( &
+        & 'use more points at small holes and corners', &
+        & 'use materials that differ less            ', allocated(system%body%sides)), &
+        & size(system%body%parts) > 0))//", or surface_correction = 'energy'")
       return
     end if
     if (plan%relaxes) then

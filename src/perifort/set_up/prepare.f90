@@ -194,7 +194,7 @@ contains
       if (allocated(error)) return
       call check_consistent(scene, system, error)
       if (allocated(error)) return
-      call prepare_surface(scene, system%body, error)
+      call prepare_surface(scene, materials, system%family, system%body, error)
       if (allocated(error)) return
       call motions_of_scene(scene, system%body, system%motions, error)
       if (allocated(error)) return

@@ -6,7 +6,8 @@ module pd_body_mesh_moments
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
-  public :: moments_type, number_of_fields, fields_at, turn_to, solve_moments, vector_at
+  public :: moments_type, number_of_fields, fields_at, turn_to, solve_moments, vector_at, &
+    & keep_sums
 
   !> A combination of the fields, in coordinates (x - origin)/scale.
   type :: moments_type
@@ -125,6 +126,41 @@ contains
       multiplier(j) = (multiplier(j) - dot_product(f(j + 1:, j), multiplier(j + 1:)))/f(j, j)
     end do
   end subroutine solve_moments
+
+  !> Take from each column of `values` its sum and, with `linear`, its first moments: the part that
+  !> is a linear function of the places. With `root` that is so for root x values.
+  pure subroutine keep_sums(x, linear, values, root)
+    real(wp), intent(in) :: x(:, :)            !! (points, dim) [m]
+    logical, intent(in) :: linear              !! whether first moments are taken, too
+    real(wp), intent(inout) :: values(:, :)    !! (points, columns)
+    real(wp), intent(in), optional :: root(:)  !! (points) > 0
+    real(wp), parameter :: follows = 1.0e-10_wp
+    real(wp) :: base(size(x, 1), size(x, 2) + 1), length, before
+    integer :: i, j, n, again
+
+    base(:, 1) = 1.0_wp
+    base(:, 2:) = x - spread(sum(x, dim=1)/size(x, 1), 1, size(x, 1))
+    n = merge(size(base, 2), 1, linear)
+    if (present(root)) base = base*spread(root, 2, size(base, 2))
+    ! Gram and Schmidt, each twice against rounding
+    do i = 1, n
+      before = norm2(base(:, i))
+      do again = 1, 2
+        do j = 1, i - 1
+          base(:, i) = base(:, i) - dot_product(base(:, j), base(:, i))*base(:, j)
+        end do
+      end do
+      length = norm2(base(:, i))
+      base(:, i) = merge(base(:, i)/max(length, tiny(1.0_wp)), 0.0_wp, length > follows*before)
+    end do
+    do again = 1, 2
+      do i = 1, n
+        do j = 1, size(values, 2)
+          values(:, j) = values(:, j) - dot_product(base(:, i), values(:, j))*base(:, i)
+        end do
+      end do
+    end do
+  end subroutine keep_sums
 
   !> The combined field at a place.
   pure function vector_at(moments, x) result(w)

@@ -11,8 +11,8 @@ module pd_body_mesh_shares
   use pd_base_text, only: to_text
   use pd_body_mesh_around, only: around_type, elements_at_nodes, points_of, widen
   use pd_body_mesh_mesh, only: fault_of_file
-  use pd_body_mesh_moments, only: fields_at, moments_type, number_of_fields, solve_moments, &
-    & vector_at
+  use pd_body_mesh_moments, only: fields_at, keep_sums, moments_type, number_of_fields, &
+    & solve_moments, vector_at
   use pd_body_mesh_part, only: facets_type, outer_facets, part_type
   implicit none (type, external)
   private
@@ -163,39 +163,6 @@ contains
       & //' m has no points behind it that could share its load', error, &
       & 'the body is one element thick there: use more, or a lower dimension')
   end subroutine weigh_facet
-
-  !> Take from each column of `values` its sum and, with `linear`, its first moments: the part that
-  !> is a linear function of the places.
-  pure subroutine keep_sums(x, linear, values)
-    real(wp), intent(in) :: x(:, :)            !! (points, dim) [m]
-    logical, intent(in) :: linear
-    real(wp), intent(inout) :: values(:, :)    !! (points, columns)
-    real(wp), parameter :: follows = 1.0e-10_wp
-    real(wp) :: base(size(x, 1), size(x, 2) + 1), length, before
-    integer :: i, j, n, again
-
-    base(:, 1) = 1.0_wp
-    base(:, 2:) = x - spread(sum(x, dim=1)/size(x, 1), 1, size(x, 1))
-    n = merge(size(base, 2), 1, linear)
-    ! Gram and Schmidt, each twice against rounding
-    do i = 1, n
-      before = norm2(base(:, i))
-      do again = 1, 2
-        do j = 1, i - 1
-          base(:, i) = base(:, i) - dot_product(base(:, j), base(:, i))*base(:, j)
-        end do
-      end do
-      length = norm2(base(:, i))
-      base(:, i) = merge(base(:, i)/max(length, tiny(1.0_wp)), 0.0_wp, length > follows*before)
-    end do
-    do again = 1, 2
-      do i = 1, n
-        do j = 1, size(values, 2)
-          values(:, j) = values(:, j) - dot_product(base(:, i), values(:, j))*base(:, i)
-        end do
-      end do
-    end do
-  end subroutine keep_sums
 
   !> `(1, 2)`
   function place_text(x) result(text)

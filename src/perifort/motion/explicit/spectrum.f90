@@ -11,7 +11,7 @@ module pd_motion_explicit_spectrum
   use pd_base_numbers, only: pi
   use pd_base_reduce, only: count_of_ranks, inner, largest_of_ranks, noise, bring_noise
   use pd_body_body, only: owned
-  use pd_law_material, only: material_type
+  use pd_law_material, only: material_type, several_stiffnesses
   use pd_family_family, only: bonds_type, allocate_bonds
   use pd_family_surface, only: bond_factor
   use pd_force_model, only: bond_factors_of, force_options_type, model_type, options_of, q_of, t_of
@@ -193,10 +193,13 @@ contains
 
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
   !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0;
-  !> and with consistent weights on a mesh, some of which are far below 0.
+  !> and with consistent weights on a mesh, on lattices that touch or of materials of different
+  !> stiffness, some of which are far below 0.
   pure logical function may_be_unstable(system)
     type(system_type), intent(in) :: system  !! with its model
-    may_be_unstable = (system%model%consistent .and. size(system%body%parts) > 0) .or. &
+    may_be_unstable = (system%model%consistent .and. (size(system%body%parts) > 0 .or. &
+      & allocated(system%body%sides) .or. &
+      & several_stiffnesses(system%model%materials))) .or. &
       & (system%model%dilatation .and. system%model%surface .and. &
       & any(system%model%materials%a < 0.0_wp .and. &
       & system%model%materials%poissons_ratio < suspicious_ratio))
@@ -288,8 +291,8 @@ contains
           if (model%weighted) then
             call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), stretch_factor, &
               & dilatation_factor)
-            Gd = dilatation_factor*merge(Gd, 1.0_wp, model%surface)
-            Gb = stretch_factor*merge(Gb, 1.0_wp, model%surface)
+            Gd = dilatation_factor*merge(Gd, 1.0_wp, model%surface .or. model%consistent)
+            Gb = stretch_factor*merge(Gb, 1.0_wp, model%surface .or. model%consistent)
             if (.not. Gb > 0.0_wp) cycle
           end if
           sum_of_bonds = sum_of_bonds + Gd**2/Gb*bonds%weight(i)/bonds%length(i)

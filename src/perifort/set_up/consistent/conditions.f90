@@ -5,6 +5,7 @@ module pd_set_up_consistent_conditions
   use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
+  use pd_force_model, only: bond_factors_of, model_type
   use pd_law_material, only: material_type
   use pd_set_up_consistent_groups, only: groups_type
   implicit none (type, external)
@@ -42,7 +43,7 @@ contains
   !> classical traction on its surface area,
   !> sum_j (q_k + q_j) Gb vc V_j n_a n_b n_c = -(A_a d_bc + A_b d_ac + A_c d_ab)/V_k, with A the sum
   !> over regions of mu x area. The rows of a class are divided by its sum of (q_k + q_j) vc V_j.
-  subroutine stretch_conditions(body, family, materials, groups, area, conditions)
+  subroutine stretch_conditions(body, family, materials, groups, area, conditions, model)
     type(body_type), intent(in) :: body              !! that the groups were found for
     class(family_type), intent(in) :: family         !! whole
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
@@ -50,8 +51,9 @@ contains
     real(wp), intent(in) :: area(:, :)
       !! (n_slots, dim) mu x area, summed over regions; in 1D E/3 x cross section [N]
     type(conditions_type), intent(out) :: conditions
+    type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     type(bonds_type) :: bonds
-    real(wp) :: total, q
+    real(wp) :: total, q, gb, gd
     integer :: c, k, i, row, x, y, z
 
     call begin(body%dim, .true., groups, conditions)
@@ -63,6 +65,10 @@ contains
         total = 0.0_wp
         do i = 1, bonds%n
           q = materials(body%material(k))%q + materials(body%material(bonds%j(i)))%q
+          if (present(model)) then
+            call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), gb, gd)
+            q = q*gb
+          end if
           conditions%n(:, first + i) = bonds%xi(i, :)/bonds%length(i)
           conditions%factor(:, first + i) = [q*bonds%weight(i), 0.0_wp]
           total = total + q*bonds%weight(i)
@@ -89,7 +95,7 @@ contains
   !> classical traction: t sum_j Gd vc V_j n_a n_b = d_ab, and t sum_j (a_k + a_j) Gd vc V_j
   !> n_a/|xi| = -A_a/V_k, with A the sum over regions of a x area. The second rows are multiplied
   !> with the spacing over the largest a.
-  subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions)
+  subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions, model)
     type(body_type), intent(in) :: body              !! that the groups were found for
     class(family_type), intent(in) :: family         !! whole
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
@@ -97,7 +103,9 @@ contains
     type(groups_type), intent(in) :: groups          !! of its bonds
     real(wp), intent(in) :: area(:, :)  !! (n_slots, dim) a x area, summed over regions [m2]
     type(conditions_type), intent(out) :: conditions
+    type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     type(bonds_type) :: bonds
+    real(wp) :: gb, gd
     integer :: c, k, i, row, x, y
 
     call begin(body%dim, .false., groups, conditions)
@@ -110,6 +118,9 @@ contains
           conditions%n(:, first + i) = bonds%xi(i, :)/bonds%length(i)
           conditions%factor(:, first + i) = t*bonds%weight(i)*[1.0_wp, (a(body%material(k)) &
             & + a(body%material(bonds%j(i))))*body%spacing(k)/bonds%length(i)]
+          if (.not. present(model)) cycle
+          call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), gb, gd)
+          conditions%factor(:, first + i) = gd*conditions%factor(:, first + i)
         end do
       end associate
       row = 0

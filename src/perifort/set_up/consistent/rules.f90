@@ -1,21 +1,24 @@
 !> What a scene with consistent weights can have, and the weights of its bonds.
 module pd_set_up_consistent_rules
-  use pd_base_error, only: error_type
+  use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_mesh_part, only: count_pieces, count_twins
   use pd_body_meshes, only: balance_surface
-  use pd_law_material, only: material_type
+  use pd_body_side_areas, only: balance_sides, side_areas_type
+  use pd_family_bond_weights, only: bond_weights_type
+  use pd_family_family, only: family_type
+  use pd_family_free_faces, only: find_sides, grids_touch
+  use pd_family_outline, only: cloud_side, uneven
+  use pd_law_material, only: material_type, several_stiffnesses
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: has_cut_cells, is_set, scene_type
-  use pd_set_up_consistent_weights, only: consistent_weights, solution_type
+  use pd_set_up_consistent_weights, only: alone_text, consistent_weights, solution_type
   implicit none (type, external)
   private
   public :: check_consistent, prepare_surface, weigh_bonds
-
-  real(wp), parameter :: same = 1.0e-12_wp  !! part of a modulus that may differ
 
 contains
 
@@ -48,26 +51,33 @@ contains
         return
       end if
       if (scene%bodies(i)%file == '') cycle
-      call refuse('body', i, 'file', 'a cloud', 'the surface areas of its points are not known')
-      return
+      if (size(scene%bodies) > 1) then
+        call refuse('body', i, 'file', 'a cloud beside other bodies', &
+          & 'the surface between bodies that touch is not known')
+        return
+      end if
+      associate (h => system%body%spacing, there => system%body%point > 0)
+        if (maxval(h, mask=there) > uneven*minval(h, mask=there)) then
+          call refuse('body', i, 'file', 'a cloud whose spacings differ by more than '// &
+            & to_text(uneven), 'its outline is found with one spacing')
+          return
+        end if
+      end associate
     end do
     do i = 1, size(system%model%laws)
       associate (law => system%model%laws(i)%law)
-        if (law%corrected .and. .not. (system%model%generic .or. system%model%weighted)) cycle
+        if (law%corrected .and. .not. (system%model%generic .or. merge(system%model%influenced, &
+          & system%model%weighted, allocated(system%model%horizon)))) cycle
       end associate
       call refuse('material', i, 'model', 'this bond law', &
         & "its weights are known for the chapter's laws with influence = 'inverse'")
       return
     end do
-    do i = 2, size(scene%materials)
-      associate (one => system%model%materials(1), other => system%model%materials(i))
-        if (abs(one%shear_modulus - other%shear_modulus) <= same*one%shear_modulus &
-          & .and. abs(one%bulk_modulus - other%bulk_modulus) <= same*one%bulk_modulus) cycle
-      end associate
-      call refuse('material', i, '', 'materials of different stiffness', &
-        & 'weights at their interface may leave a body that gives way')
+    if (size(system%body%parts) > 0 .and. several_stiffnesses(system%model%materials)) then
+      call refuse('material', 2, '', 'materials of different stiffness in a mesh', &
+        & 'the areas of the facets between them are not shared')
       return
-    end do
+    end if
     if (scene%header%precision == 'mixed') then
       call refuse('scene', 1, 'precision', "precision = 'mixed'", &
         & 'its conditions hold to rounding in double precision')
@@ -98,16 +108,54 @@ contains
 
   end subroutine check_consistent
 
-  !> Prepare the surface areas that loads and weights take: those of a mesh are balanced. An error
-  !> is set if that cannot be.
-  subroutine prepare_surface(scene, body, error)
-    type(scene_type), intent(in) :: scene    !! a checked scene
-    type(body_type), intent(inout) :: body   !! arranged in slots
+  !> Prepare the surface areas that loads and weights take: those of a mesh, and of lattices of
+  !> several grids that touch, are balanced. An error is set if that cannot be.
+  subroutine prepare_surface(scene, materials, family, body, error)
+    type(scene_type), intent(in) :: scene            !! a checked scene
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
+    class(family_type), intent(in) :: family         !! whole
+    type(body_type), intent(inout) :: body           !! arranged in its slots
     type(error_type), allocatable, intent(out) :: error
+    type(side_areas_type) :: sides
+    integer :: alone
+    logical :: found
 
-    if (scene%horizon%surface_correction /= 'consistent' .or. size(body%parts) == 0) return
-    call balance_surface(body, error)
-    call place_fault(error, scene, 'body', 1, 'mesh')
+    if (scene%horizon%surface_correction /= 'consistent') return
+    if (size(body%parts) > 0) then
+      call balance_surface(body, error)
+      call place_fault(error, scene, 'body', 1, 'mesh')
+      return
+    end if
+    if (scene%bodies(1)%file == '') then
+      if (.not. grids_touch(body, family) .and. family%rule%ratio <= 0.0_wp) return
+    end if
+    if (several_stiffnesses(materials)) then
+      call scene_fault(error, scene, 'material', 2, '', &
+        & "surface_correction = 'consistent' does not serve materials of different stiffness "// &
+        & 'in clouds, or on lattices of different spacings or offsets', 'the surface between '// &
+        & "them is not known; give surface_correction = 'energy' or 'none'")
+      return
+    end if
+    alone = 0
+    found = .true.
+    if (scene%bodies(1)%file == '') then
+      call find_sides(body, family, sides, alone)
+    else
+      call cloud_side(body, sides, found)
+    end if
+    if (alone > 0) then
+      call fail(error, alone_text(body, alone), group='horizon', number=1)
+      call place_fault(error, scene, 'horizon', 1, 'surface_correction')
+      return
+    end if
+    if (found) call balance_sides(body%x, body%volume, sides, found)
+    if (.not. found) then
+      call scene_fault(error, scene, 'horizon', 1, 'surface_correction', 'no surface areas of '// &
+        & "these points have the moments that surface_correction = 'consistent' needs", &
+        & "use more points across, or surface_correction = 'energy'")
+      return
+    end if
+    body%sides = sides
   end subroutine prepare_surface
 
   !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
@@ -118,12 +166,19 @@ contains
     type(material_type), intent(in) :: materials(:)     !! (any number) by the points' numbers
     type(error_type), allocatable, intent(out) :: error
     type(solution_type) :: stretch, dilatation
+    type(bond_weights_type) :: weights
     real(wp) :: least
 
-    call consistent_weights(system%body, system%family, materials, system%model%weights, stretch, &
-      & dilatation, error)
+    if (allocated(system%model%horizon)) then
+      call consistent_weights(system%body, system%family, materials, weights, stretch, &
+        & dilatation, error, system%model)
+    else
+      call consistent_weights(system%body, system%family, materials, weights, stretch, &
+        & dilatation, error)
+    end if
     call place_fault(error, scene, 'horizon', 1, 'surface_correction')
     if (allocated(error)) return
+    system%model%weights = weights
     system%model%consistent = .true.
     if (.not. (system%model%breaking .or. size(scene%cracks) > 0)) return
     least = stretch%least

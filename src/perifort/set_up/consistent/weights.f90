@@ -6,9 +6,11 @@ module pd_set_up_consistent_weights
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_meshes, only: surface_areas
+  use pd_body_side_areas, only: total_areas
   use pd_family_areas, only: area_vectors
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
+  use pd_force_model, only: model_type
   use pd_law_material, only: material_type
   use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
     & stretch_conditions
@@ -16,7 +18,7 @@ module pd_set_up_consistent_weights
   use pd_set_up_consistent_least_change, only: least_change, unbounded
   implicit none (type, external)
   private
-  public :: consistent_weights, weights_of_areas, solution_type
+  public :: consistent_weights, weights_of_areas, solution_type, alone_text
 
   !> How one kind of weights was found.
   type :: solution_type
@@ -36,10 +38,11 @@ module pd_set_up_consistent_weights
 
 contains
 
-  !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced. An error is
-  !> set if a point of a lattice has no second one behind it, or if no weights fulfil the
-  !> conditions.
-  subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error)
+  !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced where grids
+  !> touch or facets share it. An error is set if a point of a lattice has no second one behind it,
+  !> or if no weights fulfil the conditions.
+  subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error, &
+    & model)
     type(body_type), intent(in) :: body
       !! all on lattices, or one mesh, in the family's slots
     class(family_type), intent(in) :: family         !! whole: no bond cut
@@ -48,9 +51,22 @@ contains
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
+    type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :)
     integer :: alone
 
+    if (allocated(body%sides)) then
+      ! all materials have one stiffness
+      of_stretch = total_areas(body%sides, body%n_slots, body%dim)
+      associate (a => a_of(materials), mu => mu_of(materials, body%dim))
+        of_dilatation = a(1)*of_stretch
+        of_stretch = mu(1)*of_stretch
+      end associate
+      ! Gb above 0 leaves most of these bodies stable; bounds of Gd would take ten times as long
+      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .true., &
+        & [.true., .false.], weights, stretch, dilatation, error, model)
+      return
+    end if
     if (size(body%parts) > 0) then
       ! all materials have one stiffness
       call surface_areas(body, of_stretch, error)
@@ -59,29 +75,35 @@ contains
         of_dilatation = a(1)*of_stretch
         of_stretch = mu(1)*of_stretch
       end associate
-      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .true., .false., &
-        & weights, stretch, dilatation, error)
+      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .true., &
+        & [.false., .false.], weights, stretch, dilatation, error)
       return
     end if
     call area_vectors(body, family, mu_of(materials, body%dim), of_stretch, alone)
     if (alone > 0) then
-      call fail(error, "surface_correction = 'consistent' needs a second point behind each "// &
-        & 'surface: point '//to_text(int(body%point(alone)))//' has no neighbour on either '// &
-        & 'side along an axis; lower the dimension, use more points across, or another '// &
-        & 'correction', &
-        & group='horizon', number=1)
+      call fail(error, alone_text(body, alone), group='horizon', number=1)
       return
     end if
     call area_vectors(body, family, a_of(materials), of_dilatation, alone)
-    call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., .true., &
-      & weights, stretch, dilatation, error)
+    call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., &
+      & [.true., .true.], weights, stretch, dilatation, error)
   end subroutine consistent_weights
+
+  !> Why a point without a second one behind its face is refused.
+  function alone_text(body, slot) result(text)
+    type(body_type), intent(in) :: body  !! with the point
+    integer, intent(in) :: slot          !! of the point
+    character(:), allocatable :: text
+    text = "surface_correction = 'consistent' needs a second point behind each surface: point "// &
+      & to_text(int(body%point(slot)))//' has no neighbour on either side along an axis; lower '// &
+      & 'the dimension, use more points across, or another correction'
+  end function alone_text
 
   !> Weights for given surface areas. An error is set if no weights fulfil the conditions. Bonds in
   !> like surroundings have one weight; where that leaves no solution, surroundings are looked at
   !> farther, and in the end each bond has a weight of its own.
   subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, alone, bounded, &
-    & weights, stretch, dilatation, error)
+    & weights, stretch, dilatation, error, model)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
     class(family_type), intent(in) :: family         !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
@@ -90,11 +112,13 @@ contains
     real(wp), intent(in) :: of_dilatation(:, :)
       !! (n_slots, dim) a over the largest a x area, summed over regions [m2]
     logical, intent(in) :: alone    !! each bond has a weight of its own, however alike they are
-    logical, intent(in) :: bounded  !! weights shall be positive, if that is possible
+    logical, intent(in) :: bounded(2)
+      !! whether Gb and Gd shall be positive, if that is possible
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
+    type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     integer, parameter :: farthest = 3
     integer :: reach
 
@@ -103,7 +127,7 @@ contains
     if (alone) reach = 0
     do
       call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
-        & weights, stretch, dilatation, error)
+        & weights, stretch, dilatation, error, model)
       if (reach == 0 .or. .not. allocated(error)) return
       reach = merge(0, reach + 1, reach == farthest)
     end do
@@ -112,16 +136,17 @@ contains
   !> Weights where bonds have one weight if all looks alike within `reach` horizons. An error is set
   !> if none fulfil the conditions.
   subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
-    & weights, stretch, dilatation, error)
+    & weights, stretch, dilatation, error, model)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)
     real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
     integer, intent(in) :: reach
-    logical, intent(in) :: bounded
+    logical, intent(in) :: bounded(2)
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
+    type(model_type), intent(in), optional :: model
     type(groups_type) :: groups
     type(conditions_type) :: conditions
     real(wp), allocatable :: Gb(:), Gd(:)
@@ -132,13 +157,14 @@ contains
     call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
       & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
     if (allocated(error)) return
-    call stretch_conditions(body, family, materials, groups, of_stretch, conditions)
-    call solve(conditions, bounds_of_stretch(merge(2, 1, body%dim == 3):), bounded, 'stretch', &
+    call stretch_conditions(body, family, materials, groups, of_stretch, conditions, &
+      & model)
+    call solve(conditions, bounds_of_stretch(merge(2, 1, body%dim == 3):), bounded(1), 'stretch', &
       & Gb, stretch, error)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
-      & conditions)
-    call solve(conditions, bounds_of_dilatation, bounded, 'dilatation', Gd, dilatation, error)
+      & conditions, model)
+    call solve(conditions, bounds_of_dilatation, bounded(2), 'dilatation', Gd, dilatation, error)
     if (allocated(error)) return
     call spread_weights(body, family, groups, Gb, Gd, weights)
   end subroutine weights_at_reach
