@@ -58,13 +58,14 @@ contains
     allocate (subject%n(3, 2*angles*quadrature*layers))
     n = 0
     do l = 1, layers
-      do j = 1, 2*quadrature
-        height = merge(node((j + 1)/2), -node((j + 1)/2), mod(j, 2) == 0)
+      do j = -quadrature, quadrature
+        if (j == 0) cycle
+        height = sign(node(abs(j)), real(j, wp))
         do i = 1, angles
           n = n + 1
           phi = 2*pi*(i + 0.3_wp*l)/angles
           subject%bonds%length(n) = delta*(l - 0.5_wp)/layers
-          subject%bonds%volume(n) = 2*pi/angles*share((j + 1)/2)*subject%bonds%length(n)**2 &
+          subject%bonds%volume(n) = 2*pi/angles*share(abs(j))*subject%bonds%length(n)**2 &
             & *delta/layers
           subject%n(:, n) = [sqrt(1 - height**2)*cos(phi), sqrt(1 - height**2)*sin(phi), height]
         end do

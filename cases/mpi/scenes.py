@@ -153,6 +153,8 @@ OWN = [
           changes=(*RIGID, "left_moment_z", "box_rotation_z", "box_force_y")),
 ]
 
+PIECES_SHORT = ("heat", "ball")  # with --short in pieces, too
+
 # A wedge that points down on the plate, in mm.
 CORNERS = np.array([[40, 10, 16], [52, 10, 16], [46, 10, 10.05], [40, 30, 16], [52, 30, 16], [46, 30, 10.05]], float)
 FACETS = ((0, 1, 2), (3, 5, 4), (0, 3, 4), (0, 4, 1), (0, 2, 5), (0, 5, 3), (1, 4, 5), (1, 5, 2))

@@ -78,6 +78,8 @@ contains
     real(wp) :: change
     integer :: i
 
+    theta = 0.0_wp
+    if (bonds%n == 0) return  ! a slot without a point has no m
     change = 0.0_wp
     do i = 1, bonds%n
       if (.not. bonds%volume(i) > 0.0_wp) cycle
