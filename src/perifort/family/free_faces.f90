@@ -125,7 +125,7 @@ contains
     class(family_type), intent(in) :: family
     type(faces_type), intent(out) :: faces
     integer, intent(out) :: alone
-    type(bonds_type) :: bonds
+    type(bonds_type) :: bonds, behind
     real(wp), allocatable :: outermost(:, :, :)
     real(wp) :: free, face
     integer :: k, c, s, b, pass, next(-1:1, body%dim), further(-1:1, body%dim)
@@ -133,6 +133,7 @@ contains
     alone = 0
     call find_outermost(body, outermost)
     call allocate_bonds(family, bonds)
+    call allocate_bonds(family, behind)
     do pass = 1, 2
       faces%n = 0
       do k = 1, body%n_slots
@@ -142,7 +143,6 @@ contains
         do c = 1, body%dim
           do s = -1, 1, 2
             if (next(s, c) > 0) cycle
-            call family%bonds_of(k, bonds)
             free = 1 - covered(body, bonds, k, c, s)
             if (free <= near) cycle
             if (next(-s, c) == 0) then
@@ -151,8 +151,8 @@ contains
             end if
             faces%n = faces%n + 1
             if (pass == 1) cycle
-            call family%bonds_of(next(-s, c), bonds)
-            call next_points(body, bonds, next(-s, c), further)
+            call family%bonds_of(next(-s, c), behind)
+            call next_points(body, behind, next(-s, c), further)
             b = merge(0, int(body%body(k)), body%layer(k) > 0)
             face = s*body%x(k, c) + body%spacing(k)/2
             faces%slot(:, faces%n) = int([k, next(-s, c), further(-s, c)], i4)

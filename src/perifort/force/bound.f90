@@ -56,16 +56,8 @@ contains
         do i = 1, bonds%n
           j = bonds%j(i)
           n = bonds%xi(i, :)/bonds%length(i)
-          if (model%consistent) then
-            inverse(k) = inverse(k) + bond_size(model, k, i, .true.)*law_factor(model, k, j, &
-              & bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
-          else if (model%weighted) then
-            inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j) &
-              & *law_factor(model, k, j, bonds%length(i), .true.)*bonds%weight(i)/bonds%length(i)
-          else
-            inverse(k) = inverse(k) + surface_factor(model, model%D, n, k, j)*bonds%weight(i) &
-              & /bonds%length(i)
-          end if
+          inverse(k) = inverse(k) + factor_size(model, k, i, j, bonds%length(i), n, .true.) &
+            & *bonds%weight(i)/bonds%length(i)
         end do
         associate (m => model%materials(model%material(k)))
           inverse(k) = inverse(k)*2*max(m%a, 0.0_wp)*t_of(model, k)**2
@@ -85,40 +77,32 @@ contains
       do i = 1, bonds%n
         j = bonds%j(i)
         n = bonds%xi(i, :)/bonds%length(i)
-        if (model%consistent) then
-          bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j))*bond_size(model, k, i, .false.) &
-            & *law_factor(model, k, j, bonds%length(i), .false.) &
-            & + (inverse(k) + inverse(j))*bond_size(model, k, i, .true.) &
-            & *law_factor(model, k, j, bonds%length(i), .true.)) &
-            & *bonds%weight(i)/bonds%length(i)
-          cycle
-        end if
-        if (.not. model%weighted) then
-          bound(k) = bound(k) + ((model%materials(model%material(k))%q &
-            & + model%materials(model%material(j))%q)*surface_factor(model, model%S, n, k, j) &
-            & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j)) &
-            & *bonds%weight(i)/bonds%length(i)
-          cycle
-        end if
         bound(k) = bound(k) + ((q_of(model, k) + q_of(model, j)) &
-          & *surface_factor(model, model%S, n, k, j) &
-          & *law_factor(model, k, j, bonds%length(i), .false.) &
-          & + (inverse(k) + inverse(j))*surface_factor(model, model%D, n, k, j) &
-          & *law_factor(model, k, j, bonds%length(i), .true.))*bonds%weight(i)/bonds%length(i)
+          & *factor_size(model, k, i, j, bonds%length(i), n, .false.) &
+          & + (inverse(k) + inverse(j))*factor_size(model, k, i, j, bonds%length(i), n, .true.)) &
+          & *bonds%weight(i)/bonds%length(i)
       end do
     end do
     !$omp end parallel
   end subroutine stiffness_bound
 
-  !> The size of Gd or Gb of the bond k-j along the unit vector n.
-  pure real(wp) function surface_factor(model, g, n, k, j)
+  !> The size of all factors of the `i`-th bond of slot `k`, to slot `j`: that by which the law
+  !> weighs it, and its surface factor or consistent weight.
+  pure real(wp) function factor_size(model, k, i, j, length, n, of_dilatation) result(factor)
     type(model_type), intent(in) :: model
-    real(wp), allocatable, intent(in) :: g(:, :)
-    real(wp), intent(in) :: n(:)
-    integer, intent(in) :: k, j
-    surface_factor = 1.0_wp
-    if (model%surface) surface_factor = abs(bond_factor(n, g(k, :), g(j, :), model%axes))
-  end function surface_factor
+    integer, intent(in) :: k, i, j
+    real(wp), intent(in) :: length, n(:)      !! |xi| [m] and direction
+    logical, intent(in) :: of_dilatation      !! Gd, else Gb
+
+    factor = law_factor(model, k, j, length, of_dilatation)
+    if (model%consistent) then
+      factor = factor*bond_size(model, k, i, of_dilatation)
+    else if (model%surface .and. of_dilatation) then
+      factor = factor*abs(bond_factor(n, model%D(k, :), model%D(j, :), model%axes))
+    else if (model%surface) then
+      factor = factor*abs(bond_factor(n, model%S(k, :), model%S(j, :), model%axes))
+    end if
+  end function factor_size
 
   !> The size of the consistent weight of the `i`-th bond of slot `k`.
   pure real(wp) function bond_size(model, k, i, of_dilatation) result(weight)
