@@ -9,6 +9,8 @@ module test_body_generate
   use comparisons, only: expect_close
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: box_scene, expect, expect_true
+  use runs, only: refuse
+  use test_scene_expect, only: line
   implicit none (type, external)
   private
   public :: collect_body_generate
@@ -21,6 +23,7 @@ contains
       & new_unittest('lattice points run x fastest, at the centres of cells', test_order), &
       & new_unittest('shapes cut points out', test_removed), &
       & new_unittest('a completely removed body is refused', test_nothing_left), &
+      & new_unittest('a body between the centres of cells is refused', test_no_cell), &
       & new_unittest('clouds come from files', test_cloud), &
       & new_unittest('bad clouds are refused', test_bad_cloud), &
       & new_unittest('layers follow the body, group by group', test_layers), &
@@ -132,6 +135,20 @@ contains
     if (allocated(error)) return
     call expect_true(error, index(fault%message, 'no points') > 0, 'message: '//fault%message)
   end subroutine test_nothing_left
+
+  !> A shape between the centres of cells holds no point, beside a body with points or alone.
+  subroutine test_no_cell(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(*), parameter :: head = '&scene dimension = 3 /'//line// &
+      & '&material youngs_modulus = 1 density = 1 poissons_ratio = 0.25 /'//line// &
+      & '&time steps = 1 /'//line
+    character(*), parameter :: disc = "&body name = 'disc' shape = 'cylinder' spacing = 1 "// &
+      & 'radius = 0.1 height = 1 /'//line
+
+    call refuse(error, head//disc, "the body 'disc' has no points|:4")
+    call refuse(error, head//'&body lower = 2 0 0 upper = 6 4 4 points = 4 4 4 /'//line//disc, &
+      & "the body 'disc' has no points|:5")
+  end subroutine test_no_cell
 
   !> A cloud's spacing is what makes its volume a square: sqrt(V/h).
   subroutine test_cloud(error)

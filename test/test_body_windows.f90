@@ -237,12 +237,13 @@ contains
   subroutine test_refused(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: whole = plane//square
-    character(200), parameter :: faults(4) = [character(200) :: &
+    character(200), parameter :: faults(5) = [character(200) :: &
       & "&remove shape = 'box' lower = 0 0.1 upper = 1 0.2 /"//line// &
       & "&remove where = '1/max(0, (x - 0.0125)**2 + (y - 0.5125)**2 - 1.0e-6)' /"//line, &
       & "&remove shape = 'box' lower = -1 /"//line, &
       & "&keep shape = 'box' lower = 5 /"//line, &
-      & "&boundary side = 'x_min' displacement_x = 0 /"//line//"&horizon length = 0.01 /"//line]
+      & "&boundary side = 'x_min' displacement_x = 0 /"//line//"&horizon length = 0.01 /"//line, &
+      & "&body shape = 'sphere' centre = 2 2 radius = 1.0e-3 spacing = 0.1 /"//line]
     type(scene_type) :: scene
     type(survey_type) :: survey
     type(fault_type), allocatable :: fault, of_windows

@@ -9,7 +9,7 @@ module pd_body_generate
   use pd_base_text, only: newline, to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_scene_content_types, only: body_group, has_cut_cells, has_own_horizons, has_refinement, &
-    & is_lattice, scene_type, is_set, unset
+    & is_lattice, scene_type, is_set, unset, words_of_body
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_format_table, only: table_type, read_table
@@ -27,7 +27,7 @@ module pd_body_generate
   implicit none (type, external)
   private
   public :: generate_body, horizon_of, body_cells, check_family_size, number_of_grid
-  public :: number_of_cuts, find_taken, nothing_left
+  public :: number_of_cuts, find_taken, no_cell, nothing_left
 
   real(wp), parameter :: same_grid = 1.0e-6_wp  !! how far two grids may differ [spacings]
   real(wp), parameter :: same_axes = 1.0e-9_wp  !! how far those of one grid may differ
@@ -85,6 +85,8 @@ contains
         if (has_refinement(scene)) call refine(scene, lattices(i), depth, used, body, one, error)
         if (allocated(error)) return
       end if
+      if (one%n_points == 0) call no_cell(scene, i, error)
+      if (allocated(error)) return
       one%body = int(i, i2)
       if (scene%bodies(i)%mesh == '') one%material = material_number(scene, &
         & scene%bodies(i)%material)
@@ -211,6 +213,17 @@ contains
     name = 'remove'
     if (size(scene%kept) > 0 .and. cut == 1) name = 'keep'
   end function name_of_cut
+
+  !> An error where a body has no point before any cut.
+  subroutine no_cell(scene, number, error)
+    type(scene_type), intent(in) :: scene  !! a checked scene
+    integer, intent(in) :: number          !! of the body
+    type(error_type), allocatable, intent(out) :: error
+
+    call scene_fault(error, scene, 'body', number, 'shape', &
+      & words_of_body(scene%bodies, number)//' has no points: no cell of its lattice has '// &
+      & 'its centre in its shape', 'is the spacing too large?')
+  end subroutine no_cell
 
   !> An error where a cut leaves no point.
   subroutine nothing_left(scene, cut, error)

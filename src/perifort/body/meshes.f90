@@ -14,7 +14,7 @@ module pd_body_meshes
   use pd_body_mesh_shares, only: balance_areas, share_areas
   use pd_body_surfaces, only: facets_of_side, near_side, side_areas, skin_named
   use pd_scene_content_rules, only: place_fault
-  use pd_scene_content_types, only: has_own_horizons, scene_type
+  use pd_scene_content_types, only: has_own_horizons, scene_type, words_of_body
   use pd_scene_format_file, only: resolve_path
   implicit none (type, external)
   private
@@ -80,9 +80,7 @@ contains
     character(:), allocatable :: name
     integer :: pieces, twins
 
-    name = 'body '//to_text(part%body)
-    if (scene%bodies(part%body)%name /= '') name = "the body '"// &
-      & trim(scene%bodies(part%body)%name)//"'"
+    name = words_of_body(scene%bodies, part%body)
     if (allocated(part%mesh%first_skipped)) call warnings%add('skipped of mesh '// &
       & to_text(part%body), name//': '//counted(part%mesh%skipped, 'keyword')//' of its file '// &
       & trim(merge('is ', 'are', part%mesh%skipped == 1))//" skipped, first '"// &

@@ -19,7 +19,7 @@ module pd_body_surfaces
     & surface_type
   use pd_scene_content_expressions, only: expression_of
   use pd_scene_content_rules, only: place_fault
-  use pd_scene_content_types, only: scene_type, has_cut_cells, has_own_horizons, is_set
+  use pd_scene_content_types, only: scene_type, has_cut_cells, has_own_horizons, is_set, words_of_body
   use pd_scene_format_file, only: resolve_path
   use pd_scene_format_given, only: name_length
   implicit none (type, external)
@@ -71,17 +71,19 @@ contains
       call move_surface(solid%surface, skin%surface)
       if (.not. present(warnings)) return
       if (len(text) > 0) call warnings%add('gaps of surface '//to_text(number), &
-        & name_of(scene, number)//': '//text, tell=.false.)
+        & words_of_body(scene%bodies, number)//': '//text, tell=.false.)
       text = crossings_text(skin%surface)
       if (len(text) > 0) call warnings%add('crossings of surface '//to_text(number), &
-        & name_of(scene, number)//': '//text, tell=.false.)
+        & words_of_body(scene%bodies, number)//': '//text, tell=.false.)
       if (abs(sum(body%volume) - skin%surface%volume) > much*skin%surface%volume .and. &
         & all(windings <= 1_i1)) call warnings%add('volume of surface '//to_text(number), &
-        & name_of(scene, number)//': its cells have a volume of '//with_unit(sum(body%volume), &
+        & words_of_body(scene%bodies, number)//': its cells have a volume of '// &
+        & with_unit(sum(body%volume), &
         & 'm3', 4)//', its surface holds '//with_unit(skin%surface%volume, 'm3', 4)//"; use a "// &
         & "smaller spacing, or fill = 'volume'", tell=.false.)
       if (any(windings > 1_i1)) call warnings%add('shells of surface '//to_text(number), &
-        & name_of(scene, number)//': '//to_text(count(windings > 1_i1))//' cells are inside of '// &
+        & words_of_body(scene%bodies, number)//': '//to_text(count(windings > 1_i1))// &
+        & ' cells are inside of '// &
         & 'several shells of its surface, and count once, the first near '// &
         & place_text(findloc(windings > 1_i1, .true.))//'; shells that overlap or a surface '// &
         & 'that passes through itself do that; the facets of a cavity face into it', tell=.false.)
@@ -121,16 +123,6 @@ contains
     end subroutine move_surface
 
   end subroutine surface_body
-
-  !> How messages name a body.
-  function name_of(scene, number) result(text)
-    type(scene_type), intent(in) :: scene
-    integer, intent(in) :: number
-    character(:), allocatable :: text
-
-    text = 'body '//to_text(number)
-    if (scene%bodies(number)%name /= '') text = "the body '"//trim(scene%bodies(number)%name)//"'"
-  end function name_of
 
   !> The cells around a surface: centred in its box, or with a corner of some cell at `lower`. An
   !> error if they are too many, or larger than the surface.

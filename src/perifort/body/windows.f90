@@ -11,7 +11,7 @@ module pd_body_windows
   use pd_body_division, only: box_of, division_type, owner_of, take_part, work_of_points, &
     & work_type
   use pd_body_generate, only: body_cells, check_family_size, find_taken, horizon_of, &
-    & nothing_left, number_of_cuts, number_of_grid
+    & no_cell, nothing_left, number_of_cuts, number_of_grid
   use pd_body_lattices, only: coordinate, lattice_of
   use pd_body_layers, only: begin_layers, begin_side, box_of_layer, check_layer, choose_sides, &
     & layer_cells, layer_count_type, layer_type, see_points
@@ -217,15 +217,12 @@ contains
       if (associated(survey%together)) call agree_on_error(survey%together, w, error)
       if (allocated(error)) return
       call add_counts(survey, left)
+      if (any(left(0, :) == 0_i8)) then
+        call no_cell(scene, findloc(left(0, :), 0_i8, dim=1), error)
+        return
+      end if
       do s = 0, cuts
-        if (sum(left(s, :)) > 0_i8) then
-          continue
-        else if (s == 0) then
-          call scene_fault(error, scene, 'body', 1, 'shape', 'the scene has no points: no cell '// &
-            & 'of a lattice has its centre in the shape of its body', '')
-        else
-          call nothing_left(scene, s, error)
-        end if
+        if (sum(left(s, :)) == 0_i8) call nothing_left(scene, s, error)
         if (allocated(error)) return
         if (s == cuts) exit
         least = minval(survey%spacing, mask=left(s, :) > 0_i8)

@@ -7,7 +7,7 @@ module pd_family_warnings
   use pd_base_numbers, only: pi
   use pd_base_text, only: counted, to_text, with_unit
   use pd_base_warnings, only: warnings_type
-  use pd_scene_content_types, only: has_cut_cells, is_turned, scene_type
+  use pd_scene_content_types, only: has_cut_cells, is_turned, scene_type, words_of_body
   use pd_body_body, only: body_type
   use pd_body_lattices, only: axes_of
   use pd_family_cracks, only: points_on
@@ -45,11 +45,11 @@ contains
 
     do i = 1, size(scene%bodies)
       call warn_of_thickness(scene, body, family, i, warnings)
-      call warn_of_horizon(body, family, i, name_of(scene, i), warnings)
+      call warn_of_horizon(body, family, i, words_of_body(scene%bodies, i), warnings)
       ! the volumes of a mesh are those of its elements, however long these are; cut cells
       ! are smaller than the space that they have
       if (scene%bodies(i)%mesh == '' .and. .not. has_cut_cells(scene%bodies(i))) &
-        & call warn_of_volumes(body, family, i, name_of(scene, i), warnings)
+        & call warn_of_volumes(body, family, i, words_of_body(scene%bodies, i), warnings)
     end do
     do i = 1, size(scene%cracks)
       ! facets are at hand only where they cut bonds
@@ -112,7 +112,8 @@ contains
     !> The warning, with the direction in words.
     subroutine warn(direction)
       character(*), intent(in) :: direction
-      call warnings%add('thin body '//to_text(number)//' '//to_text(c), name_of(scene, number)// &
+      call warnings%add('thin body '//to_text(number)//' '//to_text(c), &
+        & words_of_body(scene%bodies, number)// &
         & ' is one point thick'//direction//': it cannot contract across, '// &
         & 'and is too stiff in tension by a factor of 1/(1 - nu^2) or more; use more points '// &
         & 'across it, or a scene of fewer dimensions', tell=.false.)
@@ -252,15 +253,6 @@ contains
       & ') across its plane', tell=.false.)
   end subroutine warn_of_crack
 
-  !> A body in messages: its name, or its number.
-  pure function name_of(scene, number) result(name)
-    type(scene_type), intent(in) :: scene
-    integer, intent(in) :: number
-    character(:), allocatable :: name
-    name = 'body '//to_text(number)
-    if (scene%bodies(number)%name /= '') name = "the body '"//trim(scene%bodies(number)%name)//"'"
-  end function name_of
-
   !> Warn of bodies that are bonded because points of both lie within one horizon: the first few
   !> pairs one by one.
   subroutine warn_of_joints(scene, body, family, warnings)
@@ -275,7 +267,8 @@ contains
     call count_joints(body, family, joints)
     do i = 1, min(most, size(joints))
       call warnings%add('joint '//to_text(i), to_text(joints(i)%bonds)//' bonds join '// &
-        & name_of(scene, joints(i)%bodies(1))//' and '//name_of(scene, joints(i)%bodies(2))// &
+        & words_of_body(scene%bodies, joints(i)%bodies(1))//' and '// &
+        & words_of_body(scene%bodies, joints(i)%bodies(2))// &
         & ', whose points lie within a horizon of each other: they act as one; a &crack '// &
         & 'between them parts them', tell=.false.)
     end do

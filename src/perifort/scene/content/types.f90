@@ -11,7 +11,8 @@ module pd_scene_content_types
   use pd_scene_format_given, only: is_given, is_set, name_length, path_length, &
     & text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
-  use pd_scene_groups_body, only: body_group, has_cut_cells, has_grid, is_box, is_lattice, is_turned
+  use pd_scene_groups_body, only: body_group, has_cut_cells, has_grid, is_box, is_lattice, is_turned, &
+    & words_of_body
   use pd_scene_groups_boundary, only: adds_layer, boundary_group
   use pd_scene_groups_contact, only: contact_group
   use pd_scene_groups_crack, only: crack_group
@@ -43,7 +44,7 @@ module pd_scene_content_types
     & tip_group, section_group, line_group, j_integral_group, side_group, study_group, &
     & contact_group, rigid_group, refine_group, name_length, path_length, text_length, unset, &
     & is_set, is_given
-  public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned
+  public :: adds_layer, has_cut_cells, has_grid, is_box, is_lattice, is_turned, words_of_body
   public :: has_refinement, has_own_horizons, laws_of, added_type, group_entry, group_table, &
     & group_interface, groups_interface
 

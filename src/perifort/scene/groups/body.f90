@@ -1,13 +1,14 @@
 !> The group `&body`: material points.
 module pd_scene_groups_body
   use pd_base_kinds, only: wp
+  use pd_base_text, only: to_text
   use pd_scene_format_given, only: is_set, name_length, path_length, unset
   use pd_scene_format_keys, only: keys_type, mode_write
   use pd_scene_groups_group, only: group_type
   use pd_scene_groups_shape, only: axes
   implicit none (type, external)
   private
-  public :: body_group, is_lattice, is_box, is_turned, has_grid, &
+  public :: body_group, is_lattice, is_box, is_turned, has_grid, words_of_body, &
     & has_cut_cells, body_shapes
 
   !> Shapes of lattices.
@@ -72,6 +73,16 @@ contains
     type(body_group), intent(in) :: body  !! the group
     cut = body%surface /= '' .and. body%fill == 'volume'
   end function has_cut_cells
+
+  !> A body in messages: its name, or its number.
+  pure function words_of_body(bodies, number) result(words)
+    type(body_group), intent(in) :: bodies(:)  !! the groups
+    integer, intent(in) :: number              !! which one of them
+    character(:), allocatable :: words
+
+    words = 'body '//to_text(number)
+    if (bodies(number)%name /= '') words = "the body '"//trim(bodies(number)%name)//"'"
+  end function words_of_body
 
   !> The keys of the group.
   subroutine visit(group, keys)
