@@ -56,10 +56,11 @@ def family(dim, kind, horizon):
 
 
 class Disc:
-    """A disc around the tip of a crack, with Young's modulus, spacing and Gc 1."""
+    """A disc around the tip of a crack, with Young's modulus, spacing and Gc 1. `along`: the stress
+    along the crack (T) where K is 1."""
 
-    def __init__(self, dim, kind, horizon, nu, diagonal, radius=None):
-        self.radius = radius or max(28.0, 5 * horizon)
+    def __init__(self, dim, kind, horizon, nu, diagonal, radius=None, along=0.0):
+        self.radius, self.along = radius or max(28.0, 5 * horizon), along
         self.nu, self.flat, self.diagonal = nu, dim == 3, diagonal
         self.mu = 1 / (2 * (1 + nu))
         self.steps, parts = family(dim, kind, horizon)
@@ -141,11 +142,13 @@ class Disc:
                                    for k, m, s in zip(self.k, self.l, lists[:, 5])])
 
     def field(self, tip):
-        """Displacements of the classical material at K = 1."""
+        """Displacements of the classical material at K = 1, with the stress along the crack."""
         r, angle = np.hypot(self.ahead - tip, self.above), np.arctan2(self.above, self.ahead - tip)
         kappa = 3 - 4 * self.nu if self.flat else (3 - self.nu) / (1 + self.nu)
         size = np.sqrt(r / (2 * np.pi)) / (2 * self.mu) * (kappa - np.cos(angle))
-        u, v = size * np.cos(angle / 2), size * np.sin(angle / 2)
+        strains = (1 - self.nu**2, -self.nu * (1 + self.nu)) if self.flat else (1, -self.nu)
+        u = size * np.cos(angle / 2) + self.along * strains[0] * self.ahead
+        v = size * np.sin(angle / 2) + self.along * strains[1] * self.above
         if self.diagonal:
             u, v = (u - v) / np.sqrt(2), (u + v) / np.sqrt(2)
         return np.concatenate([u, v])
@@ -196,9 +199,9 @@ class Disc:
         return np.array(rates)
 
 
-def toughness(dim, kind, horizon, nu, diagonal=False, radius=None):
+def toughness(dim, kind, horizon, nu, diagonal=False, radius=None, along=0.0):
     """G/Gc of all bonds that count."""
-    disc = Disc(dim, kind, float(horizon), float(nu), diagonal, radius)
+    disc = Disc(dim, kind, float(horizon), float(nu), diagonal, radius, along)
     disc.horizon = horizon
     return disc.grow()
 
@@ -268,14 +271,29 @@ def program(dim, kind, horizon, nu, critical="lattice"):
     return tuple(map(float, found.groups()))
 
 
+def show_stress_along():
+    """What the stress along the crack changes: T = 0.95 K/sqrt(h) in an arm of h = 30 and 60 spacings."""
+    print("nu, T sqrt(dx)/K: largest G/Gc over that without T, root: the load")
+    for nu in map(Fraction, ("1/5", "1/3", "35/100", "2/5")):
+        alone = toughness(2, "linear", "3.015", nu).max()
+        for height in (30, 60):
+            along = 0.95 / np.sqrt(height)
+            part = toughness(2, "linear", "3.015", nu, along=along).max() / alone
+            print(f"{float(nu):.4g} {along:.3f}: {part:.3f} {np.sqrt(part):.3f}", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="./pf verify toughness", description=__doc__)
     parser.add_argument("--all", action="store_true", help="every row of the table (some minutes)")
     parser.add_argument("--write", action="store_true", help="write the table into the sources")
     parser.add_argument("--quick", action="store_true", help="bond-based lattices alone")
+    parser.add_argument("--stress-along", action="store_true",
+                        help="what a stress along the crack changes, as in a double cantilever")
     options = parser.parse_args()
     if options.write:
         return write()
+    if options.stress_along:
+        return show_stress_along()
     rows = ROWS if options.all else [r for r in ROWS if r[:3] == (2, "linear", "3.015")
                                      and r[3] in (Fraction(1, 5), THIRD, Fraction(2, 3))]
     # the second is not in the table
