@@ -64,6 +64,7 @@ program main
   use test_force_contract, only: collect_force_contract
   use test_force_frame, only: collect_force_frame
   use test_force_term, only: collect_force_term
+  use test_force_term_static, only: collect_force_term_static
   use test_library, only: collect_library
   use test_own_law, only: collect_own_law
   use test_motion_conditions, only: collect_motion_conditions
@@ -204,6 +205,7 @@ program main
   call register('force_contract', collect_force_contract)
   call register('force_frame', collect_force_frame)
   call register('force_term', collect_force_term)
+  call register('force_term_static', collect_force_term_static)
   call register('library', collect_library)
   call register('own_law', collect_own_law)
   call register('motion_conditions', collect_motion_conditions)
