@@ -116,6 +116,26 @@ ROLLS = """
 RIGID = ("contact_energy", "friction_work", "contact_dissipation")
 
 
+# a crack that grows through a plate of four layers from one side, and another in the middle that branches
+TIPS = """
+&scene dimension = 3 /
+&body lower = 0.0, 0.0, 0.0, upper = 0.6, 0.36, 0.04, points = 60, 36, 4 /
+&material model = 'state_based', youngs_modulus = 2.0e11, poissons_ratio = 0.25, density = 8000.0,
+  critical_stretch = 1.0e-3 /
+&horizon ratio = 3.015 /
+&crack corner = 0.0, 0.18, 0.0, edge_1 = 0.15, 0.0, 0.0, edge_2 = 0.0, 0.0, 0.04 /
+&crack corner = 0.4, 0.18, 0.0, edge_1 = 0.1, 0.0, 0.0, edge_2 = 0.0, 0.0, 0.04 /
+&no_fail shape = 'box', lower(2) = 0.3 /
+&no_fail shape = 'box', upper(2) = 0.06 /
+&boundary side = 'y_max', velocity_y = 1.6 /
+&boundary side = 'y_min', velocity_y = -1.6 /
+&tip name = 'left', from = 0.0, 0.18, 0.02, direction = 1.0, 0.0, 0.0, threshold = 0.3 /
+&tip name = 'right', from = 0.45, 0.18, 0.02, direction = 1.0, 0.1, 0.0, threshold = 0.3 /
+&time steps = 112 /
+&output every = 40, history_every = 4, fields = 'displacement', 'damage', precision = 'double' /
+"""
+
+
 class Scene:
     """A scene, what stands in place of its words, and what is asked of it."""
 
@@ -144,6 +164,8 @@ OWN = [
     Scene("file", FILE),
     Scene("measures", MEASURES, {"TIME": "steps = 160"}, pieces=True,
           changes=("broken_bonds", "part_force_x", "cut_damage", "corner_energy_density")),
+    Scene("tips", TIPS, pieces=True, changes=("left_projection", "left_length",
+                                              "right_projection", "right_projection_mean")),
     Scene("measures at rest", MEASURES.replace("velocity_x = -4.0", "displacement_x = -1.0e-5")
           .replace("velocity_x = 4.0, velocity_y = 1.0", "displacement_x = 2.0e-5"),
           {"TIME": STATIC + ", growth = 'load_steps'"}, short=False, tolerance=1e-6),
@@ -153,7 +175,7 @@ OWN = [
           changes=(*RIGID, "left_moment_z", "box_rotation_z", "box_force_y")),
 ]
 
-PIECES_SHORT = ("heat", "ball")  # with --short in pieces, too
+PIECES_SHORT = ("heat", "ball", "tips")  # with --short in pieces, too
 
 # A wedge that points down on the plate, in mm.
 CORNERS = np.array([[40, 10, 16], [52, 10, 16], [46, 10, 10.05], [40, 30, 16], [52, 30, 16], [46, 30, 10.05]], float)

@@ -46,7 +46,7 @@ SCENES = [
     ("mixed", "trade/precision.nml", {"body": {"points": "80, 40"}, "scene": {"precision": "'mixed'"}}),
     ("block in motion", "trade/steps_block.nml", {}),
 ]
-LEFT_OUT = ("tip", "study")
+LEFT_OUT = ("study",)
 OF_BOTH = ("block", "plate")  # written as .vtu files, too
 SHORT = ("bar", "block", "plate", "hole", "failure", "crack", "glass", "mixed")
 # The same points as a list, whose sums depend on the ranks in the last digits: differences grow with

@@ -54,7 +54,6 @@ contains
       if (any(sides_of_contact(scene, i) > 0)) call refuse('contact', i, '', &
         & 'contact of points with points')
     end do
-    if (size(scene%tips) > 0) call refuse('tip', 1, '', '&tip')
     if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
     if (scene%output%fragments) call refuse('output', 1, 'fragments', 'fragments')
