@@ -9,7 +9,7 @@ module test_ranks
   use pd_base_order, only: ascending_order, exchange, number_points, order_type, ranks_type
   use pd_base_reduce, only: add_point, bring_noise, first_largest, first_where, inner, &
     & largest_over, least_over, new_running, noise, noise_after, running_type, sum_listed, &
-    & sum_over, total_of_running
+    & sum_over, sum_parts, total_of_running
   use pd_body_body, only: allocate_points, body_type, gather
   use pd_body_division, only: divide_space, division_type, take_part, work_of_points
   use pd_family_cracks, only: cut_bonds
@@ -352,8 +352,13 @@ contains
       integer, intent(in) :: ranks
       type(hub_type), target :: hub
       type(fake_type), target :: fake(ranks)
+      integer, parameter :: parts = 4  ! thirds of the points and one point alone
       real(wp) :: total(ranks), one_by_one(ranks), listed(ranks), totals(6)
+      real(wp) :: in_parts(2, parts, ranks), of_parts(2, parts)
       real(wp), allocatable :: mine(:)
+      integer(i4), allocatable :: by_part(:)
+      integer(i4) :: start(parts + 1)
+      integer(i8) :: all_points(parts)
       integer(i8), allocatable :: number(:)
       integer(i4), allocatable :: slot(:)
       integer :: states(ranks)
@@ -361,17 +366,27 @@ contains
       type(order_type) :: order
       type(running_type) :: running
       logical :: enough
-      integer :: r, p
+      integer :: r, p, part(n)
 
       if (allocated(error)) return
+      part = [(1 + mod(p, 3), p=1, n)]
+      part(17) = parts
+      all_points = [(int(count(part == p), i8), p=1, parts)]
+      do p = 1, parts
+        by_part = pack([(int(r, i4), r=1, n)], part == p)
+        of_parts(:, p) = [sum_listed(whole, by_part, a(by_part)), &
+          & sum_listed(whole, by_part, -2*a(by_part))]
+      end do
       allocate (hub%of_rank(ranks))
       enough = .false.
       total = 0.0_wp
+      in_parts = 0.0_wp
       one_by_one = 0.0_wp
       same = .true.
       !$omp parallel num_threads(ranks) default(none) &
       !$omp shared(ranks, owner, hub, fake, total, one_by_one, listed, a, enough, states, same) &
-      !$omp private(r, p, order, mine, number, slot, running, totals)
+      !$omp shared(part, all_points, in_parts) &
+      !$omp private(r, p, order, mine, number, slot, running, totals, by_part, start)
       if (omp_get_num_threads() == ranks) then
         r = omp_get_thread_num() + 1
         if (r == 1) enough = .true.
@@ -391,6 +406,15 @@ contains
         totals = total_of_running(order, running)
         one_by_one(r) = totals(1)
         listed(r) = sum_listed(order, slot, mine)
+        start = 1_i4
+        by_part = [integer(i4) ::]
+        do p = 1, parts
+          by_part = [by_part, pack(slot, part(number) == p)]
+          start(p + 1) = size(by_part, kind=i4) + 1_i4
+        end do
+        call sum_parts(order, start, all_points, by_part, &
+          & reshape([mine(by_part), -2*mine(by_part)], [2, size(by_part)], order=[2, 1]), &
+          & in_parts(:, :, r))
         do p = 1, size(mine)
           call bring_noise(order, p, 4711, 3, states(r))
           if (states(r) /= noise_after(4711, 3*(number(p) - 1))) same(r) = .false.
@@ -403,6 +427,7 @@ contains
         call expect(error, total(r), expected, 0.0_wp, 'the sum of a split')
         call expect(error, one_by_one(r), expected, 0.0_wp, 'a split, point by point')
         call expect(error, listed(r), expected, 0.0_wp, 'a split, by a list')
+        call expect_close(error, in_parts(:, :, r), of_parts, 0.0_wp, 'a split, in parts')
         call expect_true(error, same(r), 'random numbers of a split')
       end do
     end subroutine try

@@ -136,6 +136,22 @@ TIPS = """
 """
 
 
+# a bar held by two pins, one of which moves; a bar that turns about a pin and breaks on the other
+PINS = """
+&scene dimension = 2, thickness = 0.01 /
+&body lower = 0.0, 0.0, upper = 0.6, 0.2, points = 60, 20 /
+&material model = 'state_based', youngs_modulus = 2.0e11, poissons_ratio = 0.3, density = 8000.0BREAK /
+&horizon ratio = 3.015 /
+&region name = 'left', shape = 'sphere', centre = 0.1, 0.1, radius = 0.05 /
+&region name = 'right', shape = 'sphere', centre = 0.5, 0.1, radius = 0.05 /
+&boundary name = 'left', region = 'left', motion = 'pin', displacement_x = 0.0, displacement_y = 0.0 /
+&boundary name = 'right', region = 'right', motion = 'pin', MOVED /
+&load side = 'x_max', force_y = 1.0e4 /
+&time TIME /
+&output every = 40, history_every = 4, fields = FIELDS, precision = 'double'ALSO /
+"""
+
+
 class Scene:
     """A scene, what stands in place of its words, and what is asked of it."""
 
@@ -166,6 +182,13 @@ OWN = [
           changes=("broken_bonds", "part_force_x", "cut_damage", "corner_energy_density")),
     Scene("tips", TIPS, pieces=True, changes=("left_projection", "left_length",
                                               "right_projection", "right_projection_mean")),
+    Scene("pins, fragments", PINS, {"BREAK": ", critical_stretch = 1.0e-3", "TIME": "steps = 160",
+                                    "MOVED": "velocity_x = 8.0, velocity_y = 6.0",
+                                    "FIELDS": "'displacement', 'fragment'",
+                                    "ALSO": ", fragments = .true."}, pieces=True,
+          changes=("left_moment_z", "right_rotation_z", "fragments", "largest_fragment_mass")),
+    Scene("pins at rest", PINS, {"BREAK": "", "TIME": STATIC, "FIELDS": "'displacement', 'stress'",
+                                 "MOVED": "displacement_y = 1.0e-5", "ALSO": ""}, tolerance=1e-6),
     Scene("measures at rest", MEASURES.replace("velocity_x = -4.0", "displacement_x = -1.0e-5")
           .replace("velocity_x = 4.0, velocity_y = 1.0", "displacement_x = 2.0e-5"),
           {"TIME": STATIC + ", growth = 'load_steps'"}, short=False, tolerance=1e-6),

@@ -47,6 +47,7 @@ SCENES = [
     ("block in motion", "trade/steps_block.nml", {}),
 ]
 LEFT_OUT = ("study",)
+TABLES = ("history.csv", "fragments.csv")  # compared as text
 OF_BOTH = ("block", "plate")  # written as .vtu files, too
 SHORT = ("bar", "block", "plate", "hole", "failure", "crack", "glass", "mixed")
 # The same points as a list, whose sums depend on the ranks in the last digits: differences grow with
@@ -151,7 +152,7 @@ class Mpi(Case):
 
 
 def arrays(folder):
-    """All arrays of a results file by their paths, and the history as text."""
+    """All arrays of a results file by their paths, and the tables beside it as text."""
     found = {}
     [path] = folder.glob("*.vtkhdf")
 
@@ -160,7 +161,9 @@ def arrays(folder):
             found[name] = item[()]
     with h5py.File(path, "r") as file:
         file.visititems(visit)
-    found["history.csv"] = np.frombuffer((folder / "history.csv").read_bytes(), np.uint8)
+    for name in TABLES:
+        if (folder / name).is_file():
+            found[name] = np.frombuffer((folder / name).read_bytes(), np.uint8)
     return found
 
 
@@ -175,7 +178,7 @@ def difference(one, other):
     for name, values in a.items():
         if values.shape != b[name].shape:
             return np.inf
-        if np.array_equal(values, b[name]) or name == "history.csv":
+        if np.array_equal(values, b[name]) or name in TABLES:
             continue
         scale = np.abs(values).max()
         found = np.abs(values.astype(float) - b[name]).max() / scale if scale > 0 else np.inf
@@ -184,7 +187,7 @@ def difference(one, other):
 
 
 def same_bits(one, other):
-    """Whether all arrays of two runs, and the history's text, are the same."""
+    """Whether all arrays of two runs, and the text of their tables, are the same."""
     a, b = arrays(one), arrays(other)
     return a.keys() == b.keys() and all(a[k].tobytes() == b[k].tobytes() for k in a)
 

@@ -18,7 +18,7 @@ module pd_base_reduce
   private
   public :: sums_type, running_type
   public :: new_sums, add_block, total_of, new_running, add_point, total_of_running
-  public :: inner, sum_over, sum_listed, largest_over, least_over, first_where, first_largest
+  public :: inner, sum_over, sum_listed, sum_parts, largest_over, least_over, first_where, first_largest
   public :: largest_of_ranks, sum_of_ranks, count_of_ranks, any_of_ranks
   public :: noise, noise_after, bring_noise
 
@@ -311,6 +311,94 @@ contains
     call values_of(order, whole, totals)
     total = totals(1)
   end function sum_listed
+
+  !> The sums of some terms over parts of the points, on all ranks: of each part and term the bits of
+  !> `sum_listed`. Most parts are on one rank, which knows their sums; the digits of the others go
+  !> from rank to rank, some parts at a time.
+  subroutine sum_parts(order, start, all_points, points, terms, totals)
+    type(order_type), intent(in) :: order      !! which points are owned
+    integer(i4), intent(in) :: start(:)        !! (parts + 1) where each part begins in `points`
+    integer(i8), intent(in) :: all_points(:)   !! (parts) how many points a part has on all ranks
+    integer(i4), intent(in) :: points(:)       !! numbers here, part by part
+    real(wp), intent(in) :: terms(:, :)        !! (terms, points); those of points that others own
+                                               !! do not count
+    real(wp), intent(out) :: totals(:, :)      !! (terms, parts)
+    integer, parameter :: at_once = 64         ! parts of which digits are sent
+    type(whole_type), allocatable :: whole(:)
+    real(wp), allocatable :: divided(:), flat(:)
+    integer, allocatable :: shared(:)
+    integer :: p, n, first, last, here
+
+    n = size(terms, 1)
+    allocate (divided(size(all_points)), source=0.0_wp)
+    do p = 1, size(all_points)
+      call sum_here(order, points(start(p):start(p + 1) - 1), &
+        & terms(:, start(p):start(p + 1) - 1), here, whole)
+      if (here < all_points(p)) then
+        if (here > 0) divided(p) = 1.0_wp
+        totals(:, p) = 0.0_wp
+      else
+        totals(:, p) = [(value_of(whole(last)), last=1, n)]
+      end if
+    end do
+    if (.not. associated(order%ranks)) return
+    call order%ranks%take_largest(divided)
+    flat = reshape(totals, [size(totals)])
+    call order%ranks%add_all(flat)
+    totals = reshape(flat, shape(totals))
+    shared = pack([(p, p=1, size(divided))], divided > 0.0_wp)
+    do first = 1, size(shared), at_once
+      last = min(first + at_once - 1, size(shared))
+      call sum_shared(shared(first:last))
+    end do
+
+  contains
+
+    !> The sums of parts that several ranks have.
+    subroutine sum_shared(parts)
+      integer, intent(in) :: parts(:)
+      type(whole_type), allocatable :: of_part(:), all_parts(:)
+      real(wp) :: values(n*size(parts))
+      integer :: i, points_here
+
+      allocate (all_parts(n*size(parts)))
+      do i = 1, size(parts)
+        associate (a => start(parts(i)), b => start(parts(i) + 1) - 1)
+          call sum_here(order, points(a:b), terms(:, a:b), points_here, of_part)
+        end associate
+        all_parts(n*(i - 1) + 1:n*i) = of_part
+      end do
+      call values_of(order, all_parts, values)
+      totals(:, parts) = reshape(values, [n, size(parts)])
+    end subroutine sum_shared
+  end subroutine sum_parts
+
+  !> The digits of the sums over those of some points that are owned, and how many these are.
+  pure subroutine sum_here(order, points, terms, number, whole)
+    type(order_type), intent(in) :: order
+    integer(i4), intent(in) :: points(:)
+    real(wp), intent(in) :: terms(:, :)   !! (terms, points)
+    integer, intent(out) :: number
+    type(whole_type), allocatable, intent(out) :: whole(:)  !! (terms)
+    real(wp) :: some(block_points, size(terms, 1))
+    integer :: i, n, s
+
+    allocate (whole(size(terms, 1)))
+    number = 0
+    n = 0
+    do i = 1, size(points)
+      if (owns(order, points(i))) then
+        number = number + 1
+        n = n + 1
+        some(n, :) = terms(:, i)
+      end if
+      if (n == 0 .or. (n < block_points .and. i < size(points))) cycle
+      do s = 1, size(whole)
+        call add_digits(digits_of(some(:n, s)), whole(s))
+      end do
+      n = 0
+    end do
+  end subroutine sum_here
 
   ! ---------------------------------------------------------------- sums of arrays over slots
 

@@ -1,15 +1,15 @@
 !> Imposed motion, heating and no-fail zones of a scene, on the slots that they hold.
 module pd_set_up_conditions
-  use pd_base_kinds, only: wp, i2, i4
+  use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_error, only: error_type
   use pd_base_expression, only: constant_value, expression_type
   use pd_scene_content_expressions, only: expression_of, varies_in_time
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: scene_type, is_set
   use pd_scene_groups_course, only: ramp_of
-  use pd_base_reduce, only: any_of_ranks
+  use pd_base_reduce, only: any_of_ranks, count_of_ranks
   use pd_base_text, only: to_text
-  use pd_body_body, only: body_type
+  use pd_body_body, only: body_type, owned
   use pd_body_meshes, only: facet_mask, names_set
   use pd_body_choice, only: values_on
   use pd_body_regions, only: in_shape, region_mask
@@ -92,7 +92,8 @@ contains
     allocate (of_pin(body%n_slots))
     do m = 1, size(motions)
       if (.not. motions(m)%is_pin) cycle
-      if (size(motions(m)%slots) == 1 .and. body%dim > 1) then
+      if (body%dim > 1 .and. count_of_ranks(body%order, count(owned(body, &
+        & int(motions(m)%slots)), kind=i8)) == 1_i8) then
         call scene_fault(error, scene, 'boundary', m, 'motion', 'a pin of one point', &
           & 'a single point has no rotation: leave out motion, or take a region with more points')
         return
@@ -131,8 +132,8 @@ contains
     call expression_of(scene, text, expression)
     if (expression%in_time) then
       if (motion%is_pin) then
-        ! the same at every place
-        call vary_in_time(motion, c, expression, body%x(motion%slots(:1), :))
+        ! the same at every place, also where a rank has none of its points
+        call vary_in_time(motion, c, expression, reshape([real(wp) ::], [1, body%dim], [0.0_wp]))
       else
         call vary_in_time(motion, c, expression, body%x(motion%slots, :))
       end if

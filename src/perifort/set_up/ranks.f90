@@ -47,20 +47,21 @@ contains
     if (scene%horizon%local) call refuse('horizon', 1, 'local', 'horizons of points')
     if (scene%horizon%surface_correction == 'consistent') &
       & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
-    do i = 1, size(scene%boundaries)
-      if (scene%boundaries(i)%motion == 'pin') call refuse('boundary', i, 'motion', 'a pin')
-    end do
     do i = 1, size(scene%contacts)
       if (any(sides_of_contact(scene, i) > 0)) call refuse('contact', i, '', &
         & 'contact of points with points')
     end do
     if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
-    if (scene%output%fragments) call refuse('output', 1, 'fragments', 'fragments')
-    if (allocated(scene%output%fields)) then
-      if (any(scene%output%fields == 'fragment')) call refuse('output', 1, 'fields', &
-        & "the field 'fragment'")
-    end if
+    ! fragments are found by all ranks together, values at places by those that are near
+    do i = 1, size(scene%probes)
+      if (any(scene%probes(i)%fields == 'fragment')) call refuse('probe', i, 'fields', &
+        & "a probe of the field 'fragment'", 'an output can have it')
+    end do
+    do i = 1, size(scene%lines)
+      if (any(scene%lines(i)%fields == 'fragment')) call refuse('line', i, 'fields', &
+        & "a line of the field 'fragment'", 'an output can have it')
+    end do
 
   contains
 

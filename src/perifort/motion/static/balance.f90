@@ -230,7 +230,7 @@ contains
     end associate
     do m = 1, size(frames)
       if (frames(m)%number == 0) cycle
-      associate (piece => balance%piece(rigid%pieces%of(system%motions(m)%slots(1))))
+      associate (piece => balance%piece(rigid%first_of_pin(m)))
         piece%residual = piece%residual + squares_of(system, m, left, .true.)
         piece%rho = piece%rho + sum(drives(:, m)**2)
       end associate

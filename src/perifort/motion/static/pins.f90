@@ -231,8 +231,8 @@ contains
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
         if (.not. motion%is_pin) cycle
-        p = rigid%pieces%of(motion%slots(1))
-        if (any(rigid%pieces%of(motion%slots) /= p)) then
+        p = rigid%first_of_pin(m)
+        if (rigid%last_of_pin(m) > p) then
           call fail(error, 'the pin of &boundary number '//to_text(m)//' holds points of '// &
             & 'several pieces that no bond joins: in static equilibrium a pin lies in one piece', &
             & status, 'boundary', m)

@@ -2,12 +2,13 @@
 !> problem nothing resists those, so the loads must not drive them.
 module pd_motion_static_rigid
   use pd_base_eigen, only: eigenvectors, solve_symmetric
-  use pd_base_kinds, only: wp, i1
-  use pd_base_reduce, only: add_point, new_running, running_type, total_of_running, &
-    & largest_of_ranks, largest_over
+  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_reduce, only: add_point, count_of_ranks, new_running, running_type, &
+    & total_of_running, largest_of_ranks, largest_over
   use pd_base_error, only: error_type, fail
   use pd_base_text, only: to_text
   use pd_base_vectors, only: cross
+  use pd_body_body, only: owned
   use pd_motion_static_pieces, only: pieces_type, find_pieces, piece_text
   use pd_force_term, only: term_view_type
   use pd_motion_conditions, only: free_component
@@ -42,6 +43,8 @@ module pd_motion_static_rigid
   type :: rigid_type
     type(pieces_type) :: pieces
     type(piece_type), allocatable :: piece(:)
+    integer, allocatable :: first_of_pin(:)  !! (motions) the first and the last piece in which the
+    integer, allocatable :: last_of_pin(:)   !! points of a pin are; 0 for other boundaries
   end type rigid_type
 
 contains
@@ -64,6 +67,7 @@ contains
           & rigid%piece(p))
       end associate
     end do
+    call place_pins(system, rigid)
     call find_resistance(system, rigid, resistance)
     call resist_by_pins(system, rigid, resistance)
     held = held_but_for_pins(system)
@@ -107,6 +111,23 @@ contains
         & real(maxval(system%held(slots, :)), wp)) > 0.0_wp
     end associate
   end subroutine place_piece
+
+  !> The pieces in which pins are; a rank may have no point of a pin.
+  subroutine place_pins(system, rigid)
+    type(system_type), intent(in) :: system
+    type(rigid_type), intent(inout) :: rigid  !! with its pieces
+    integer :: m
+
+    allocate (rigid%first_of_pin(size(system%motions)), rigid%last_of_pin(size(system%motions)), &
+      & source=0)
+    do m = 1, size(system%motions)
+      if (.not. system%motions(m)%is_pin) cycle
+      associate (of => rigid%pieces%of(system%motions(m)%slots), order => system%body%order)
+        rigid%first_of_pin(m) = -nint(largest_of_ranks(order, -real(minval(of), wp)))
+        rigid%last_of_pin(m) = nint(largest_of_ranks(order, real(max(0_i4, maxval(of)), wp)))
+      end associate
+    end do
+  end subroutine place_pins
 
   !> What the terms of the force resist to the six unit motions of each piece alone, over the
   !> largest stiffness of a point, so that a point counts about as one that is held.
@@ -166,17 +187,20 @@ contains
     real(wp), intent(inout) :: resistance(:, :, :)      !! (6, 6, pieces) [-] added to
     real(wp) :: mode(6)
     integer :: m, c, i, p
+    integer(i8) :: points
 
     do m = 1, size(system%motions)
       associate (motion => system%motions(m))
         if (.not. motion%is_pin) cycle
-        p = rigid%pieces%of(motion%slots(1))
+        p = rigid%first_of_pin(m)
+        points = count_of_ranks(system%body%order, count(owned(system%body, int(motion%slots)), &
+          & kind=i8))
         do c = 1, system%body%dim
           if (motion%kind(c) == free_component) cycle
           mode = motion_at(rigid%piece(p)%centre, rigid%piece(p)%size, &
             & motion%pose%centre(:system%body%dim), c)
           do i = 1, 6
-            resistance(:, i, p) = resistance(:, i, p) + size(motion%slots)*mode(i)*mode
+            resistance(:, i, p) = resistance(:, i, p) + points*mode(i)*mode
           end do
         end do
       end associate

@@ -3,7 +3,6 @@ module pd_output_fields_fragment
   use pd_base_kinds, only: wp
   use pd_body_body, only: gather
   use pd_motion_static_pieces, only: find_pieces, pieces_type
-  use pd_motion_system, only: system_type
   use pd_output_fields_field, only: moment_type, output_field_type
   use pd_output_results_types, only: nodes_nearest
   implicit none (type, external)
@@ -18,7 +17,6 @@ contains
     field%meaning = 'number of the part that chains of intact bonds join, by its first point'
     field%at_nodes = nodes_nearest
     field%fill => fill
-    field%lack => lack
   end function fragment_field
 
   !> Parts are numbered from 1 in the order of their first points.
@@ -31,14 +29,5 @@ contains
     call find_pieces(now%system%body, now%system%family, pieces)
     call gather(now%system%body, real(pieces%of, wp), values(:, 1))
   end subroutine fill
-
-  function lack(system) result(reason)
-    type(system_type), intent(in) :: system
-    character(:), allocatable :: reason
-
-    reason = ''
-    if (associated(system%body%order%ranks)) &
-      & reason = 'parts of the body are found by one process alone'
-  end function lack
 
 end module pd_output_fields_fragment

@@ -3,7 +3,9 @@
 module pd_output_measures_fragments
   use pd_base_error, only: error_type
   use pd_base_kinds, only: wp, i4, i8
+  use pd_base_reduce, only: sum_parts
   use pd_base_vectors, only: cross
+  use pd_body_body, only: owned
   use pd_motion_static_pieces, only: find_pieces, pieces_type
   use pd_motion_system, only: inverse_density, system_type
   use pd_output_fields_field, only: moment_type
@@ -58,9 +60,6 @@ contains
       call scene_fault(error, scene, 'output', 1, 'fragments', &
         & 'there are no fragments: no bond can break', &
         & 'expected a material with critical_stretch, or a &crack')
-    else if (associated(system%body%order%ranks)) then
-      call scene_fault(error, scene, 'output', 1, 'fragments', 'fragments cannot be found', &
-        & 'parts of the body are found by one process alone')
     end if
   end subroutine begin_fragments
 
@@ -82,32 +81,25 @@ contains
     type(row_source_type), intent(in) :: now
     real(wp), intent(out) :: values(:)
     type(pieces_type) :: pieces
-    integer :: p
-
-    if (now%system%broken /= measure%broken) then
-      call find_pieces(now%system%body, now%system%family, pieces)
-      measure%broken = now%system%broken
-      measure%number = pieces%number
-      measure%mass = 0.0_wp
-      do p = 1, pieces%number
-        measure%mass = max(measure%mass, mass_of(now%system, pieces, p))
-      end do
-    end if
-    values(:) = [real(measure%number, wp), measure%mass]
-  end subroutine row_of_fragments
-
-  !> The mass of a piece, summed in the order of its points [kg].
-  pure real(wp) function mass_of(system, pieces, piece) result(mass)
-    type(system_type), intent(in) :: system
-    type(pieces_type), intent(in) :: pieces
-    integer, intent(in) :: piece
+    real(wp), allocatable :: masses(:, :), totals(:, :)
     integer :: i
 
-    mass = 0.0_wp
-    do i = pieces%start(piece), pieces%start(piece + 1) - 1
-      mass = mass + mass_at(system, pieces%slots(i))
-    end do
-  end function mass_of
+    associate (system => now%system)
+      if (system%broken /= measure%broken) then
+        call find_pieces(system%body, system%family, pieces)
+        measure%broken = system%broken
+        measure%number = pieces%number
+        allocate (masses(1, size(pieces%slots)), totals(1, pieces%number))
+        do i = 1, size(pieces%slots)
+          masses(1, i) = mass_at(system, pieces%slots(i))
+        end do
+        call sum_parts(system%body%order, pieces%start, pieces%points, &
+          & system%body%point(pieces%slots), masses, totals)
+        measure%mass = max(0.0_wp, maxval(totals))
+      end if
+    end associate
+    values(:) = [real(measure%number, wp), measure%mass]
+  end subroutine row_of_fragments
 
   !> The mass of a point [kg].
   pure real(wp) function mass_at(system, k) result(mass)
@@ -117,66 +109,65 @@ contains
   end function mass_at
 
   !> All fragments at an instant, in the order of their first points, as the field `fragment`
-  !> numbers them. Sums go in the order of points.
+  !> numbers them; all ranks have all of them.
   subroutine fragments_of(now, fragments)
     type(moment_type), intent(in) :: now                             !! with velocities
     type(fragment_type), allocatable, intent(out) :: fragments(:)    !! (any number)
     type(pieces_type) :: pieces
-    integer :: p
+    real(wp), allocatable :: terms(:, :), totals(:, :), sizes(:)
+    real(wp) :: r(3), v(3), inertia(3, 3)
+    integer :: i, p, c
 
-    call find_pieces(now%system%body, now%system%family, pieces)
-    allocate (fragments(pieces%number))
+    associate (system => now%system, body => now%system%body, dim => now%system%body%dim)
+      call find_pieces(body, system%family, pieces)
+      allocate (fragments(pieces%number), sizes(pieces%number))
+      ! mass, first moment, momentum
+      allocate (terms(7, size(pieces%slots)), totals(7, pieces%number), source=0.0_wp)
+      do i = 1, size(pieces%slots)
+        associate (k => pieces%slots(i))
+          terms(1, i) = mass_at(system, k)
+          terms(2:1 + dim, i) = terms(1, i)*(body%x(k, :) + system%state%u(k, :))
+          terms(5:4 + dim, i) = terms(1, i)*now%v(k, :)
+        end associate
+      end do
+      call sum_parts(body%order, pieces%start, pieces%points, body%point(pieces%slots), terms, &
+        & totals)
+      do p = 1, pieces%number
+        fragments(p)%points = int(pieces%points(p))
+        fragments(p)%mass = totals(1, p)
+        fragments(p)%centre = totals(2:4, p)/totals(1, p)
+        fragments(p)%velocity = totals(5:7, p)/totals(1, p)
+      end do
+      ! angular momentum and second moments about the centre
+      deallocate (terms, totals)
+      allocate (terms(9, size(pieces%slots)), totals(9, pieces%number))
+      sizes = 0.0_wp
+      do i = 1, size(pieces%slots)
+        associate (k => pieces%slots(i), f => fragments(pieces%of(pieces%slots(i))))
+          r = 0.0_wp
+          v = 0.0_wp
+          r(:dim) = body%x(k, :) + system%state%u(k, :) - f%centre(:dim)
+          v(:dim) = now%v(k, :) - f%velocity(:dim)
+          terms(:, i) = mass_at(system, k)*[cross(r, v), r**2, r(1)*r(2), r(2)*r(3), r(1)*r(3)]
+          if (owned(body, int(k))) sizes(pieces%of(k)) = max(sizes(pieces%of(k)), &
+            & 2*norm2(r) + body%spacing(k))
+        end associate
+      end do
+      call sum_parts(body%order, pieces%start, pieces%points, body%point(pieces%slots), terms, &
+        & totals)
+      if (associated(body%order%ranks)) call body%order%ranks%take_largest(sizes)
+    end associate
     do p = 1, pieces%number
-      call describe(now, pieces%slots(pieces%start(p):pieces%start(p + 1) - 1), fragments(p))
+      associate (m => totals(4:, p))
+        inertia = -reshape([m(1), m(4), m(6), m(4), m(2), m(5), m(6), m(5), m(3)], [3, 3])
+        do c = 1, 3
+          inertia(c, c) = inertia(c, c) + m(1) + m(2) + m(3)
+        end do
+      end associate
+      fragments(p)%spin = spin_of(totals(:3, p), inertia)
+      fragments(p)%size = sizes(p)
     end do
   end subroutine fragments_of
-
-  !> What there is to know of one.
-  subroutine describe(now, slots, fragment)
-    type(moment_type), intent(in) :: now
-    integer(i4), intent(in) :: slots(:)  !! in the order of points
-    type(fragment_type), intent(out) :: fragment
-    real(wp) :: momentum(3), inertia(3, 3), r(3), v(3), mass
-    integer :: i, c
-
-    associate (body => now%system%body, dim => now%system%body%dim)
-      fragment%points = size(slots)
-      do i = 1, size(slots)
-        mass = mass_at(now%system, slots(i))
-        fragment%mass = fragment%mass + mass
-        fragment%centre(:dim) = fragment%centre(:dim) + mass*place(slots(i))
-        fragment%velocity(:dim) = fragment%velocity(:dim) + mass*now%v(slots(i), :)
-      end do
-      fragment%centre = fragment%centre/fragment%mass
-      fragment%velocity = fragment%velocity/fragment%mass
-      momentum = 0.0_wp
-      inertia = 0.0_wp
-      do i = 1, size(slots)
-        mass = mass_at(now%system, slots(i))
-        r = 0.0_wp
-        v = 0.0_wp
-        r(:dim) = place(slots(i)) - fragment%centre(:dim)
-        v(:dim) = now%v(slots(i), :) - fragment%velocity(:dim)
-        momentum = momentum + mass*[r(2)*v(3) - r(3)*v(2), r(3)*v(1) - r(1)*v(3), &
-          & r(1)*v(2) - r(2)*v(1)]
-        do c = 1, 3
-          inertia(:, c) = inertia(:, c) - mass*r*r(c)
-          inertia(c, c) = inertia(c, c) + mass*sum(r**2)
-        end do
-        fragment%size = max(fragment%size, 2*norm2(r) + body%spacing(slots(i)))
-      end do
-    end associate
-    fragment%spin = spin_of(momentum, inertia)
-
-  contains
-
-    !> Where a point is now (dim) [m].
-    pure function place(k) result(x)
-      integer(i4), intent(in) :: k
-      real(wp) :: x(now%system%body%dim)
-      x = now%system%body%x(k, :) + now%system%state%u(k, :)
-    end function place
-  end subroutine describe
 
   !> The angular velocity that gives mass points of such inertia their angular momentum; 0 of a
   !> single point, and about the line of points that stand in one line.
