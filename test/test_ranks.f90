@@ -15,16 +15,17 @@ module test_ranks
   use pd_family_cracks, only: cut_bonds
   use pd_family_lattice, only: lattice_family_type, new_lattice_family
   use pd_force_breaking, only: damage_of
+  use pd_force_contact, only: contact_type, new_contact
   use pd_force_dashpots, only: dashpots_type, new_dashpots
   use pd_force_springs, only: new_springs, springs_type
-  use pd_force_term, only: force_term_type
+  use pd_force_term, only: force_term_type, term_view_type
   use pd_force_model, only: new_model
   use pd_force_weights, only: build_weights
   use pd_motion_conditions, only: motion_type
   use pd_motion_loads, only: add_loads_to, load_of, load_type, number_of_loads
   use pd_motion_explicit_integrators, only: run_explicit
   use pd_motion_static_relaxation, only: relaxation_type, run_relaxation
-  use pd_motion_system, only: start_system, system_type
+  use pd_motion_system, only: start_system, system_type, view_of
   use pd_output_deal, only: deal_type
   use pd_set_up_prepare, only: set_up_type
   use pd_set_up_ranks, only: find_lowest, reproducible_layer, work_of_body
@@ -89,6 +90,7 @@ contains
       & new_unittest('an explicit run in space', test_block), &
       & new_unittest('a growing crack', test_crack), &
       & new_unittest('springs and dashpots', test_terms), &
+      & new_unittest('contact of two halves', test_halves), &
       & new_unittest('dynamic relaxation', test_relaxation), &
       & new_unittest('dynamic relaxation of a bar', test_bar), &
       & new_unittest('conjugate gradients', test_gradients)]
@@ -176,11 +178,12 @@ contains
     !$omp barrier
   end subroutine collect
 
-  subroutine deal(self, values, given, got)
+  subroutine deal(self, values, given, got, taken)
     class(fake_type), intent(inout) :: self
     real(wp), intent(in) :: values(:)
     integer, intent(in) :: given(:)
     real(wp), allocatable, intent(out) :: got(:)
+    integer, intent(in), optional :: taken(:)
     integer :: r, at
 
     self%hub%of_rank(self%rank)%values = values
@@ -191,6 +194,9 @@ contains
       associate (all_given => nint(self%hub%of_rank(r)%field(:, 1)))
         at = sum(all_given(:self%rank - 1))
         got = [got, self%hub%of_rank(r)%values(at + 1:at + all_given(self%rank))]
+        if (present(taken)) then
+          if (taken(r) /= all_given(self%rank)) error stop 'other numbers than a rank expects'
+        end if
       end associate
     end do
     !$omp barrier
@@ -632,6 +638,30 @@ contains
     call compare(scene, 2, 'relaxation', error)
   end subroutine test_terms
 
+  !> Halves that a crack parts are pressed together and slide. Ranks are cut along the crack and
+  !> across it, so that points of other ranks meet, with and without copies; then bonds break.
+  subroutine test_halves(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+
+    call plate(scene)
+    deallocate (scene%loads, scene%cracks, scene%contacts)
+    allocate (scene%loads(0), scene%cracks(1), scene%contacts(1))
+    scene%cracks(1)%from(:2) = [-0.1_wp, 0.2_wp]
+    scene%cracks(1)%to(:2) = [1.0_wp, 0.2_wp]
+    scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) ::]
+    scene%contacts(1)%within = 'box'
+    scene%contacts(1)%friction = 0.4_wp
+    scene%boundaries(1)%velocity(:2) = [20.0_wp, 30.0_wp]
+    scene%boundaries(2)%velocity(:2) = [-20.0_wp, -30.0_wp]
+    scene%time%steps = 120
+    call compare(scene, 2, 'velocity_verlet', error, dissipates=.true.)
+    call compare(scene, 3, 'runge_kutta', error, dissipates=.true.)
+    scene%materials(1)%critical_stretch = 2.0e-3_wp
+    scene%contacts(1)%damping = 0.2_wp
+    call compare(scene, 4, 'velocity_verlet', error, breaks=.true., dissipates=.true.)
+  end subroutine test_halves
+
   !> With 1000 points and more one process that may differ from ranks would have a coarse part in
   !> its preconditioner, which they do not have.
   subroutine pulled_plate(scene)
@@ -696,6 +726,7 @@ contains
     type(work_of_points) :: work
     type(division_type) :: division
     type(body_type) :: body
+    type(term_view_type) :: view
     logical :: enough
     integer :: r, blocks
 
@@ -727,10 +758,13 @@ contains
     end do
     enough = .false.
     !$omp parallel num_threads(ranks) default(none) shared(ranks, parts, enough, method, set_up) &
-    !$omp private(r)
+    !$omp private(r, view)
     if (omp_get_num_threads() == ranks) then
       r = omp_get_thread_num() + 1
       if (r == 1) enough = .true.
+      ! terms begin anew where ranks can speak
+      call view_of(parts(r)%system, 0.0_wp, view)
+      call parts(r)%system%terms%begin(view)
       call run(parts(r)%system, parts(r)%relaxation, method, set_up%plan%step, &
         & set_up%plan%steps, parts(r)%diary, parts(r)%fault)
     end if
@@ -921,6 +955,7 @@ contains
 
     subroutine take_term(of_whole)
       class(force_term_type), intent(in) :: of_whole
+      type(contact_type) :: contact
       integer(i4), allocatable :: slots(:)
       integer :: k
 
@@ -933,6 +968,12 @@ contains
         slots = here(set_up%system%body%point(of_whole%slots))
         call part%system%terms%add(new_dashpots(pack(slots, slots > 0), &
           & of_whole%damping(pack([(k, k=1, size(slots))], slots > 0), :)))
+      type is (contact_type)
+        call new_contact(part%system%body, of_whole%law%delta, of_whole%law%ratio, &
+          & of_whole%law%rule, of_whole%part, contact)
+        contact%conservative = of_whole%conservative
+        contact%follows = of_whole%follows
+        call part%system%terms%add(contact)
       class default
         call test_failed(error, 'a term that parts cannot have')
       end select

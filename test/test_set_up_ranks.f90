@@ -10,7 +10,7 @@ module test_set_up_ranks
   private
   public :: collect_set_up_ranks
 
-  integer, parameter :: kinds = 13   !! of scenes that are refused
+  integer, parameter :: kinds = 12   !! of scenes that are refused
 
 contains
 
@@ -69,25 +69,20 @@ contains
       name = 'a pin'
       scene%boundaries(1)%motion = 'pin'
     case (7)
-      name = 'contact of points with points'
-      deallocate (scene%contacts)
-      allocate (scene%contacts(1))
-      scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) :: 'all']
-    case (8)
       name = '&tip'
       deallocate (scene%tips)
       allocate (scene%tips(1))
-    case (9)
+    case (8)
       name = '&j_integral'
       deallocate (scene%j_integrals)
       allocate (scene%j_integrals(1))
-    case (10)
+    case (9)
       name = 'fragments'
       scene%output%fragments = .true.
-    case (11)
+    case (10)
       name = "the field 'fragment'"
       scene%output%fields = [character(len(scene%output%fields)) :: 'damage', 'fragment']
-    case (12)
+    case (11)
       name = '&refine'
       allocate (scene%refines(1))
     case default
@@ -119,10 +114,11 @@ contains
     deallocate (scene%sections, scene%lines)
     allocate (scene%sections(1), scene%lines(1))
     deallocate (scene%rigids, scene%contacts)
-    allocate (scene%rigids(1), scene%contacts(1))
+    allocate (scene%rigids(1), scene%contacts(2))
     scene%bodies(1)%name = 'block'
     scene%rigids(1)%name = 'ball'
     scene%contacts(1)%between = [character(len(scene%contacts(1)%between)) :: 'block', 'ball']
+    scene%contacts(2)%within = 'block'
     call check_ranks(scene, fault)
     call expect_true(error, .not. allocated(fault), 'an explicit run is refused')
     scene%time%method = 'relaxation'

@@ -113,6 +113,69 @@ ROLLS = """
 &time TIME /
 &output every = 60, history_every = 5, fields = 'displacement', 'velocity', precision = 'double' /
 """
+
+# Points that meet points. A disc, a plate and a post of other spacings, which meet two by two.
+SLIDE = """
+&scene dimension = 2, thickness = 0.01 /
+&body name = 'disc', shape = 'sphere', centre = 0.17, 0.1353, radius = 0.04, spacing = 4.0e-3 /
+&body name = 'plate', lower = 0.0, 0.0, upper = 0.32, 0.09, points = 64, 18 /
+&body name = 'post', lower = 0.321, 0.02, upper = 0.361, 0.14, points = 10, 30 /
+&material model = 'state_based', youngs_modulus = 2.0e9, poissons_ratio = 0.3, density = 1200.0 /
+&horizon ratio = 3.015 /
+&region name = 'disc', where = 'min(y - 0.0905, 0.3 - x) > 0' /
+&region name = 'post', where = 'x > 0.3205' /
+&initial region = 'disc', velocity_x = 20.0, velocity_y = -40.0 /
+&initial region = 'post', velocity_x = -30.0 /
+&contact between = 'disc', 'plate', 'post', friction = 0.4, restitution = 0.7 /
+&time steps = 220 /
+&output every = 60, history_every = 5, fields = 'displacement', 'velocity', precision = 'double' /
+"""
+
+# A bar that breaks on a plate, which breaks, too: normals of surfaces that lose bonds, and pieces.
+SMASH = """
+&scene dimension = 2, thickness = 0.01 /
+&body name = 'bar', lower = 0.1, 0.1021, upper = 0.18, 0.2021, points = 20, 25 /
+&body name = 'plate', lower = 0.0, 0.0, upper = 0.32, 0.1, points = 80, 25 /
+&material youngs_modulus = 7.0e10, poissons_ratio = 0.3333, density = 2400.0, critical_stretch = 1.0e-3 /
+&horizon ratio = 3.015 /
+&region name = 'bar', where = 'y > 0.101' /
+&initial region = 'bar', velocity_y = -200.0 /
+&contact between = 'all', friction = 0.3, damping = 0.1, stiffness = 5.0 /
+&time steps = 200 /
+&output every = 50, history_every = 5, fields = 'displacement', 'velocity', 'damage', precision = 'double' /
+"""
+
+# Halves of a block in space, which a crack parts, are pressed together and slide.
+HALVES = """
+&scene dimension = 3 /
+&body name = 'block', lower = 0.0, 0.0, 0.0, upper = 0.04, 0.016, 0.016, points = 20, 8, 8 /
+&material youngs_modulus = 2.0e9, poissons_ratio = 0.25, density = 1200.0, critical_stretch = 0.02 /
+&horizon ratio = 3.015 /
+&crack corner = 0.019999, -1.0, -1.0, edge_1 = 0.0, 3.0, 0.0, edge_2 = 0.0, 0.0, 3.0 /
+&region name = 'left', where = 'x < 0.02' /
+&initial region = 'left', velocity_x = 40.0, velocity_y = 6.0 /
+&contact within = 'block', friction = 0.5 /
+&time steps = 120, integrator = 'velocity_verlet' /
+&output every = 40, history_every = 5, fields = 'displacement', 'velocity', precision = 'double' /
+"""
+
+# Three bodies in space, one above the other, along lines of centres and normals.
+STACK = """
+&scene dimension = 3 /
+&body name = 'a', lower = 0.0, 0.0, 0.0, upper = 0.02, 0.02, 0.008, points = 10, 10, 4 /
+&body name = 'b', lower = 0.005, 0.003, 0.0081, upper = 0.021, 0.019, 0.0161, points = 8, 8, 4 /
+&body name = 'c', shape = 'sphere', centre = 0.011, 0.01, 0.0232, radius = 0.007, spacing = 1.5e-3 /
+&material model = 'state_based', youngs_modulus = 2.0e9, poissons_ratio = 0.3, density = 1200.0 /
+&horizon ratio = 3.015, family = 'list' /
+&region name = 'c', where = 'z > 0.01611' /
+&region name = 'b', where = 'min(z - 0.00805, 0.0161 - z) > 0' /
+&initial region = 'c', velocity_z = -90.0, velocity_x = 15.0 /
+&initial region = 'b', velocity_z = -60.0 /
+&contact between = 'a', 'b', normals = 'centres', damping = 0.2 /
+&contact between = 'c', 'b', friction = 0.2 /
+&time steps = 150, integrator = 'adams_bashforth' /
+&output every = 50, history_every = 5, fields = 'displacement', 'velocity', precision = 'double' /
+"""
 RIGID = ("contact_energy", "friction_work", "contact_dissipation")
 
 
@@ -156,7 +219,7 @@ class Scene:
     """A scene, what stands in place of its words, and what is asked of it."""
 
     def __init__(self, name, text, words=None, changes=(), short=True, pieces=False, tolerance=1e-12,
-                 surfaces=False):
+                 surfaces=False, alike=False):
         self.name, self.text = name, text
         for word, value in (words or {}).items():
             self.text = self.text.replace(word, value)
@@ -165,6 +228,7 @@ class Scene:
         self.pieces = pieces        # it is stopped and goes on on other numbers of ranks, too
         self.tolerance = tolerance  # of displacements without --reproducible, over the largest one
         self.surfaces = surfaces    # it writes surfaces of rigid bodies
+        self.alike = alike          # its points have one mass, and nothing acts from outside
 
 
 STATIC = "method = 'relaxation' /\n&relaxation load_steps = 2, tolerance = 1.0e-9"
@@ -196,9 +260,15 @@ OWN = [
           changes=(*RIGID, "ball_force_x", "ball_moment_y", "floor_force_z", "punch_force_z", "broken_bonds")),
     Scene("rolls", ROLLS, {"TIME": "steps = 300"}, pieces=True, surfaces=True,
           changes=(*RIGID, "left_moment_z", "box_rotation_z", "box_force_y")),
+    Scene("slide", SLIDE, pieces=True, changes=RIGID),
+    Scene("smash", SMASH, pieces=True, changes=(*RIGID, "broken_bonds"), alike=True),
+    Scene("smash, late", SMASH.replace("steps = 200", "steps = 200, breaking = 'after_forces'"), short=False,
+          changes=(*RIGID, "broken_bonds"), alike=True),
+    Scene("halves", HALVES, pieces=True, changes=RIGID[:2], alike=True),
+    Scene("stack", STACK, short=False, pieces=True, changes=RIGID),
 ]
 
-PIECES_SHORT = ("heat", "ball", "tips")  # with --short in pieces, too
+PIECES_SHORT = ("heat", "smash", "tips")  # with --short in pieces, too
 
 # A wedge that points down on the plate, in mm.
 CORNERS = np.array([[40, 10, 16], [52, 10, 16], [46, 10, 10.05], [40, 30, 16], [52, 30, 16], [46, 30, 10.05]], float)

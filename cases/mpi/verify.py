@@ -234,6 +234,9 @@ def compare_own(case, ranks):
         path.write_text(scene.text, encoding="utf-8")
         whole = compare_bits(case, path, scene.name, ranks, surfaces=scene.surfaces)
         table = np.genfromtxt(whole / "history.csv", delimiter=",", names=True)
+        for n in ranks if scene.alike else ():
+            case.below(f"{scene.name}: {n} ranks, change of momentum", change_of_momentum(
+                path.with_name(f"{path.stem}.{n}")), ROUNDING)
         for column in scene.changes:
             case.equal(f"{scene.name}: {column} changes", np.ptp(table[column]) > 0, True)
         if scene.pieces and not (case.options.short and scene.name not in scenes.PIECES_SHORT):
@@ -317,6 +320,13 @@ def difference_of_fields(one, other):
     return found if np.isfinite(found) else np.inf
 
 
+def change_of_momentum(folder):
+    """The largest change of the momentum of points of one mass, over the sum of their sizes."""
+    found = [v.astype(float) for k, v in sorted(arrays(folder).items()) if k.startswith("outputs/velocity/")]
+    change = max(np.abs((v - found[0]).sum(axis=0)).max() for v in found)
+    return change / np.abs(found[0]).sum() if len(found) > 2 and np.isfinite(change) else np.inf
+
+
 def check_ends(case):
     """What ends one rank ends all, once, with the right status."""
     crack = case.write("end", "plate_crack/slow.nml",
@@ -345,6 +355,12 @@ def check_ends(case):
     case.equal("unstable: status", process.returncode, 3)
     case.equal("unstable: errors", len(re.findall(r"^error: unstable", errors, re.M)), 1)
     case.equal("unstable: history", (folder / "history.csv").is_file(), True)
+    # the same with contact of points, of which one rank has the fastest
+    smash = crack.with_name("smash.nml")
+    _, process = case.start(smash, 3, "--set", "time%step=2.0e-6", folder=smash.with_name("smash.end"))
+    errors = process.communicate()[1]
+    case.equal("unstable contact: status", process.returncode, 3)
+    case.equal("unstable contact: errors", len(re.findall(r"^error: unstable", errors, re.M)), 1)
     # stopped in order; mpirun passes this signal on
     folder, process = case.start(crack, 3)
     wait_for(folder / "end.vtkhdf")
@@ -561,7 +577,7 @@ def command_of(entry):
 
 def main():
     case = Mpi(__file__, __doc__, options=[
-        ("--short", {"action": "store_true", "help": "eight scenes on three ranks"}),
+        ("--short", {"action": "store_true", "help": "some scenes on three ranks"}),
         ("--ranks", {"default": "", "help": "numbers of ranks (default: 2,3,4,7; --short: 3)"})])
     if not Path(PARALLEL).is_file():
         sys.exit("error: PERIFORT_MPI does not name the program with MPI; start this as ./pf verify mpi")

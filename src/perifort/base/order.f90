@@ -75,13 +75,15 @@ module pd_base_order
     end function count_before
 
     !> Every rank gives every rank some of its values.
-    subroutine dealt_values(self, values, given, got)
+    subroutine dealt_values(self, values, given, got, taken)
       import :: ranks_type, wp
       implicit none (type, external)
       class(ranks_type), intent(inout) :: self
       real(wp), intent(in) :: values(:)   !! those for the first rank, those for the second, ..
       integer, intent(in) :: given(:)     !! (ranks) how many each rank gets
       real(wp), allocatable, intent(out) :: got(:)  !! from the first rank, from the second, ..
+      integer, intent(in), optional :: taken(:)
+        !! (ranks) how many come from each, if all ranks know it; else they tell each other
     end subroutine dealt_values
 
     !> Values of all ranks one after another, in the order of ranks, on the first one.

@@ -53,6 +53,9 @@ contains
   module procedure deal
     got = values
     if (self%ranks > 1 .or. size(given) /= 1) call internal_fault('there is no other rank')
+    if (present(taken)) then
+      if (any(taken /= given)) call internal_fault('a rank takes other values than it gives')
+    end if
   end procedure deal
 
   module procedure number_before

@@ -214,18 +214,22 @@ contains
   end procedure find_handles
 
   module procedure deal
-    integer :: taken(self%ranks), given_at(self%ranks + 1), taken_at(self%ranks + 1)
+    integer :: from(self%ranks), given_at(self%ranks + 1), taken_at(self%ranks + 1)
     integer :: r
 
-    call MPI_Alltoall(given, 1, MPI_INTEGER, taken, 1, MPI_INTEGER, MPI_COMM_WORLD)
+    if (present(taken)) then
+      from = taken
+    else
+      call MPI_Alltoall(given, 1, MPI_INTEGER, from, 1, MPI_INTEGER, MPI_COMM_WORLD)
+    end if
     given_at(1) = 0
     taken_at(1) = 0
     do r = 1, self%ranks
       given_at(r + 1) = given_at(r) + given(r)
-      taken_at(r + 1) = taken_at(r) + taken(r)
+      taken_at(r + 1) = taken_at(r) + from(r)
     end do
     allocate (got(taken_at(self%ranks + 1)))
-    call MPI_Alltoallv(values, given, given_at(:self%ranks), MPI_DOUBLE_PRECISION, got, taken, &
+    call MPI_Alltoallv(values, given, given_at(:self%ranks), MPI_DOUBLE_PRECISION, got, from, &
       & taken_at(:self%ranks), MPI_DOUBLE_PRECISION, MPI_COMM_WORLD)
   end procedure deal
 

@@ -127,12 +127,14 @@ module pd_comm_world
     end subroutine collect
 
     !> Every rank gives every rank some of its values.
-    module subroutine deal(self, values, given, got)
+    module subroutine deal(self, values, given, got, taken)
       implicit none (type, external)
       class(world_type), intent(inout) :: self
       real(wp), intent(in) :: values(:)   !! those for the first rank, those for the second, ..
       integer, intent(in) :: given(:)     !! (ranks) how many each rank gets
       real(wp), allocatable, intent(out) :: got(:)  !! from the first rank, from the second, ..
+      integer, intent(in), optional :: taken(:)
+        !! (ranks) how many come from each, if all ranks know it; else they tell each other
     end subroutine deal
 
     !> Wait until all ranks are here.

@@ -6,19 +6,25 @@
 !> points that were farther apart than D and the skin are then still farther apart than D. What a
 !> point sums up is in the order of the others' numbers, and pairs farther apart than D add nothing:
 !> so the bits do not depend on when the search was, nor on the number of threads.
+!>
+!> Of several ranks each sums what its own points get (`pd_force_vicinity`). All search together, as
+!> soon as a point of any of them has moved by half the skin.
 module pd_force_contact
-  use pd_base_archive, only: archive_type
+  use pd_base_archive, only: archive_type, of_slots, same
   use pd_base_error, only: internal_fault
-  use pd_base_kinds, only: wp, i4
-  use pd_body_body, only: body_type
+  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_reduce, only: count_of_ranks, largest_of_ranks
+  use pd_body_body, only: body_type, share_halo
   use pd_force_contact_law, only: constant_of, contact_law_type, contact_rule_type, find_close, &
     & loses, of_friction, of_normal_force, reach_of_patch, slope, sum_pairs, usual_distance
   use pd_force_movement, only: is_noted, moved, movement_type, new_movement, note_instant, &
     & remember_places
   use pd_force_normals, only: add_couples, find_normals, find_rates, frame_type, renew_intact, &
-    & surface_normals, surface_type, take_surface
+    & surface_normals, surface_type, take_surface, turn_couples
   use pd_force_pairs, only: pairs_type, search_pairs
   use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
+  use pd_force_vicinity, only: company_type, find_vicinity, new_company, points_of_vicinity, &
+    & renew_vicinity, sum_vicinity, vicinity_type
   implicit none (type, external)
   private
   public :: contact_type, new_contact
@@ -34,7 +40,9 @@ module pd_force_contact
   type, extends(force_term_type) :: contact_type
     integer :: part = of_normal_force
     type(contact_law_type) :: law
-    integer(i4), allocatable :: slots(:)     !! points that may touch, in order
+    integer(i4), allocatable :: slots(:)     !! owned points that may touch, in order
+    integer(i8) :: points = 0_i8             !! that may touch, of all ranks
+    real(wp) :: least = 0.0_wp               !! the smallest spacing of these [m]
     integer, allocatable :: side(:)          !! of each of these
     real(wp), allocatable :: reach(:)        !! up to which each meets points of other bodies, its
                                              !! half of the distance and of the skin [m]
@@ -46,6 +54,8 @@ module pd_force_contact
     type(pairs_type) :: pairs                !! then
     type(surface_type) :: surface            !! of these points, if it is smoothed
     type(frame_type) :: frame                !! its normals at the noted instant
+    type(company_type) :: company            !! the ranks
+    type(vicinity_type) :: vicinity          !! of several ranks in place of pairs and surface
   contains
     procedure :: add_force
     procedure :: add_energy
@@ -60,7 +70,7 @@ module pd_force_contact
 
 contains
 
-  !> Contact by a rule: of the bodies' points in their slots.
+  !> Contact by a rule: of the bodies' points in their slots. All ranks call it together.
   subroutine new_contact(body, delta, ratio, rule, part, contact)
     type(body_type), intent(in) :: body             !! arranged in slots
     real(wp), intent(in) :: delta                   !! horizon, the largest one of all points [m]
@@ -69,12 +79,14 @@ contains
     type(contact_rule_type), intent(in) :: rule     !! who meets whom, and how
     integer, intent(in) :: part                     !! `of_normal_force` or `of_friction`
     type(contact_type), intent(out) :: contact      !! ready to begin
-    real(wp) :: least
     integer :: i
 
     contact%name = 'contact'
     if (part == of_friction) contact%name = 'friction'
-    contact%slots = pack(body%slot, rule%side(body%body(body%slot)) > 0)
+    associate (owned => body%slot(:body%order%n_owned))
+      contact%slots = pack(owned, rule%side(body%body(owned)) > 0)
+    end associate
+    contact%points = count_of_ranks(body%order, size(contact%slots, kind=i8))
     contact%side = rule%side(body%body(contact%slots))
     contact%law%smoothed = rule%smoothed .and. body%dim > 1 .and. count(rule%side > 0) > 1
     ! without losses no account of work is needed
@@ -86,8 +98,8 @@ contains
     contact%law%delta = delta
     contact%law%ratio = ratio
     contact%acts_on_few = .true.
-    least = minval(body%spacing(contact%slots))
-    contact%skin = merge(skin_within, skin_between, rule%pieces)*least
+    contact%least = -largest_of_ranks(body%order, -minval(body%spacing(contact%slots)))
+    contact%skin = merge(skin_within, skin_between, rule%pieces)*contact%least
     allocate (contact%within(size(contact%slots)), contact%reach(size(contact%slots)))
     do i = 1, size(contact%slots)
       associate (spacing => body%spacing(contact%slots(i)))
@@ -109,6 +121,9 @@ contains
 
     real(wp), allocatable :: normals(:, :)
 
+    call new_company(view%body, self%company)
+    ! families reach to copies of other ranks' points
+    call share_halo(view%body, view%u)
     self%law%begun = view%body%x + view%u
     if (.not. self%law%smoothed) return
     call surface_normals(view, self%slots, normals)
@@ -130,7 +145,13 @@ contains
         if (self%movement%searches /= before%movement%searches) then
           self%pairs = before%pairs
           self%surface = before%surface
+          self%vicinity = before%vicinity
           self%movement%searches = before%movement%searches
+        end if
+        if (self%company%ranks > 0) then
+          call follow(before%vicinity, self%vicinity)
+          call note_instant(self%movement, view)
+          return
         end if
         if (self%law%smoothed) then
           call renew_intact(self%surface, view)
@@ -140,24 +161,45 @@ contains
         call internal_fault('friction follows no contact')
       end select
     else if (.not. still_holds(self, view)) then
-      call find_pairs(self, view, self%pairs, self%surface)
+      if (self%company%ranks > 0) then
+        call search_vicinity(self, view, self%vicinity)
+      else
+        call find_pairs(self, view, self%pairs, self%surface)
+      end if
       call remember_places(self%movement, view%u)
     end if
-    if (self%law%smoothed .and. .not. self%follows) then
+    if (self%company%ranks > 0) then
+      call renew_vicinity(view, self%vicinity)
+    else if (self%law%smoothed .and. .not. self%follows) then
       call renew_intact(self%surface, view)
       call find_frame(self, self%pairs, self%surface, view, self%frame)
     end if
     call note_instant(self%movement, view)
   end subroutine search
 
-  !> Whether no pair is near that the last search has not found.
+  !> Take what another term has found out of an instant since the last search.
+  subroutine follow(before, vicinity)
+    type(vicinity_type), intent(in) :: before
+    type(vicinity_type), intent(inout) :: vicinity  !! of the same search
+
+    vicinity%u = before%u
+    vicinity%v = before%v
+    if (.not. vicinity%law%smoothed) return
+    vicinity%surface%intact = before%surface%intact
+    vicinity%surface%broken = before%surface%broken
+    vicinity%frame = before%frame
+    vicinity%rates = before%rates
+  end subroutine follow
+
+  !> Whether no pair is near that the last search has not found, on any rank.
   logical function still_holds(self, view) result(holds)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
 
     holds = .false.
     if (allocated(self%movement%u)) &
-      & holds = moved(self%movement, view%u) < but_rounding*self%skin/2
+      & holds = largest_of_ranks(view%body%order, moved(self%movement, view%u)) &
+      & < but_rounding*self%skin/2
   end function still_holds
 
   !> The pairs that are near, and the surfaces of those that had one at the start.
@@ -175,6 +217,17 @@ contains
       & [(norm2(self%law%normals(:, pairs%slots(i))), i=1, size(pairs%slots))], surface)
   end subroutine find_pairs
 
+  !> The same of several ranks.
+  subroutine search_vicinity(self, view, vicinity)
+    class(contact_type), intent(in) :: self
+    type(term_view_type), intent(in) :: view
+    type(vicinity_type), intent(out) :: vicinity
+
+    if (.not. allocated(self%law%begun)) call internal_fault('contact has not begun')
+    call find_vicinity(self%company, self%law, view, self%slots, self%side, self%reach, &
+      & self%within, vicinity)
+  end subroutine search_vicinity
+
   !> Points that are near others, and with smoothed normals their families.
   subroutine acting(self, view, slots)
     class(contact_type), intent(in) :: self     !! the contact
@@ -182,8 +235,16 @@ contains
     integer(i4), allocatable, intent(out) :: slots(:)
     type(pairs_type) :: pairs
     type(surface_type) :: surface
+    type(vicinity_type) :: vicinity
 
-    if (is_noted(self%movement, view)) then
+    if (self%company%ranks > 0) then
+      if (is_noted(self%movement, view)) then
+        call points_of_vicinity(self%vicinity, slots)
+      else
+        call search_vicinity(self, view, vicinity)
+        call points_of_vicinity(vicinity, slots)
+      end if
+    else if (is_noted(self%movement, view)) then
       slots = self%pairs%slots
       if (self%law%smoothed) slots = self%surface%around
     else
@@ -225,8 +286,18 @@ contains
     type(pairs_type) :: pairs
     type(surface_type) :: surface
     type(frame_type) :: frame
+    type(vicinity_type) :: vicinity
 
-    if (is_noted(self%movement, view) .and. (.not. self%law%smoothed &
+    if (self%company%ranks > 0) then
+      if (is_noted(self%movement, view) .and. (.not. self%law%smoothed &
+        & .or. self%vicinity%surface%broken == view%broken)) then
+        call sum_vicinity(self%vicinity, self%part, view, force, energy)
+      else
+        call search_vicinity(self, view, vicinity)
+        call renew_vicinity(view, vicinity)
+        call sum_vicinity(vicinity, self%part, view, force, energy)
+      end if
+    else if (is_noted(self%movement, view) .and. (.not. self%law%smoothed &
       & .or. self%surface%broken == view%broken)) then
       call sum_up(self, self%pairs, self%surface, self%frame, view, force, energy)
     else
@@ -267,11 +338,13 @@ contains
       allocate (couples(3, size(pairs%slots)))
     end if
     call sum_pairs(self%law, self%part, pairs, frame, rates, view, force, energy, couples)
-    if (self%law%smoothed .and. size(force) > 0) call add_couples(surface, frame, couples, force)
+    if (.not. self%law%smoothed .or. size(force) == 0) return
+    call turn_couples(surface, frame, couples)
+    call add_couples(surface, frame, couples, force)
   end subroutine sum_up
 
   !> A point may touch a few others at once, with the stiffness of the largest of them; their
-  !> displacements move it as its own does.
+  !> displacements move it as its own does. All ranks call it together.
   subroutine add_stiffness_bound(self, view, bound)
     class(contact_type), intent(in) :: self     !! the contact
     type(term_view_type), intent(in) :: view    !! of the body
@@ -280,7 +353,7 @@ contains
     real(wp) :: largest
     integer :: i, k
 
-    if (self%part == of_friction .or. size(self%slots) == 0) return
+    if (self%part == of_friction .or. self%points == 0_i8) return
     largest = largest_stiffness(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
@@ -297,32 +370,33 @@ contains
     integer, intent(in) :: k
 
     part = 1.0_wp
-    if (self%law%ratio > 0.0_wp) part = (minval(view%body%spacing(self%slots)) &
-      & /view%body%spacing(k))**2
+    if (self%law%ratio > 0.0_wp) part = (self%least/view%body%spacing(k))**2
   end function part_of_largest
 
   !> The stiffness of a pair of the stiffest material and the largest volume, per volume [N/m4];
-  !> where points have their own horizons, of two points of the least spacing.
-  pure real(wp) function largest_stiffness(self, view) result(stiffness)
+  !> where points have their own horizons, of two points of the least spacing. All ranks call it
+  !> together.
+  real(wp) function largest_stiffness(self, view) result(stiffness)
     class(contact_type), intent(in) :: self
     type(term_view_type), intent(in) :: view
-    real(wp) :: least
+    real(wp) :: constant, volume
     integer :: i
 
-    stiffness = self%law%rule%stiffness*maxval([(constant_of(view, int(self%slots(i))), i=1, &
-      & size(self%slots))])/self%law%delta
-    if (self%law%ratio > 0.0_wp) then
-      associate (dim => view%body%dim, h => view%body%spacing(self%slots))
-        least = minval(h)
-        stiffness = stiffness*maxval(view%body%volume(self%slots)/h**dim)*least**dim &
-          & *(self%law%delta/(self%law%ratio*least))**(dim + 2)
-      end associate
-    else
-      stiffness = stiffness*maxval(view%body%volume(self%slots))
-    end if
+    constant = maxval([(constant_of(view, int(self%slots(i))), i=1, size(self%slots))])
+    stiffness = self%law%rule%stiffness*largest_of_ranks(view%body%order, constant)/self%law%delta
+    associate (dim => view%body%dim)
+      if (self%law%ratio > 0.0_wp) then
+        volume = maxval(view%body%volume(self%slots)/view%body%spacing(self%slots)**dim)
+        stiffness = stiffness*largest_of_ranks(view%body%order, volume)*self%least**dim &
+          & *(self%law%delta/(self%law%ratio*self%least))**(dim + 2)
+      else
+        volume = maxval(view%body%volume(self%slots))
+        stiffness = stiffness*largest_of_ranks(view%body%order, volume)
+      end if
+    end associate
   end function largest_stiffness
 
-  !> The dashpots of damping, or of friction.
+  !> The dashpots of damping, or of friction. All ranks call it together.
   subroutine add_damping_bound(self, view, bound)
     class(contact_type), intent(in) :: self     !! the contact
     type(term_view_type), intent(in) :: view    !! of the body
@@ -333,7 +407,7 @@ contains
 
     part = self%law%rule%damping
     if (self%part == of_friction) part = slope
-    if (.not. part > 0.0_wp .or. size(self%slots) == 0) return
+    if (.not. part > 0.0_wp .or. self%points == 0_i8) return
     largest = largest_stiffness(self, view)
     do i = 1, size(self%slots)
       k = self%slots(i)
@@ -347,8 +421,16 @@ contains
     class(contact_type), intent(inout) :: self     !! the contact
     class(archive_type), intent(inout) :: archive  !! a checkpoint that is written or read
 
+    real(wp), allocatable :: normals(:, :)
+
+    call archive%over(of_slots)
     call archive%keep(self%name//' began', self%law%begun)
-    if (self%law%smoothed) call archive%keep(self%name//' normals began', self%law%normals)
+    if (self%law%smoothed) then
+      normals = transpose(self%law%normals)
+      call archive%keep(self%name//' normals began', normals)
+      self%law%normals = transpose(normals)
+    end if
+    call archive%over(same)
   end subroutine keep
 
   !> The scene's own lines describe it.

@@ -8,12 +8,14 @@ module pd_force_normals
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i4, i8
   use pd_base_order, only: ascending_order
+  use pd_body_body, only: share_halo
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_force_term, only: term_view_type
   implicit none (type, external)
   private
   public :: surface_type, frame_type, patch_type
-  public :: surface_normals, take_surface, renew_intact, find_normals, find_rates, add_couples
+  public :: surface_normals, take_surface, renew_intact, find_normals, find_rates, turn_couples, &
+    & add_couples
   public :: normal_of_pair, patch_radius, meet
 
   !> Sum of directions to the others, times their volumes and 1 - |xi|/delta, over the sum of these:
@@ -31,7 +33,7 @@ module pd_force_normals
 
   !> Some points with the bonds within their bodies, of which their normals are made.
   type :: surface_type
-    integer(i4), allocatable :: slots(:)    !! of the points
+    integer(i4), allocatable :: slots(:)    !! of the points; 0: of another rank, without a copy
     real(wp), allocatable :: weight(:)      !! of their normals; 0: none [-]
     integer(i4), allocatable :: around(:)   !! slots of them and of the others of their bonds, in
                                             !! the order of points: the places of what follows
@@ -72,12 +74,14 @@ contains
 
   !> Outward normals of points, 0 where there is no surface: from intact bonds within a body. Their
   !> lengths, up to 1, are the weights that they have in normals of pairs: less at edges, where they
-  !> are inclined to the faces, than on faces.
+  !> are inclined to the faces, than on faces. All ranks call it together.
   subroutine surface_normals(view, slots, normals)
-    type(term_view_type), intent(in) :: view                 !! the instant
-    integer(i4), intent(in) :: slots(:)                      !! of the points, in their order
+    type(term_view_type), intent(in) :: view
+      !! the instant, with the displacements of copies of other ranks' points
+    integer(i4), intent(in) :: slots(:)
+      !! of the points, in their order; of several ranks those that this one owns
     real(wp), allocatable, intent(out) :: normals(:, :)      !! (3, points)
-    real(wp), allocatable :: of_slot(:, :)
+    real(wp), allocatable :: of_slot(:, :), by_slot(:, :)
     integer(i4), allocatable :: place(:)
     integer :: first, last, i
 
@@ -100,6 +104,11 @@ contains
     do i = 1, size(slots)
       normals(:, i) = of_slot(:, slots(i))
     end do
+    if (associated(view%body%order%ranks)) then
+      by_slot = transpose(of_slot)
+      call share_halo(view%body, by_slot)
+      of_slot = transpose(by_slot)
+    end if
     call weigh(view, slots, of_slot, normals)
   end subroutine surface_normals
 
@@ -220,12 +229,14 @@ contains
     do i = 1, n
       place(surface%around(i)) = int(i, i4)
     end do
-    surface%place = place(surface%slots)
-    surface%member = place(surface%member)
+    allocate (surface%place(size(surface%slots)), source=0_i4)
     allocate (surface%own(n), source=0_i4)
     do i = 1, size(surface%slots)
+      if (surface%slots(i) == 0_i4) cycle
+      surface%place(i) = place(surface%slots(i))
       surface%own(surface%place(i)) = int(i, i4)
     end do
+    surface%member = place(surface%member)
     place(surface%around) = 0_i4
 
   contains
@@ -233,6 +244,7 @@ contains
     subroutine enter(slot)
       integer, intent(in) :: slot
 
+      if (slot == 0) return
       if (place(slot) > 0_i4) return
       n = n + 1
       place(slot) = int(n, i4)
@@ -377,14 +389,25 @@ contains
     !$omp end parallel do
   end subroutine find_rates
 
+  !> From couples on the normals to those on the sums that these are the directions of.
+  pure subroutine turn_couples(surface, frame, couples)
+    type(surface_type), intent(in) :: surface     !! that the normals were found of
+    type(frame_type), intent(in) :: frame         !! the normals
+    real(wp), intent(inout) :: couples(:, :)
+      !! (3, points) on unit normals, per volume [N/m2]; on return on the sums
+    integer :: i
+
+    do i = 1, size(surface%slots)
+      if (any(abs(couples(:, i)) > 0.0_wp)) couples(:, i) = turned(frame, i, couples(:, i))
+    end do
+  end subroutine turn_couples
+
   !> The forces on points and their families by what acts on the normals: the power of the couple c
   !> of a point is c.dN/dt per volume of the point.
   subroutine add_couples(surface, frame, couples, force)
     type(surface_type), intent(in) :: surface     !! that the normals were found of
     type(frame_type), intent(in) :: frame         !! the normals
-    real(wp), intent(inout) :: couples(:, :)
-      !! (3, points) on unit normals, per volume [N/m2]; on return on the sums that these are the
-      !! directions of
+    real(wp), intent(in) :: couples(:, :)         !! (3, points) from `turn_couples`
     real(wp), intent(inout), contiguous :: force(:, :)
       !! (n_slots, dim) force density, added to [N/m3]
     real(wp) :: total(3), c(3)
@@ -392,9 +415,7 @@ contains
     integer :: a, i, e, b, k
 
     do i = 1, size(surface%slots)
-      turns(i) = any(abs(couples(:, i)) > 0.0_wp)
-      if (.not. turns(i)) cycle
-      couples(:, i) = turned(frame, i, couples(:, i))
+      turns(i) = .not. all(abs(couples(:, i)) <= 0.0_wp)
     end do
     !$omp parallel do if (size(surface%slots) >= worth_threads) default(none) &
     !$omp schedule(dynamic, at_once) shared(surface, frame, couples, turns, force) &

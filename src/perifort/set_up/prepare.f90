@@ -248,6 +248,7 @@ contains
       end do
       do i = 1, size(scene%contacts)
         call part_bodies(sides_of_contact(scene, i), system%body, system%family, cut)
+        if (divided) cut = broken_bonds(system%body, system%family) - set_up%cut - set_up%parted
         set_up%parted = set_up%parted + cut
         if (cut > 0_i8) call set_up%notes%add('parted '//to_text(i), '&contact number '// &
           & to_text(i)//' leaves out '//to_text(cut)//' bonds between bodies that touch', &

@@ -15,7 +15,6 @@ module pd_set_up_ranks
   use pd_family_volume, only: reach, volume_rule_type
   use pd_scene_content_rules, only: scene_fault
   use pd_scene_content_types, only: has_refinement, scene_type, is_set
-  use pd_set_up_terms, only: sides_of_contact
   implicit none (type, external)
   private
   public :: check_ranks, divide_body, divide_survey, find_lowest, work_of_body, join_ranks, &
@@ -47,10 +46,6 @@ contains
     if (scene%horizon%local) call refuse('horizon', 1, 'local', 'horizons of points')
     if (scene%horizon%surface_correction == 'consistent') &
       & call refuse('horizon', 1, 'surface_correction', "surface_correction = 'consistent'")
-    do i = 1, size(scene%contacts)
-      if (any(sides_of_contact(scene, i) > 0)) call refuse('contact', i, '', &
-        & 'contact of points with points')
-    end do
     if (size(scene%j_integrals) > 0) call refuse('j_integral', 1, '', '&j_integral')
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
     ! fragments are found by all ranks together, values at places by those that are near
