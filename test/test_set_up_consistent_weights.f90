@@ -683,8 +683,8 @@ contains
   end subroutine test_outlines
 
   !> 60 x 60 points off their places by up to 0.3 of a spacing, with volumes of 0.8 to 1.2 cells:
-  !> with surface areas that are not changed for the weights Gd these grow with the width of the body
-  !> to 50, and it has negative eigenvalues.
+  !> with surface areas that are not changed for the weights Gd these grow with the body's width, to
+  !> 50 here, and it has negative eigenvalues.
   subroutine test_large_cloud(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
@@ -744,8 +744,7 @@ contains
               end do
             else
               do c = 1, dims(number)
-                x(c) = x(c) + merge(0.2_wp, 0.3_wp, number == 4 .or. number == 6) &
-                  & *noise(seed)
+                x(c) = x(c) + merge(0.2_wp, 0.3_wp, number == 4)*noise(seed)
               end do
             end if
             if (number == 3 .and. norm2(x(:2) - [10, 7]) < 3.5_wp) cycle

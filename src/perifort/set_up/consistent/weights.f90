@@ -41,8 +41,8 @@ module pd_set_up_consistent_weights
 contains
 
   !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced where grids
-  !> touch or facets share it. The surface areas of a cloud are changed. An error is set if a point
-  !> of a lattice has no second one behind it, or if no weights fulfil the conditions.
+  !> touch or facets share it. The surface areas of a cloud change, except in space. An error is set
+  !> if a point of a lattice has no second one behind it, or if no weights fulfil the conditions.
   subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error, &
     & model)
     type(body_type), intent(inout) :: body
@@ -58,7 +58,8 @@ contains
     integer :: alone
 
     if (allocated(body%sides)) then
-      if (all(body%sides%axis == 0)) then
+      ! in space areas and Gb would have to be found together
+      if (all(body%sides%axis == 0) .and. body%dim < 3) then
         call weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
         return
       end if
@@ -95,8 +96,9 @@ contains
       & [.true., .true.], weights, stretch, dilatation, error)
   end subroutine consistent_weights
 
-  !> Weights of a cloud and what its surface areas must be for them: an outline knows them roughly
-  !> only. The conditions on Gd depend on them most, and have them as unknowns.
+  !> Weights of a cloud in the plane or on a line, and what its surface areas must be for them: an
+  !> outline knows them roughly only. The conditions on Gd depend on them most, and have them as
+  !> unknowns.
   subroutine weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
     type(body_type), intent(inout) :: body
     class(family_type), intent(in) :: family
@@ -142,8 +144,7 @@ contains
     dilatation%unknowns = groups%n_groups
     dilatation%least = minval(Gd)
     dilatation%greatest = maxval(Gd)
-    call solve(conditions, bounds_of_stretch(merge(2, 1, body%dim == 3):), .true., 'stretch', Gb, &
-      & stretch, error)
+    call solve(conditions, bounds_of_stretch, .true., 'stretch', Gb, stretch, error)
     if (allocated(error)) return
     call spread_weights(body, family, groups, Gb, Gd, weights)
   end subroutine weights_of_cloud
