@@ -13,6 +13,7 @@ module test_set_up_consistent_weights
   use pd_force_model, only: model_type, new_model, options_of
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use pd_law_material, only: material_type, new_material
+  use pd_motion_explicit_spectrum, only: lowest_eigenvalue
   use pd_motion_system, only: system_type
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_scene_content_read, only: read_scene_text
@@ -51,6 +52,7 @@ contains
       & new_unittest('loads on sides and held layers of refined plates', test_refined), &
       & new_unittest('a rotated strip of points without a lattice', test_clouds), &
       & new_unittest('clouds whose surface areas are found', test_outlines), &
+      & new_unittest('long: a large cloud', test_large_cloud), &
       & new_unittest('meshes of every shape in the plane', test_meshes), &
       & new_unittest('a pulled mesh is strained uniformly', test_pulled_mesh), &
       & new_unittest('what consistent weights do not serve of meshes is refused', &
@@ -680,14 +682,43 @@ contains
       & fault%message)
   end subroutine test_outlines
 
+  !> 60 x 60 points off their places by up to 0.3 of a spacing, with volumes of 0.8 to 1.2 cells:
+  !> with surface areas that are not changed for the weights Gd these grow with the body's width, to
+  !> 50 here, and it has negative eigenvalues.
+  subroutine test_large_cloud(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    real(wp) :: lowest
+
+    call put_cloud(6)
+    call ready_of_text(grid_scene(2, "&body file = 'consistent.txt' /"//lf// &
+      & "&horizon surface_correction = 'consistent' /"), set_up, fault)
+    if (allocated(fault)) then
+      call test_failed(error, fault%message)
+      return
+    end if
+    call strain_all(set_up%system, 'a large cloud', error)
+    if (allocated(error)) return
+    associate (weights => set_up%system%model%weights)
+      call expect_true(error, all(abs(weights%Gd) < 25.0_wp), 'weights Gd of '// &
+        & text_of(minval(weights%Gd))//' to '//text_of(maxval(weights%Gd)))
+      call expect_true(error, all(weights%Gb > 0.049_wp), 'a weight Gb of '// &
+        & text_of(minval(weights%Gb)))
+    end associate
+    if (allocated(error)) return
+    call lowest_eigenvalue(set_up%system, lowest)
+    call expect_true(error, lowest >= 0.0_wp, 'an eigenvalue of '//text_of(lowest))
+  end subroutine test_large_cloud
+
   !> Write cloud `number` as build/consistent.txt.
   subroutine put_cloud(number)
     integer, intent(in) :: number
     real(wp), parameter :: turn(2, 2) = reshape([0.866025403784438647_wp, 0.5_wp, -0.5_wp, &
       & 0.866025403784438647_wp], [2, 2])
-    integer, parameter :: cells(3, 5) = reshape([20, 1, 1, 18, 12, 1, 20, 14, 1, 8, 6, 6, &
-      & 4, 4, 4], [3, 5]), order(3, 6) = reshape([1, 2, 3, 1, 3, 2, 2, 1, 3, 2, 3, 1, 3, 1, 2, &
-      & 3, 2, 1], [3, 6]), dims(5) = [1, 2, 2, 3, 3]
+    integer, parameter :: cells(3, 6) = reshape([20, 1, 1, 18, 12, 1, 20, 14, 1, 8, 6, 6, &
+      & 4, 4, 4, 60, 60, 1], [3, 6]), order(3, 6) = reshape([1, 2, 3, 1, 3, 2, 2, 1, 3, 2, 3, 1, &
+      & 3, 1, 2, 3, 2, 1], [3, 6]), dims(6) = [1, 2, 2, 3, 3, 2]
     character(:), allocatable :: text
     character(100) :: line
     real(wp) :: x(3), corner(3), depth

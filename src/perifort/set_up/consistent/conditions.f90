@@ -30,7 +30,8 @@ module pd_set_up_consistent_conditions
     integer(i8), allocatable :: first(:)    !! (unknowns + 1) first entry of each unknown
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
-    ! where each class is a point, each unknown a bond with two ends, and n n, and n over |xi|:
+    ! where each class is a point, each unknown a bond with two ends or a component of an area, and
+    ! n n, and n over |xi|:
     real(wp), allocatable :: x(:, :)        !! (dim, points) positions [m]
     real(wp), allocatable :: strain(:)      !! (points) what makes a gradient multipliers of n n
     real(wp), allocatable :: shift(:)       !! (points) what makes a vector multipliers of n/|xi|
@@ -94,8 +95,10 @@ contains
   !> Conditions on Gd: theta is the strain's trace, and the force of equal p is that of the
   !> classical traction: t sum_j Gd vc V_j n_a n_b = d_ab, and t sum_j (a_k + a_j) Gd vc V_j
   !> n_a/|xi| = -A_a/V_k, with A the sum over regions of a x area. The second rows are multiplied
-  !> with the spacing over the largest a.
-  subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions, model)
+  !> with the spacing over the largest a. With `free_area` the areas of some points are unknowns,
+  !> too: an unknown of such a point and axis changes the area by (its value - 1) x `free_area`.
+  subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions, model, &
+    & free_area)
     type(body_type), intent(in) :: body              !! that the groups were found for
     class(family_type), intent(in) :: family         !! whole
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
@@ -104,11 +107,13 @@ contains
     real(wp), intent(in) :: area(:, :)  !! (n_slots, dim) a x area, summed over regions [m2]
     type(conditions_type), intent(out) :: conditions
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
+    real(wp), intent(in), optional :: free_area(:)
+      !! (n_slots) unit of the unknown areas, 0 where an area is fixed; each point is a class [m2]
     type(bonds_type) :: bonds
     real(wp) :: gb, gd
     integer :: c, k, i, row, x, y
 
-    call begin(body%dim, .false., groups, conditions)
+    call begin(body%dim, .false., groups, conditions, free_area)
     call allocate_bonds(family, bonds)
     do c = 1, conditions%classes
       k = int(groups%first(c))
@@ -131,10 +136,24 @@ contains
         end do
       end do
       conditions%right(row + 1:, c) = -area(k, :)*body%spacing(k)/body%volume(k)
+      if (.not. present(free_area)) cycle
+      if (.not. free_area(k) > 0.0_wp) cycle
+      associate (first => conditions%start(c) + bonds%n - 1, &
+        & unit => free_area(k)*body%spacing(k)/body%volume(k))
+        do x = 1, body%dim
+          conditions%n(:, first + x) = 0.0_wp
+          conditions%n(x, first + x) = 1.0_wp
+          conditions%factor(:, first + x) = [0.0_wp, unit]
+        end do
+        ! a value of 1 is no change
+        conditions%right(row + 1:, c) = conditions%right(row + 1:, c) + unit
+      end associate
     end do
     call turn(conditions)
-    if (all(conditions%first(2:) - conditions%first(:conditions%unknowns) == 2_i8)) &
-      & call note_points(body, materials, a, groups, conditions)
+    associate (first => conditions%first, n => groups%n_groups)
+      if (all(first(2:n + 1) - first(:n) == 2_i8)) &
+        & call note_points(body, materials, a, groups, conditions)
+    end associate
   end subroutine dilatation_conditions
 
   !> Note what multipliers of smooth fields depend on: with w V/(t spacing) for the force and
@@ -163,12 +182,16 @@ contains
     conditions%shift = conditions%shift/maxval(conditions%shift)
   end subroutine note_points
 
-  !> Room for the conditions of all classes.
-  subroutine begin(dim, cubic, groups, conditions)
+  !> Room for the conditions of all classes. Unknown areas come after the groups, and after the
+  !> bonds of their class.
+  subroutine begin(dim, cubic, groups, conditions, free_area)
     integer, intent(in) :: dim
     logical, intent(in) :: cubic
     type(groups_type), intent(in) :: groups
     type(conditions_type), intent(inout) :: conditions
+    real(wp), intent(in), optional :: free_area(:)
+    integer(i8) :: n
+    integer :: c, x
 
     conditions%dim = dim
     conditions%cubic = cubic
@@ -176,10 +199,26 @@ contains
     conditions%classes = groups%n_classes
     conditions%unknowns = groups%n_groups
     conditions%start = groups%start
-    conditions%unknown = groups%group
-    associate (n => size(groups%group))
-      allocate (conditions%n(dim, n), conditions%factor(2, n))
-    end associate
+    if (present(free_area)) then
+      do c = 1, groups%n_classes
+        conditions%start(c + 1) = conditions%start(c) + groups%start(c + 1) - groups%start(c) &
+          & + merge(dim, 0, free_area(groups%first(c)) > 0.0_wp)
+      end do
+      allocate (conditions%unknown(conditions%start(groups%n_classes + 1) - 1))
+      do c = 1, groups%n_classes
+        n = conditions%start(c) + groups%start(c + 1) - groups%start(c)
+        conditions%unknown(conditions%start(c):n - 1) = &
+          & groups%group(groups%start(c):groups%start(c + 1) - 1)
+        do x = 1, merge(dim, 0, free_area(groups%first(c)) > 0.0_wp)
+          conditions%unknowns = conditions%unknowns + 1
+          conditions%unknown(n + x - 1) = int(conditions%unknowns, i4)
+        end do
+      end do
+    else
+      conditions%unknown = groups%group
+    end if
+    n = size(conditions%unknown, kind=i8)
+    allocate (conditions%n(dim, n), conditions%factor(2, n))
     allocate (conditions%right(conditions%rows, groups%n_classes))
   end subroutine begin
 

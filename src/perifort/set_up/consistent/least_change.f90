@@ -24,6 +24,7 @@ module pd_set_up_consistent_least_change
   integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
+  integer, parameter :: across = 40                 !! points across that these are enough for
   real(wp), parameter :: part_of_step = 1.0e-6_wp   !! of the error that a step with grids leaves
 
 contains
@@ -72,7 +73,7 @@ contains
           return
         end if
       end if
-      if (low > unbounded .and. iterations > most_of_bound) return
+      if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) return
       free = t + 1 > low
       call solve(conditions, levels, free, r, step, iterations)
       slope = sum(r*step)
@@ -90,6 +91,14 @@ contains
     residual = maxval(abs(r))
     found = residual <= allowed
   end subroutine least_change
+
+  !> The width of a body of points that all differ, over that for which the numbers of iterations
+  !> are; 1 for less and for classes that points share.
+  pure real(wp) function wider(conditions)
+    type(conditions_type), intent(in) :: conditions
+
+    wider = max(1.0_wp, conditions%classes**(1/real(conditions%dim, wp))/across)
+  end function wider
 
   !> Weights of multipliers z, what the conditions miss, and the function that is minimised in z.
   subroutine weigh(conditions, low, z, t, G, r, value)
@@ -121,7 +130,7 @@ contains
     real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
     real(wp), allocatable :: best(:, :)
     real(wp) :: rho, rho_before, curvature, target, least
-    integer :: i
+    integer :: i, most
 
     call factorize(conditions, free, factor)
     allocate (rest, source=r)
@@ -135,7 +144,8 @@ contains
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
     if (size(levels) > 0) target = max(0.3_wp*tolerance, part_of_step*maxval(abs(r)))
     least = huge(1.0_wp)
-    do i = 1, merge(most_iterations, most_bounded, all(free))
+    most = merge(most_iterations, nint(most_bounded*wider(conditions)), all(free))
+    do i = 1, most
       call precondition(factor, rest, w)
       call add_levels(conditions, levels, rest, w)
       rho = sum(rest*w)

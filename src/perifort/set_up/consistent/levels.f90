@@ -181,13 +181,13 @@ contains
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
     integer, intent(in) :: node(3)
-    integer, intent(in) :: u             !! unknown, with two ends
+    integer, intent(in) :: u             !! unknown, with two ends, or one of an area
     real(wp) :: value, gradient(3)
     integer(i8) :: e, i
     integer :: k
 
     q = 0.0_wp
-    do i = conditions%first(u), conditions%first(u) + 1
+    do i = conditions%first(u), conditions%first(u + 1) - 1
       e = conditions%bond(i)
       k = int(conditions%class(e))
       call spline_at(level, node, k, value, gradient)
@@ -205,11 +205,11 @@ contains
     real(wp) :: diagonal(level%dim), part
     integer(i4), allocatable :: points(:)
     integer(i8) :: e
-    integer :: number, node(3), i, k, u
+    integer :: number, node(3), i, k, j, u
 
     allocate (level%inverse(level%dim, product(level%nodes)))
     !$omp parallel do schedule(dynamic, 8) default(none) shared(conditions, level) &
-    !$omp private(diagonal, part, points, e, number, node, i, k, u)
+    !$omp private(diagonal, part, points, e, number, node, i, k, j, u)
     do number = 1, product(level%nodes)
       node = node_at(level, number)
       diagonal = 0.0_wp
@@ -220,7 +220,10 @@ contains
           u = int(conditions%unknown(e))
           part = of_bond(conditions, level, node, u)**2
           ! a bond with both ends here is met twice
-          if (reaches(level, node, other_end(conditions, u, k))) part = part/2
+          j = other_end(conditions, u, k)
+          if (j > 0) then
+            if (reaches(level, node, j)) part = part/2
+          end if
           diagonal = diagonal + part*conditions%n(:, e)**2
         end do
       end do
@@ -230,11 +233,13 @@ contains
     level%inverse = damping/max(level%inverse, part)
   end subroutine find_diagonal
 
-  !> The point at the other end of a bond.
+  !> The point at the other end of a bond; 0 for an area.
   pure integer function other_end(conditions, u, k) result(j)
     type(conditions_type), intent(in) :: conditions
     integer, intent(in) :: u, k
 
+    j = 0
+    if (conditions%first(u + 1) - conditions%first(u) < 2) return
     j = int(conditions%class(conditions%bond(conditions%first(u))))
     if (j == k) j = int(conditions%class(conditions%bond(conditions%first(u) + 1)))
   end function other_end

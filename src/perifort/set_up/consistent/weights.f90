@@ -6,7 +6,7 @@ module pd_set_up_consistent_weights
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_meshes, only: surface_areas
-  use pd_body_side_areas, only: total_areas
+  use pd_body_side_areas, only: balance_sides, total_areas
   use pd_family_areas, only: area_vectors
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
@@ -35,16 +35,18 @@ module pd_set_up_consistent_weights
   !> that are not negative are far from 1.
   real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, unbounded], &
     & bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
+  !> Change of a cloud's surface area that counts as much as one of a weight by 1 [faces].
+  real(wp), parameter :: part_of_face = 0.03_wp
 
 contains
 
   !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced where grids
-  !> touch or facets share it. An error is set if a point of a lattice has no second one behind it,
-  !> or if no weights fulfil the conditions.
+  !> touch or facets share it. The surface areas of a cloud change, except in space. An error is set
+  !> if a point of a lattice has no second one behind it, or if no weights fulfil the conditions.
   subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error, &
     & model)
-    type(body_type), intent(in) :: body
-      !! all on lattices, or one mesh, in the family's slots
+    type(body_type), intent(inout) :: body
+      !! all on lattices, or one mesh or cloud, in the family's slots
     class(family_type), intent(in) :: family         !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
     type(bond_weights_type), intent(out) :: weights
@@ -56,6 +58,11 @@ contains
     integer :: alone
 
     if (allocated(body%sides)) then
+      ! in space areas and Gb would have to be found together
+      if (all(body%sides%axis == 0) .and. body%dim < 3) then
+        call weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
+        return
+      end if
       ! all materials have one stiffness
       of_stretch = total_areas(body%sides, body%n_slots, body%dim)
       associate (a => a_of(materials), mu => mu_of(materials, body%dim))
@@ -88,6 +95,59 @@ contains
     call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., &
       & [.true., .true.], weights, stretch, dilatation, error)
   end subroutine consistent_weights
+
+  !> Weights of a cloud in the plane or on a line, and what its surface areas must be for them: an
+  !> outline knows them roughly only. The conditions on Gd depend on them most, and have them as
+  !> unknowns.
+  subroutine weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
+    type(body_type), intent(inout) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch, dilatation
+    type(error_type), allocatable, intent(out) :: error
+    type(model_type), intent(in), optional :: model
+    type(groups_type) :: groups
+    type(conditions_type) :: conditions
+    real(wp), allocatable :: Gb(:), Gd(:), unit(:)
+    real(wp) :: a(size(materials)), mu(size(materials))
+    integer :: e, c, x, u
+    logical :: found  ! as before the change
+
+    a = a_of(materials)
+    mu = mu_of(materials, body%dim)
+    associate (sides => body%sides)
+      allocate (unit(body%n_slots), source=0.0_wp)
+      unit(sides%slot) = part_of_face*sides%face
+      associate (area => total_areas(sides, body%n_slots, body%dim))
+        call find_groups(body, family, area, 0, groups, error)
+        if (allocated(error)) return
+        call dilatation_conditions(body, family, materials, a, groups, a(1)*area, conditions, &
+          & model, unit)
+      end associate
+      call solve(conditions, [unbounded], .false., 'dilatation', Gd, dilatation, error)
+      if (allocated(error)) return
+      do e = 1, size(sides%slot)
+        c = int(groups%class(sides%slot(e)))
+        if (c == 0) cycle
+        do x = 1, body%dim
+          u = int(conditions%unknown(conditions%start(c + 1) - 1 - body%dim + x))
+          sides%area(x, e) = sides%area(x, e) + (Gd(u) - 1)*unit(sides%slot(e))/a(1)
+        end do
+      end do
+      ! what the tolerance leaves of the sums would stay in the conditions on Gb
+      call balance_sides(body%x, body%volume, sides, found)
+      call stretch_conditions(body, family, materials, groups, &
+        & mu(1)*total_areas(sides, body%n_slots, body%dim), conditions, model)
+    end associate
+    Gd = Gd(:groups%n_groups)
+    dilatation%unknowns = groups%n_groups
+    dilatation%least = minval(Gd)
+    dilatation%greatest = maxval(Gd)
+    call solve(conditions, bounds_of_stretch, .true., 'stretch', Gb, stretch, error)
+    if (allocated(error)) return
+    call spread_weights(body, family, groups, Gb, Gd, weights)
+  end subroutine weights_of_cloud
 
   !> Why a point without a second one behind its face is refused.
   function alone_text(body, slot) result(text)
