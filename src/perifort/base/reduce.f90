@@ -18,7 +18,8 @@ module pd_base_reduce
   private
   public :: sums_type, running_type
   public :: new_sums, add_block, total_of, new_running, add_point, total_of_running
-  public :: inner, sum_over, sum_listed, sum_parts, largest_over, least_over, first_where, first_largest
+  public :: inner, sum_over, sum_listed, sum_parts
+  public :: largest_over, least_over, first_where, first_largest
   public :: largest_of_ranks, sum_of_ranks, count_of_ranks, any_of_ranks
   public :: noise, noise_after, bring_noise
 
@@ -312,9 +313,9 @@ contains
     total = totals(1)
   end function sum_listed
 
-  !> The sums of some terms over parts of the points, on all ranks: of each part and term the bits of
-  !> `sum_listed`. Most parts are on one rank, which knows their sums; the digits of the others go
-  !> from rank to rank, some parts at a time.
+  !> The sums of some terms over parts of the points, on all ranks: of each part and term the bits
+  !> of `sum_listed`. Most parts are on one rank, which knows their sums; the digits of the others
+  !> go from rank to rank, some parts at a time.
   subroutine sum_parts(order, start, all_points, points, terms, totals)
     type(order_type), intent(in) :: order      !! which points are owned
     integer(i4), intent(in) :: start(:)        !! (parts + 1) where each part begins in `points`

@@ -19,7 +19,8 @@ module pd_body_surfaces
     & surface_type
   use pd_scene_content_expressions, only: expression_of
   use pd_scene_content_rules, only: place_fault
-  use pd_scene_content_types, only: scene_type, has_cut_cells, has_own_horizons, is_set, words_of_body
+  use pd_scene_content_types, only: scene_type, has_cut_cells, has_own_horizons, is_set, &
+    & words_of_body
   use pd_scene_format_file, only: resolve_path
   use pd_scene_format_given, only: name_length
   implicit none (type, external)

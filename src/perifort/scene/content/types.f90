@@ -11,8 +11,8 @@ module pd_scene_content_types
   use pd_scene_format_given, only: is_given, is_set, name_length, path_length, &
     & text_length, unset
   use pd_scene_format_keys, only: keys_type, mode_describe
-  use pd_scene_groups_body, only: body_group, has_cut_cells, has_grid, is_box, is_lattice, is_turned, &
-    & words_of_body
+  use pd_scene_groups_body, only: body_group, has_cut_cells, has_grid, is_box, is_lattice, &
+    & is_turned, words_of_body
   use pd_scene_groups_boundary, only: adds_layer, boundary_group
   use pd_scene_groups_contact, only: contact_group
   use pd_scene_groups_crack, only: crack_group
