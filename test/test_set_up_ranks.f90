@@ -2,7 +2,7 @@
 module test_set_up_ranks
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp
-  use pd_scene_content_types, only: scene_type
+  use pd_scene_content_types, only: name_length, scene_type
   use pd_set_up_ranks, only: check_ranks, reproducible_layer
   use bodies, only: box_scene, expect_true
   use testdrive, only: error_type, new_unittest, unittest_type
@@ -10,7 +10,7 @@ module test_set_up_ranks
   private
   public :: collect_set_up_ranks
 
-  integer, parameter :: kinds = 12   !! of scenes that are refused
+  integer, parameter :: kinds = 10   !! of scenes that are refused
 
 contains
 
@@ -66,23 +66,18 @@ contains
       name = "surface_correction = 'consistent'"
       scene%horizon%surface_correction = 'consistent'
     case (6)
-      name = 'a pin'
-      scene%boundaries(1)%motion = 'pin'
-    case (7)
-      name = '&tip'
-      deallocate (scene%tips)
-      allocate (scene%tips(1))
-    case (8)
       name = '&j_integral'
       deallocate (scene%j_integrals)
       allocate (scene%j_integrals(1))
+    case (7)
+      name = "a probe of the field 'fragment'"
+      scene%probes(1)%fields = [character(name_length) :: 'damage', 'fragment']
+    case (8)
+      name = "a line of the field 'fragment'"
+      deallocate (scene%lines)
+      allocate (scene%lines(1))
+      scene%lines(1)%fields = [character(name_length) :: 'fragment']
     case (9)
-      name = 'fragments'
-      scene%output%fragments = .true.
-    case (10)
-      name = "the field 'fragment'"
-      scene%output%fields = [character(len(scene%output%fields)) :: 'damage', 'fragment']
-    case (11)
       name = '&refine'
       allocate (scene%refines(1))
     case default
@@ -106,6 +101,10 @@ contains
     scene%materials(1)%scatter = 10.0_wp
     scene%horizon%surface_correction = 'energy'
     scene%boundaries(1)%absorbing = .true.
+    scene%boundaries(2)%motion = 'pin'
+    deallocate (scene%tips)
+    allocate (scene%tips(1))
+    scene%output%fragments = .true.
     scene%loads(1)%stiffness(2) = 1.0_wp
     scene%initial(1)%file = 'state.txt'
     scene%initial(2)%temperature_change = 10.0_wp

@@ -50,15 +50,22 @@ contains
     if (scene%output%cells) call refuse('output', 1, 'cells', 'cells')
     ! fragments are found by all ranks together, values at places by those that are near
     do i = 1, size(scene%probes)
-      if (any(scene%probes(i)%fields == 'fragment')) call refuse('probe', i, 'fields', &
+      if (has_fragment(scene%probes(i)%fields)) call refuse('probe', i, 'fields', &
         & "a probe of the field 'fragment'", 'an output can have it')
     end do
     do i = 1, size(scene%lines)
-      if (any(scene%lines(i)%fields == 'fragment')) call refuse('line', i, 'fields', &
+      if (has_fragment(scene%lines(i)%fields)) call refuse('line', i, 'fields', &
         & "a line of the field 'fragment'", 'an output can have it')
     end do
 
   contains
+
+    !> Whether the field `fragment` is among some; without any it is not.
+    pure logical function has_fragment(fields)
+      character(*), intent(in), optional :: fields(:)
+      has_fragment = .false.
+      if (present(fields)) has_fragment = any(fields == 'fragment')
+    end function has_fragment
 
     !> Refuse one thing.
     subroutine refuse(group, number, key, what, instead)
