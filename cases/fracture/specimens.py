@@ -77,7 +77,7 @@ SPECIMENS = {
                      0.016, 0.034, bent, 1),
     "cantilever": Specimen("double cantilever", "double_cantilever.nml", lambda a: f"{a:.6g}, 0.0",
                            0.040, 0.058, cantilever, 2,
-                           "its T-stress, at a horizon of a tenth of an arm: README.md"),
+                           "the stress along its crack, at a horizon of a tenth of an arm: README.md"),
 }
 
 

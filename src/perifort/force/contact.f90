@@ -23,7 +23,7 @@ module pd_force_contact
     & surface_normals, surface_type, take_surface, turn_couples
   use pd_force_pairs, only: pairs_type, search_pairs
   use pd_force_term, only: density_of, force_term_type, no_tangent, term_view_type
-  use pd_force_vicinity, only: company_type, find_vicinity, new_company, points_of_vicinity, &
+  use pd_force_vicinity, only: owners_type, find_vicinity, find_owners, points_of_vicinity, &
     & renew_vicinity, sum_vicinity, vicinity_type
   implicit none (type, external)
   private
@@ -54,7 +54,7 @@ module pd_force_contact
     type(pairs_type) :: pairs                !! then
     type(surface_type) :: surface            !! of these points, if it is smoothed
     type(frame_type) :: frame                !! its normals at the noted instant
-    type(company_type) :: company            !! the ranks
+    type(owners_type) :: owners            !! the ranks
     type(vicinity_type) :: vicinity          !! of several ranks in place of pairs and surface
   contains
     procedure :: add_force
@@ -121,7 +121,7 @@ contains
 
     real(wp), allocatable :: normals(:, :)
 
-    call new_company(view%body, self%company)
+    call find_owners(view%body, self%owners)
     ! families reach to copies of other ranks' points
     call share_halo(view%body, view%u)
     self%law%begun = view%body%x + view%u
@@ -148,7 +148,7 @@ contains
           self%vicinity = before%vicinity
           self%movement%searches = before%movement%searches
         end if
-        if (self%company%ranks > 0) then
+        if (self%owners%ranks > 0) then
           call follow(before%vicinity, self%vicinity)
           call note_instant(self%movement, view)
           return
@@ -161,14 +161,14 @@ contains
         call internal_fault('friction follows no contact')
       end select
     else if (.not. still_holds(self, view)) then
-      if (self%company%ranks > 0) then
+      if (self%owners%ranks > 0) then
         call search_vicinity(self, view, self%vicinity)
       else
         call find_pairs(self, view, self%pairs, self%surface)
       end if
       call remember_places(self%movement, view%u)
     end if
-    if (self%company%ranks > 0) then
+    if (self%owners%ranks > 0) then
       call renew_vicinity(view, self%vicinity)
     else if (self%law%smoothed .and. .not. self%follows) then
       call renew_intact(self%surface, view)
@@ -224,7 +224,7 @@ contains
     type(vicinity_type), intent(out) :: vicinity
 
     if (.not. allocated(self%law%begun)) call internal_fault('contact has not begun')
-    call find_vicinity(self%company, self%law, view, self%slots, self%side, self%reach, &
+    call find_vicinity(self%owners, self%law, view, self%slots, self%side, self%reach, &
       & self%within, vicinity)
   end subroutine search_vicinity
 
@@ -237,7 +237,7 @@ contains
     type(surface_type) :: surface
     type(vicinity_type) :: vicinity
 
-    if (self%company%ranks > 0) then
+    if (self%owners%ranks > 0) then
       if (is_noted(self%movement, view)) then
         call points_of_vicinity(self%vicinity, slots)
       else
@@ -288,7 +288,7 @@ contains
     type(frame_type) :: frame
     type(vicinity_type) :: vicinity
 
-    if (self%company%ranks > 0) then
+    if (self%owners%ranks > 0) then
       if (is_noted(self%movement, view) .and. (.not. self%law%smoothed &
         & .or. self%vicinity%surface%broken == view%broken)) then
         call sum_vicinity(self%vicinity, self%part, view, force, energy)

@@ -28,19 +28,19 @@ module pd_force_vicinity
   use pd_force_term, only: term_view_type
   implicit none (type, external)
   private
-  public :: company_type, vicinity_type, new_company, find_vicinity, renew_vicinity, sum_vicinity, &
+  public :: owners_type, vicinity_type, find_owners, find_vicinity, renew_vicinity, sum_vicinity, &
     & points_of_vicinity
 
-  integer, parameter :: of_guest = 5   !! numbers that are sent of a point beside its position
+  integer, parameter :: of_received = 5   !! numbers that are sent of a point beside its position
 
   !> The ranks, and who owns the copies that this one has.
-  type :: company_type
+  type :: owners_type
     integer :: rank = 0                      !! of this process, from 0
     integer :: ranks = 0                     !! how many there are; 0: this process has all points
     integer, allocatable :: owner(:)         !! (n_slots) rank that owns the point, from 0
     integer(i8), allocatable :: number(:)    !! of the copies' points, ascending
     integer(i4), allocatable :: slot(:)      !! of each of these
-  end type company_type
+  end type owners_type
 
   !> The family of the body, by places.
   type, extends(family_type) :: family_of_places_type
@@ -76,41 +76,41 @@ module pd_force_vicinity
   end type vicinity_type
 
   !> Points that other ranks have sent.
-  type :: guests_type
-    integer, allocatable :: from(:)          !! (guests) rank that owns each
+  type :: received_type
+    integer, allocatable :: from(:)          !! (points) rank that owns each
     integer(i8), allocatable :: number(:)    !! among the points of all ranks
-    real(wp), allocatable :: y(:, :)         !! (guests, dim) where they are [m]
+    real(wp), allocatable :: y(:, :)         !! (points, dim) where they are [m]
     real(wp), allocatable :: reach(:), within(:)   !! [m]
     integer, allocatable :: side(:), body(:)
-  end type guests_type
+  end type received_type
 
 contains
 
   !> Find out which ranks there are, and who owns the copies here.
-  subroutine new_company(body, company)
+  subroutine find_owners(body, owners)
     type(body_type), intent(in) :: body          !! arranged in slots, its ranks joined
-    type(company_type), intent(out) :: company
+    type(owners_type), intent(out) :: owners
     real(wp), allocatable :: rank(:)
     integer, allocatable :: order(:)
 
     if (.not. associated(body%order%ranks)) return
-    company%ranks = nint(sum_of_ranks(body%order, 1.0_wp))
-    company%rank = int(body%order%ranks%number_before(1_i8))
-    allocate (rank(body%n_slots), source=real(company%rank, wp))
+    owners%ranks = nint(sum_of_ranks(body%order, 1.0_wp))
+    owners%rank = int(body%order%ranks%number_before(1_i8))
+    allocate (rank(body%n_slots), source=real(owners%rank, wp))
     call share_halo(body, rank)
-    company%owner = nint(rank)
+    owners%owner = nint(rank)
     associate (n => body%order%n_owned)
-      company%number = body%number(n + 1:)
-      order = ascending_order(company%number)
-      company%number = company%number(order)
-      company%slot = body%slot(n + order)
+      owners%number = body%number(n + 1:)
+      order = ascending_order(owners%number)
+      owners%number = owners%number(order)
+      owners%slot = body%slot(n + order)
     end associate
-  end subroutine new_company
+  end subroutine find_owners
 
   !> Search the pairs of points that are near each other, and ask for what is needed of other ranks'
   !> points.
-  subroutine find_vicinity(company, law, view, slots, side, reach, within, vicinity)
-    type(company_type), intent(in) :: company    !! the ranks
+  subroutine find_vicinity(owners, law, view, slots, side, reach, within, vicinity)
+    type(owners_type), intent(in) :: owners    !! the ranks
     type(contact_law_type), intent(in) :: law    !! what pairs do; begun
     type(term_view_type), intent(in) :: view     !! the instant
     integer(i4), intent(in) :: slots(:)          !! of owned points that may touch, in their order
@@ -118,34 +118,34 @@ contains
     real(wp), intent(in) :: reach(:)             !! of each [m]
     real(wp), intent(in) :: within(:)            !! of each, for others of its body [m]
     type(vicinity_type), intent(out) :: vicinity !! to be renewed before it is summed
-    type(guests_type) :: guests
+    type(received_type) :: received
     type(pairs_type) :: found
     integer, allocatable :: candidate(:), owner(:)
     integer(i8), allocatable :: number(:)
 
-    call invite(company, law, view, slots, side, reach, within, guests)
-    call search_all(law, view, slots, side, reach, within, guests, candidate, found)
-    call take_near(company, law, view, slots, guests, candidate, found, owner, number, vicinity)
-    call join(company, view, owner, number, vicinity)
+    call exchange_points(owners, law, view, slots, side, reach, within, received)
+    call search_all(law, view, slots, side, reach, within, received, candidate, found)
+    call take_near(owners, law, view, slots, received, candidate, found, owner, number, vicinity)
+    call join(owners, view, owner, number, vicinity)
     call take_start(law, view, vicinity)
   end subroutine find_vicinity
 
   !> Send points to the ranks that have others where these may be near.
-  subroutine invite(company, law, view, slots, side, reach, within, guests)
-    type(company_type), intent(in) :: company
+  subroutine exchange_points(owners, law, view, slots, side, reach, within, received)
+    type(owners_type), intent(in) :: owners
     type(contact_law_type), intent(in) :: law
     type(term_view_type), intent(in) :: view
     integer(i4), intent(in) :: slots(:)
     integer, intent(in) :: side(:)
     real(wp), intent(in) :: reach(:), within(:)
-    type(guests_type), intent(out) :: guests
+    type(received_type), intent(out) :: received
     real(wp), allocatable :: y(:, :), box(:, :, :, :), message(:), got(:)
     integer, allocatable :: of_side(:), given(:), taken(:), going(:)
     real(wp) :: most
     integer :: dim, columns, sides, i, r, n, pass
 
     dim = size(view%u, 2)
-    columns = dim + of_guest
+    columns = dim + of_received
     y = view%body%x(slots, :) + view%u(slots, :)
     ! with points of one side that meet, there is one box
     sides = max(1, maxval(law%rule%side))
@@ -154,13 +154,13 @@ contains
       sides = 1
       of_side = 1
     end if
-    call find_boxes(company, view, y, of_side, sides, box)
+    call find_boxes(owners, view, y, of_side, sides, box)
     most = 2*largest_of_ranks(view%body%order, maxval(reach))
-    allocate (given(0:company%ranks - 1), source=0)
+    allocate (given(0:owners%ranks - 1), source=0)
     do pass = 1, 2
       n = 0
-      do r = 0, company%ranks - 1
-        if (r == company%rank) cycle
+      do r = 0, owners%ranks - 1
+        if (r == owners%rank) cycle
         do i = 1, size(slots)
           if (.not. may_meet(i, r)) cycle
           n = n + 1
@@ -180,17 +180,17 @@ contains
     call tell_numbers(view, given, taken)
     call view%body%order%ranks%deal(message, columns*given, got, columns*taken)
     n = sum(taken)
-    guests%from = [([(r, i=1, taken(r + 1))], r=0, company%ranks - 1)]
-    allocate (guests%y(n, dim), guests%number(n), guests%reach(n), guests%within(n), &
-      & guests%side(n), guests%body(n))
+    received%from = [([(r, i=1, taken(r + 1))], r=0, owners%ranks - 1)]
+    allocate (received%y(n, dim), received%number(n), received%reach(n), received%within(n), &
+      & received%side(n), received%body(n))
     do i = 1, n
       associate (row => got((i - 1)*columns + 1:i*columns))
-        guests%y(i, :) = row(:dim)
-        guests%number(i) = nint(row(dim + 1), i8)
-        guests%reach(i) = row(dim + 2)
-        guests%within(i) = row(dim + 3)
-        guests%side(i) = nint(row(dim + 4))
-        guests%body(i) = nint(row(dim + 5))
+        received%y(i, :) = row(:dim)
+        received%number(i) = nint(row(dim + 1), i8)
+        received%reach(i) = row(dim + 2)
+        received%within(i) = row(dim + 3)
+        received%side(i) = nint(row(dim + 4))
+        received%body(i) = nint(row(dim + 5))
       end associate
     end do
 
@@ -208,11 +208,11 @@ contains
           & .and. all(y(i, :) <= box(:, 2, s, r + 1) + most))
       end do
     end function may_meet
-  end subroutine invite
+  end subroutine exchange_points
 
   !> The boxes around the points of each side of each rank; where it has none, they hold nothing.
-  subroutine find_boxes(company, view, y, side, sides, box)
-    type(company_type), intent(in) :: company
+  subroutine find_boxes(owners, view, y, side, sides, box)
+    type(owners_type), intent(in) :: owners
     type(term_view_type), intent(in) :: view
     real(wp), intent(in) :: y(:, :)
     integer, intent(in) :: side(:), sides
@@ -228,10 +228,10 @@ contains
       end do
     end do
     n = size(mine)
-    allocate (flat(n*company%ranks), source=0.0_wp)
-    flat(n*company%rank + 1:n*(company%rank + 1)) = reshape(mine, [n])
+    allocate (flat(n*owners%ranks), source=0.0_wp)
+    flat(n*owners%rank + 1:n*(owners%rank + 1)) = reshape(mine, [n])
     call view%body%order%ranks%add_all(flat)
-    box = reshape(flat, [size(y, 2), 2, sides, company%ranks])
+    box = reshape(flat, [size(y, 2), 2, sides, owners%ranks])
   end subroutine find_boxes
 
   !> Tell every rank how many points it gets.
@@ -246,16 +246,16 @@ contains
     taken = nint(got)
   end subroutine tell_numbers
 
-  !> Search the pairs of this rank's points and the guests; in them stand numbers of candidates.
-  subroutine search_all(law, view, slots, side, reach, within, guests, candidate, found)
+  !> Search the pairs of this rank's points and of those received; in them stand numbers of candidates.
+  subroutine search_all(law, view, slots, side, reach, within, received, candidate, found)
     type(contact_law_type), intent(in) :: law
     type(term_view_type), intent(in) :: view
     integer(i4), intent(in) :: slots(:)
     integer, intent(in) :: side(:)
     real(wp), intent(in) :: reach(:), within(:)
-    type(guests_type), intent(in) :: guests
+    type(received_type), intent(in) :: received
     integer, allocatable, intent(out) :: candidate(:)
-      !! by the numbers of points: which one of `slots`, or behind them of the guests, each is
+      !! by the numbers of points: which one of `slots`, or behind them of those received, each is
     type(pairs_type), intent(out) :: found
     type(body_type), target :: body
     real(wp), allocatable, target :: nothing(:, :)
@@ -265,7 +265,7 @@ contains
     real(wp), allocatable :: all_y(:, :), all_reach(:), all_within(:)
     integer :: c, n
 
-    number = [number_at(view%body, int(slots)), guests%number]
+    number = [number_at(view%body, int(slots)), received%number]
     candidate = ascending_order(number)
     n = size(candidate)
     call allocate_points(body, size(view%u, 2), n)
@@ -273,13 +273,13 @@ contains
     nothing = 0.0_wp
     do c = 1, body%dim
       all_y(:size(slots), c) = view%body%x(slots, c) + view%u(slots, c)
-      all_y(size(slots) + 1:, c) = guests%y(:, c)
+      all_y(size(slots) + 1:, c) = received%y(:, c)
       body%x(:, c) = all_y(candidate, c)
     end do
-    all_sides = [side, guests%side]
-    all_bodies = [int(view%body%body(slots)), guests%body]
-    all_reach = [reach, guests%reach]
-    all_within = [within, guests%within]
+    all_sides = [side, received%side]
+    all_bodies = [int(view%body%body(slots)), received%body]
+    all_reach = [reach, received%reach]
+    all_within = [within, received%within]
     body%body = int(all_bodies(candidate), i2)
     here%body => body
     here%u => nothing
@@ -289,12 +289,13 @@ contains
 
   !> The places: points that are near one of this rank's, and points near whose families this rank
   !> has a part of, then the others of all families that make normals.
-  subroutine take_near(company, law, view, slots, guests, candidate, found, owner, number, vicinity)
-    type(company_type), intent(in) :: company
+  subroutine take_near(owners, law, view, slots, received, candidate, found, owner, number, &
+      & vicinity)
+    type(owners_type), intent(in) :: owners
     type(contact_law_type), intent(in) :: law
     type(term_view_type), intent(in) :: view
     integer(i4), intent(in) :: slots(:)
-    type(guests_type), intent(in) :: guests
+    type(received_type), intent(in) :: received
     integer, intent(in) :: candidate(:)
     type(pairs_type), intent(in) :: found
     integer, allocatable, intent(out) :: owner(:)          !! (places) rank that owns each, from 0
@@ -321,7 +322,7 @@ contains
       end do
       call share_halo(view%body, weight)
     end if
-    n = count(keep) + count(weight(company%slot) > 0.0_wp)
+    n = count(keep) + count(weight(owners%slot) > 0.0_wp)
     allocate (owner(n), number(n), vicinity%slot(n), place_of(n))
     allocate (of_slot(view%body%n_slots), source=0_i4)
     n = 0
@@ -332,25 +333,25 @@ contains
       i = candidate(c)
       if (i <= size(slots)) then
         vicinity%slot(n) = slots(i)
-        owner(n) = company%rank
+        owner(n) = owners%rank
         number(n) = number_at(view%body, int(slots(i)))
       else
-        owner(n) = guests%from(i - size(slots))
-        number(n) = guests%number(i - size(slots))
-        k = place_in(company%number, number(n))
+        owner(n) = received%from(i - size(slots))
+        number(n) = received%number(i - size(slots))
+        k = place_in(owners%number, number(n))
         vicinity%slot(n) = 0_i4
-        if (k > 0) vicinity%slot(n) = company%slot(k)
+        if (k > 0) vicinity%slot(n) = owners%slot(k)
       end if
       if (vicinity%slot(n) > 0_i4) of_slot(vicinity%slot(n)) = 1_i4
     end do
-    do i = 1, size(company%slot)
-      k = company%slot(i)
+    do i = 1, size(owners%slot)
+      k = owners%slot(i)
       if (.not. weight(k) > 0.0_wp .or. of_slot(k) > 0_i4) cycle
       n = n + 1
       place_of(n) = 0
       vicinity%slot(n) = int(k, i4)
-      owner(n) = company%owner(k)
-      number(n) = company%number(i)
+      owner(n) = owners%owner(k)
+      number(n) = owners%number(i)
     end do
     order = ascending_order(number(:n))
     number = number(order)
@@ -376,7 +377,7 @@ contains
       vicinity%surface%around(i) = of_slot(k)
     end do
     vicinity%slot = [vicinity%slot, others]
-    owner = [owner, company%owner(others)]
+    owner = [owner, owners%owner(others)]
     number = [number, number_at(view%body, int(others))]
 
   contains
@@ -430,19 +431,19 @@ contains
 
   !> Ask the owners of other ranks' points for their values, and find out which points others ask
   !> this rank for: those, too, get places.
-  subroutine join(company, view, owner, number, vicinity)
-    type(company_type), intent(in) :: company
+  subroutine join(owners, view, owner, number, vicinity)
+    type(owners_type), intent(in) :: owners
     type(term_view_type), intent(in) :: view
     integer, intent(in) :: owner(:)          !! (places)
     integer(i8), intent(in) :: number(:)     !! (places)
     type(vicinity_type), intent(inout) :: vicinity
-    integer :: wanted(0:company%ranks - 1)
+    integer :: wanted(0:owners%ranks - 1)
     integer(i4), allocatable :: of_slot(:), more(:)
     integer, allocatable :: others(:)
     real(wp), allocatable :: asked(:)
     integer :: i, n, k
 
-    others = pack([(i, i=1, size(owner))], owner /= company%rank)
+    others = pack([(i, i=1, size(owner))], owner /= owners%rank)
     others = others(ascending_order(int(owner(others), i8)))
     vicinity%taken = int(others, i4)
     wanted = 0
@@ -455,7 +456,7 @@ contains
     call view%body%order%ranks%deal(real(number(others), wp), wanted, asked, vicinity%given)
     allocate (of_slot(view%body%n_slots), source=0_i4)
     do i = 1, size(owner)
-      if (owner(i) == company%rank) of_slot(vicinity%slot(i)) = int(i, i4)
+      if (owner(i) == owners%rank) of_slot(vicinity%slot(i)) = int(i, i4)
     end do
     allocate (vicinity%sent(size(asked)), more(size(asked)))
     n = 0
@@ -470,7 +471,7 @@ contains
       end if
       vicinity%sent(i) = of_slot(k)
     end do
-    vicinity%own = [owner == company%rank, [(.true., i=1, n)]]
+    vicinity%own = [owner == owners%rank, [(.true., i=1, n)]]
     vicinity%slot = [vicinity%slot, more(:n)]
     of_slot = 0_i4
     do i = 1, size(vicinity%slot)
