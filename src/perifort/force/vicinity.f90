@@ -246,7 +246,8 @@ contains
     taken = nint(got)
   end subroutine tell_numbers
 
-  !> Search the pairs of this rank's points and of those received; in them stand numbers of candidates.
+  !> Search the pairs of this rank's points and of those received; in them stand numbers of
+  !> candidates.
   subroutine search_all(law, view, slots, side, reach, within, received, candidate, found)
     type(contact_law_type), intent(in) :: law
     type(term_view_type), intent(in) :: view
