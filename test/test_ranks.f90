@@ -372,16 +372,22 @@ contains
       type(order_type) :: order
       type(running_type) :: running
       logical :: enough
-      integer :: r, p, part(n)
+      integer, allocatable :: part(:)
+      integer(i4), allocatable :: points(:)
+      integer :: r, p
 
       if (allocated(error)) return
-      part = [(1 + mod(p, 3), p=1, n)]
+      allocate (part(n), points(n))
+      do p = 1, n
+        part(p) = 1 + mod(p, 3)
+        points(p) = int(p, i4)
+      end do
       part(17) = parts
-      all_points = [(int(count(part == p), i8), p=1, parts)]
       do p = 1, parts
-        by_part = pack([(int(r, i4), r=1, n)], part == p)
-        of_parts(:, p) = [sum_listed(whole, by_part, a(by_part)), &
-          & sum_listed(whole, by_part, -2*a(by_part))]
+        all_points(p) = count(part == p)
+        by_part = pack(points, part == p)
+        mine = a(by_part)
+        of_parts(:, p) = [sum_listed(whole, by_part, mine), sum_listed(whole, by_part, -2*mine)]
       end do
       allocate (hub%of_rank(ranks))
       enough = .false.

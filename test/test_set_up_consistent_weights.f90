@@ -47,6 +47,7 @@ contains
       & new_unittest('long: uniform strains are in equilibrium with classical tractions', &
       & test_uniform), &
       & new_unittest('long: uniform strains of bodies of two materials', test_two_materials), &
+      & new_unittest('strains that leave tractions continuous need no force', test_continuous), &
       & new_unittest('two materials in series', test_series), &
       & new_unittest('long: grids of several spacings and offsets that touch', test_grids), &
       & new_unittest('loads on sides and held layers of refined plates', test_refined), &
@@ -924,6 +925,48 @@ contains
     end do
   end subroutine test_two_materials
 
+  !> Two materials of one Poisson's ratio beside each other in x, strained alike so that the traction
+  !> on their interface is continuous, (lambda + 2 mu) exx + lambda eyy the same in both: no point
+  !> needs a force but those of the two outer rows, on which the surface acts.
+  subroutine test_continuous(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: ratios(*) = [0.1_wp, 0.35_wp], poissons_ratios(*) = [0.2_wp, 0.3_wp]
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    real(wp), allocatable :: u(:, :), force(:, :), p(:)
+    integer(i1), allocatable :: strained(:)
+    logical, allocatable :: inside(:)
+    real(wp) :: strain(2), lambda(2), mu(2)
+    integer :: i, c
+
+    do i = 1, size(ratios)
+      call two_materials('plate', ratios(i), spread(poissons_ratios(i), 1, 2), scene)
+      call ready(scene, set_up, error)
+      if (allocated(error)) return
+      associate (system => set_up%system, body => set_up%system%body)
+        lambda = lame_of(system%model%materials, 2)
+        mu = shear_of(system%model%materials, 2)
+        strain = zeta*[-(lambda(2) - lambda(1))/(lambda(2) - lambda(1) + 2*(mu(2) - mu(1))), 1.0_wp]
+        if (allocated(u)) deallocate (u, force, p, strained)
+        allocate (u(body%n_slots, 2), force(body%n_slots, 2), source=0.0_wp)
+        allocate (p(merge(body%n_slots, 0, system%model%dilatation)), source=0.0_wp)
+        allocate (strained(0))
+        inside = body%point > 0
+        do c = 1, 2
+          where (body%point > 0) u(:, c) = strain(c)*body%x(:, c)
+          inside = inside .and. body%x(:, c) > 2*spacing .and. &
+            & body%x(:, c) < maxval(body%x(:, c), mask=body%point > 0) - 1.5_wp*spacing
+        end do
+        call internal_force(body, system%family, system%model, options_of(system%model), &
+          & system%workspace, u, p, force, strained)
+        call expect_true(error, count(inside) == 16*7, 'points inside')
+        call expect_close(error, pack(force, spread(inside, 2, 2)), 0.0_wp, &
+          & 1.0e-9_wp*max_abs(force), 'inside')
+      end associate
+      if (allocated(error)) return
+    end do
+  end subroutine test_continuous
+
   !> Bars of two materials in series, pulled at the ends: in each the classical strain away from
   !> the interface, which is as soft as less than a row of the softer one.
   subroutine test_series(error)
@@ -1262,6 +1305,18 @@ contains
     call box_scene([10, 1], spacing, 0.3_wp, scene)
     scene%horizon%surface_correction = 'consistent'
     call refused(scene, 'lower the dimension', error)
+    ! of one material, unstable by weights below 0: two rows of points, and a disc
+    call box_scene([6, 2], spacing, 0.3_wp, scene)
+    scene%horizon%surface_correction = 'consistent'
+    call refused(scene, 'round and thin parts', error)
+    call box_scene([14, 14], spacing, 0.3_wp, scene)
+    scene%horizon%surface_correction = 'consistent'
+    deallocate (scene%kept)
+    allocate (scene%kept(1))
+    scene%kept(1)%shape = 'sphere'
+    scene%kept(1)%centre(:2) = 7*spacing
+    scene%kept(1)%radius = 7*spacing
+    call refused(scene, 'round and thin parts', error)
   end subroutine test_refused
 
   !> Fail unless a scene is refused with a message that has `word`.

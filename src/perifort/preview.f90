@@ -25,6 +25,7 @@ module pd_preview
   use pd_scene_content_write, only: scene_text
   use pd_set_up_move, only: take_all_memory
   use pd_set_up_prepare, only: prepare, set_up_type
+  use pd_set_up_ranks, only: check_ranks
   implicit none (type, external)
   private
   public :: check_scene, preview_scene
@@ -80,6 +81,7 @@ contains
 
     text = ''
     call check_names(scene, fields_of(options), error)
+    if (.not. allocated(error) .and. options%ranks > 1) call check_ranks(scene, error)
     if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads)
     if (allocated(error)) return
     call foresee_output(scene, fields_of(options), set_up, measures, error)

@@ -13,6 +13,7 @@ module pd_set_up_plan
   use pd_motion_explicit_spectrum, only: spectrum_type, largest_frequency, lasting_frequency, &
     & stable_step_of, may_be_unstable, lowest_eigenvalue
   use pd_force_term, only: term_view_type
+  use pd_law_material, only: several_stiffnesses
   use pd_motion_loads, only: other_terms
   use pd_motion_system, only: ask_bonds, inverse_density, system_type, view_of
   use pd_motion_explicit_time_step, only: stable_step, printed_step, book_step, &
@@ -68,10 +69,7 @@ contains
       call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
         & "surface_correction = 'consistent' makes this body unstable: its stiffness has an "// &
         & 'eigenvalue of '//to_text(plan%lowest, 2)//' of the largest one', &
-        & trim(merge('use more elements across its thinnest part', merge( &
-        & 'use more points at small holes and corners', &
-        & 'use materials that differ less            ', allocated(system%body%sides)), &
-        & size(system%body%parts) > 0))//", or surface_correction = 'energy'")
+        & remedy_of(system)//", or surface_correction = 'energy'")
       return
     end if
     if (plan%relaxes) then
@@ -109,6 +107,20 @@ contains
     plan%steps = steps_of(scene%time%duration, plan%step)
     plan%step = scene%time%duration/plan%steps
   end subroutine make_plan
+
+  !> What may make a body stable with consistent weights.
+  function remedy_of(system) result(text)
+    type(system_type), intent(in) :: system
+    character(:), allocatable :: text
+
+    if (size(system%body%parts) > 0) then
+      text = 'use more elements across its thinnest part'
+    else if (several_stiffnesses(system%model%materials)) then
+      text = 'use materials that differ less'
+    else
+      text = 'use more points at round and thin parts, small holes and corners'
+    end if
+  end function remedy_of
 
   !> The fewest steps of at most `step` that make up `duration`; a quotient that only rounding has
   !> lifted above a whole number is that number.

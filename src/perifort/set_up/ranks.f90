@@ -152,7 +152,7 @@ contains
     if (division%work(i) > 0.0_wp) return
     call scene_fault(error, scene, 'body', 1, 'points', 'the scene has too few points for '// &
       & to_text(division%ranks)//' ranks: rank '//to_text(i)//' would have none', &
-      & 'use fewer ranks')
+      & 'use fewer ranks; with --reproducible cuts lie between blocks of points of a row')
   end subroutine check_division
 
   !> Note where each grid begins, so that blocks and slabs of lattices are the same on all ranks.

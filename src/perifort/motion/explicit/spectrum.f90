@@ -193,13 +193,15 @@ contains
 
   !> Whether a body may be unstable as it stands, before any load: with a strongly negative
   !> Poisson's ratio and surface factors, which strengthen the dilatation of corners, while a < 0;
-  !> and with consistent weights on a mesh, on lattices that touch or of materials of different
-  !> stiffness, some of which are far below 0.
+  !> and with consistent weights on a mesh, on lattices that touch, of materials of different
+  !> stiffness, or of which some are below 0, as at round and thin bodies.
   pure logical function may_be_unstable(system)
     type(system_type), intent(in) :: system  !! with its model
-    may_be_unstable = (system%model%consistent .and. (size(system%body%parts) > 0 .or. &
-      & allocated(system%body%sides) .or. &
-      & several_stiffnesses(system%model%materials))) .or. &
+    may_be_unstable = .false.
+    if (system%model%consistent) may_be_unstable = size(system%body%parts) > 0 .or. &
+      & allocated(system%body%sides) .or. several_stiffnesses(system%model%materials) .or. &
+      & any(system%model%weights%Gb < 0.0_wp)
+    may_be_unstable = may_be_unstable .or. &
       & (system%model%dilatation .and. system%model%surface .and. &
       & any(system%model%materials%a < 0.0_wp .and. &
       & system%model%materials%poissons_ratio < suspicious_ratio))

@@ -179,17 +179,19 @@ contains
     type(energies_type), intent(in) :: energies  !! at this instant
     real(wp), intent(in) :: t                    !! time [s]
     type(error_type), allocatable, intent(out) :: error
-    character(:), allocatable :: advice
+    character(:), allocatable :: cause
 
     if (energies%strain >= -max(system%watch%rounding, 0.01_wp*energies%kinetic)) return
     if (.not. any(system%model%materials%a < 0.0_wp)) return
-    advice = ''
-    if (system%model%surface) advice = ' with surface correction, which strengthens the '// &
+    cause = 'a Poisson''s ratio of '// &
+      & to_text(minval(system%model%materials%poissons_ratio))
+    if (system%model%surface) cause = cause//' with surface correction, which strengthens the '// &
       & 'dilatation of corners (surface_correction = ''none'' does not)'
+    if (system%model%consistent) cause = 'weights of surface_correction = ''consistent'' that '// &
+      & 'are below 0 (surface_correction = ''energy'' has none)'
     call fail(error, 'unstable by t = '//to_text(t)//' s: the strain energy is negative, '// &
-      & with_unit(energies%strain, 'J', 3)//'. The cause is not the step but a Poisson''s '// &
-      & 'ratio of '//to_text(minval(system%model%materials%poissons_ratio))//advice, &
-      & status_no_answer)
+      & with_unit(energies%strain, 'J', 3)//'. The cause is not the step but '// &
+      & cause, status_no_answer)
   end subroutine check_strain_energy
 
   !> The largest stretch, in size, of the intact bonds of slot `k`; not finite if displacements

@@ -238,6 +238,7 @@ contains
     real(wp), allocatable, intent(out) :: G(:)
     type(solution_type), intent(out) :: solution
     type(error_type), allocatable, intent(out) :: error
+    character(:), allocatable :: why
     integer :: b, iterations
     logical :: found
 
@@ -252,10 +253,15 @@ contains
     solution%least = minval(G)
     solution%greatest = maxval(G)
     if (found) return
+    if (solution%residual < 1.0_wp) then
+      why = 'uniform strains would leave forces of '//to_text(solution%residual, 2)// &
+        & ' of those of the bonds'
+    else
+      why = 'the iterations do not converge. Families may have too few bonds: horizons of 2.5 '// &
+        & 'spacings and more are served'
+    end if
     call fail(error, "surface_correction = 'consistent' finds no weights of the "//what// &
-      & ' for these points: uniform strains would leave forces of '// &
-      & to_text(solution%residual, 2)//' of those of the bonds; use another correction', &
-      & group='horizon', number=1)
+      & ' for these points: '//why//'; use another correction', group='horizon', number=1)
   end subroutine solve
 
   !> The shear modulus that the stretches alone give; in 1D a third of Young's modulus.
