@@ -926,8 +926,8 @@ contains
   end subroutine test_two_materials
 
   !> Two materials of one Poisson's ratio beside each other in x, strained alike so that the
-  !> traction on their interface is continuous, (lambda + 2 mu) exx + lambda eyy the same in both: no
-  !> point needs a force but those of the two outer rows, on which the surface acts.
+  !> traction on their interface is continuous, (lambda + 2 mu) exx + lambda eyy the same in both:
+  !> no point needs a force but those of the two outer rows, on which the surface acts.
   subroutine test_continuous(error)
     type(error_type), allocatable, intent(out) :: error
     real(wp), parameter :: ratios(*) = [0.1_wp, 0.35_wp], poissons_ratios(*) = [0.2_wp, 0.3_wp]
