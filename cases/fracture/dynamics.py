@@ -71,28 +71,45 @@ def strip(case):
 
 
 def kalthoff(case):
-    """Kalthoff and Winkler's plate: the angle of both cracks, when they start, how fast they run."""
+    """Kalthoff and Winkler's plate: the angle of both cracks, when they start, how fast they run; with the formula's
+    critical stretch and, beside it, with that of the lattice's own toughness.
+    """
     text = case.scene("kalthoff.nml")
     if case.options.quick:
-        text = change(text, "body", points="100, 200")
+        text = change(text, "body", points="200, 400")
     if case.options.full:
-        text = change(text, "body", points="400, 800")
+        text = change(text, "body", points="800, 1600")
     results = case.run("kalthoff.nml", text, threads=case.threads)
-    dx = spacing_of(results)
     _, _, speed = rayleigh_speed(190e9, 0.3, 8000.0, "strain")
     for name, side in (("upper", 1), ("lower", -1)):
-        tip = results.tip(name)
-        x = crack(results, start=(0.05, side * 0.025))
-        x = x[(side * x[:, 1] > 0.025 + 2 * dx) & (side * x[:, 1] < 0.085)]
-        angle = side * slope_angle(x, (0.05, side * 0.025))
-        case.not_met(f"Kalthoff, {name} notch: angle of the crack [degrees], 65 to 75", angle, 70.0,
-                     65.0 <= angle <= 75.0, "flatter by a few degrees: README.md")
-        start = time_at(tip, 2 * dx)
-        case.not_met("   start: the tip two spacings on [s], 20 to 30 us", start, 25e-6,
-                     20e-6 <= start <= 30e-6, "3 % early with critical = 'lattice': README.md")
-        case.below("   largest mean speed over 5 mm [m/s], of Rayleigh's",
-                   fastest(tip, 5e-3, 0.065), speed)
-    return [(results, "damage", "Kalthoff and Winkler, 90 us")]
+        angle, start, fast = kalthoff_crack(results, name, side)
+        what = f"Kalthoff, {name} notch: angle of the crack [degrees]"
+        if case.options.quick:
+            # Flatter by 4 degrees on points of 0.5 mm
+            case.show(what, angle, 70.0)
+        else:
+            case.near(what, angle, 70.0, absolute=5.0)
+        case.near("   start: the tip two spacings on [s]", start, 25e-6, absolute=5e-6)
+        case.below("   largest mean speed over 5 mm [m/s], of Rayleigh's", fast, speed)
+    pictures = [(results, "damage", "Kalthoff and Winkler, 90 us")]
+    if not case.options.quick:
+        results = case.run("kalthoff_lattice.nml", change(text, "material", critical="'lattice'"),
+                           threads=case.threads)
+        angle, start, _ = kalthoff_crack(results, "upper", 1)
+        reason = "a lower critical stretch: README.md"
+        case.not_met("the same with critical = 'lattice': angle, 65 to 75", angle, 70.0, 65.0 <= angle <= 75.0, reason)
+        case.not_met("   start [s], 20 to 30 us", start, 25e-6, 20e-6 <= start <= 30e-6, reason)
+    return pictures
+
+
+def kalthoff_crack(results, name, side):
+    """Angle [degrees] of the crack from the notch above (side 1) or below (-1) the middle, when its tip has come two
+    spacings [s], and its largest mean speed over 5 mm [m/s].
+    """
+    dx, tip = spacing_of(results), results.tip(name)
+    x = crack(results, start=(0.05, side * 0.025))
+    x = x[(side * x[:, 1] > 0.025 + 2 * dx) & (side * x[:, 1] < 0.085)]
+    return side * slope_angle(x, (0.05, side * 0.025)), time_at(tip, 2 * dx), fastest(tip, 5e-3, 0.065)
 
 
 RADIUS, ACROSS, SPACING = 0.05, 3, 1 / 3e3

@@ -8,7 +8,7 @@ import numpy as np
 
 CASES = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(CASES), str(CASES / "fracture")]
-from common import Case  # noqa: E402
+from common import Case, change  # noqa: E402
 from measures import (asymmetry, crack, fastest, rayleigh_speed, slope_angle, spacing_of,  # noqa: E402
                       time_at)
 
@@ -39,6 +39,9 @@ def momentum(results, output):
 def main():
     case = Case(__file__, __doc__)
     text, moved_text = case.scene("impact.nml"), (CASES / "fracture/kalthoff.nml").read_text(encoding="utf-8")
+    # The striker's lattice and critical stretch
+    moved_text = change(moved_text, "body", points="200, 400")
+    moved_text = change(moved_text, "material", critical="'lattice'")
     if case.options.quick:
         text, moved_text = coarser(text), coarser(moved_text)
     results = case.run("impact.nml", text)
