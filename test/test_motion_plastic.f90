@@ -56,7 +56,7 @@ contains
       & new_unittest('long: a bar yields, hardens, unloads and yields back', test_bar), &
       & new_unittest('long: a bar is twisted until all of it yields', test_torsion), &
       & new_unittest('a bar that is hit keeps its energy', test_hit), &
-      & new_unittest('the balance closes at second order while a bar yields and breaks', &
+      & new_unittest('long: the balance closes at second order while a bar yields and breaks', &
       & test_torn), &
       & new_unittest('forces balance after flow, and wait for the commit', test_balance), &
       & new_unittest('scenes that cannot have it', test_refused)]

@@ -155,7 +155,9 @@ contains
 
   !> Load curves and dissipated energies with spacings and horizons from 1 to 1/2, within 5 % of
   !> each other. At this ratio a sum over the lattice counts 5.4 % less for a straight crack than
-  !> the integral of Gc (doc/theory.md, 8); the cracks are curved.
+  !> the integral of Gc (doc/theory.md, 8): 0.946 Gc A is the least that a crack costs. Bonds beside
+  !> it that soften and unload again come on top; they are some 2 to 5 % here, so that 0.976 is
+  !> asked for, to 3 %.
   subroutine test_spacings(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: points(*) = [48, 64, 96]
@@ -176,7 +178,7 @@ contains
         return
       end if
       lost(i) = set_up%system%dissipated
-      call expect_close(error, lost(i)/(Gc*ligament), 0.946_wp, 0.03_wp, 'dissipated over Gc A')
+      call expect_close(error, lost(i)/(Gc*ligament), 0.976_wp, 0.03_wp, 'dissipated over Gc A')
       call expect_close(error, curve(i)%energy, curve(i)%work, 0.005_wp*Gc*ligament, &
         & 'stored and dissipated energy')
       call expect_true(error, set_up%system%broken > 0_i8, 'no bond is lost')
