@@ -173,7 +173,7 @@ contains
           end do
           call force_at(subject, turned, force_of_turned)
           force = matmul(force, transpose(R(:dim, :dim)))
-          call expect_close(error, force_of_turned, force, 1.0e-10_wp*max_abs(force), &
+          call expect_close(error, force_of_turned, force, 1.0e-11_wp*max_abs(force), &
             & 'forces of a turned body, '//subject%law)
           if (allocated(error)) return
         end do
@@ -210,7 +210,7 @@ contains
             u(k, c) = u(k, c) - 2*h
             slope = (slope - total_energy(subject, u))/(2*h)
             u(k, c) = u(k, c) + h
-            call expect(error, -slope, force(k, c)*subject%body%volume(k), 1.0e-5_wp*largest, &
+            call expect(error, -slope, force(k, c)*subject%body%volume(k), 1.0e-7_wp*largest, &
               & 'gradient, '//trim(subject%law))
             if (allocated(error)) return
           end do
@@ -305,7 +305,7 @@ contains
         u = 0.9_wp*u
         call force_at(list, u, other)
         call expect_close(error, other(list%body%slot, :), force(lattice%body%slot, :), &
-          & 1.0e-11_wp*max_abs(force), 'list and lattice, '//lattice%law)
+          & 1.0e-12_wp*max_abs(force), 'list and lattice, '//lattice%law)
         if (allocated(error)) return
       end do
     end do

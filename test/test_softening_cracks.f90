@@ -79,13 +79,17 @@ contains
       & 'displacement_y = 0.0'//nl//'/'//nl//method
   end function strip
 
-  !> The same, pulled to 54 micrometres in 36 load steps.
+  !> The same, pulled to 54 micrometres in 50 load steps: 20 of them from 0.19 to 0.30 of that,
+  !> where a band of bonds softens and others unload. What these have reached is known at the ends
+  !> of load steps alone: with 36 equal steps up to 6 % of the greatest load are missing there, of
+  !> 64 points along the strip, against 144 steps.
   function strip_at_rest(points) result(text)
     integer, intent(in) :: points
     character(:), allocatable :: text
     text = strip(points, '&boundary'//nl//"name = 'right'"//nl//"side = 'x_max'"//nl// &
-      & 'displacement_x = 54.0e-6'//nl//'displacement_y = 0.0'//nl//'/'//nl//'&time'//nl// &
-      & "method = 'relaxation'"//nl//'/'//nl//'&relaxation'//nl//'load_steps = 36'//nl//'/'//nl)
+      & 'displacement_x = 54.0e-6'//nl//'times = 0.0, 0.2, 0.6, 1.0'//nl// &
+      & 'values = 0.0, 0.19, 0.30, 1.0'//nl//'displacement_y = 0.0'//nl//'/'//nl//'&time'//nl// &
+      & "method = 'relaxation'"//nl//'/'//nl//'&relaxation'//nl//'load_steps = 50'//nl//'/'//nl)
   end function strip_at_rest
 
   !> The same, of 16 by 8 points, pulled at a given speed [m/s].
@@ -151,10 +155,12 @@ contains
 
   !> Load curves and dissipated energies with spacings and horizons from 1 to 1/2, within 5 % of
   !> each other. At this ratio a sum over the lattice counts 5.4 % less for a straight crack than
-  !> the integral of Gc (doc/theory.md, 8); the cracks are curved.
+  !> the integral of Gc (doc/theory.md, 8): 0.946 Gc A is the least that a crack costs. Bonds beside
+  !> it that soften and unload again come on top; they are some 2 to 5 % here, so that 0.976 is
+  !> asked for, to 3 %.
   subroutine test_spacings(error)
     type(error_type), allocatable, intent(out) :: error
-    integer, parameter :: points(*) = [32, 48, 64]
+    integer, parameter :: points(*) = [48, 64, 96]
     type(scene_type) :: scene
     type(set_up_type) :: set_up
     type(curve_type) :: curve(size(points))
@@ -172,7 +178,7 @@ contains
         return
       end if
       lost(i) = set_up%system%dissipated
-      call expect_close(error, lost(i)/(Gc*ligament), 0.946_wp, 0.03_wp, 'dissipated over Gc A')
+      call expect_close(error, lost(i)/(Gc*ligament), 0.976_wp, 0.03_wp, 'dissipated over Gc A')
       call expect_close(error, curve(i)%energy, curve(i)%work, 0.005_wp*Gc*ligament, &
         & 'stored and dissipated energy')
       call expect_true(error, set_up%system%broken > 0_i8, 'no bond is lost')

@@ -48,7 +48,8 @@ contains
       & new_unittest('energy balance beside what is dissipated', test_dissipated), &
       & new_unittest('heat without expansion', test_idle_heat), &
       & new_unittest('velocities in relaxation', test_velocities), &
-      & new_unittest('large strains', test_strains)]
+      & new_unittest('large strains', test_strains), &
+      & new_unittest('large strains of bodies that yield', test_yielding)]
   end subroutine collect_warnings
 
   !> Hold a scene to having (or not having) a warning, or a note, with this text, told once.
@@ -790,5 +791,52 @@ contains
       end do
     end do
   end subroutine test_strains
+
+  !> Bodies that yield are stretched and compressed along x at their volume; the bonds along x have
+  !> the strain of the body, those across half of it, and all others less. `lps_plastic` is warned
+  !> of beyond 10 %, though flow leaves it hardly any energy; `lps_plastic_large` beyond a
+  !> logarithmic strain of 0.4, in compression where it is -0.42 with a stretch of only -0.34.
+  subroutine test_yielding(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: strain(4) = [0.42_wp, 0.38_wp, -0.42_wp, -0.38_wp]
+    type(scene_type) :: scene
+    type(run_options_type) :: options
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: text
+    integer :: law, i, c
+
+    options%output_directory = here//'/yielding'
+    options%quiet = .true.
+    options%overwrite = .true.
+    do law = 1, 2
+      do i = 1, size(strain)
+        call box_scene(spread(5, 1, 3), spacing, 0.3_wp, scene)
+        scene%materials(1)%model = trim(merge('lps_plastic_large', 'lps_plastic      ', law == 2))
+        scene%materials(1)%influence = 'linear'
+        allocate (scene%materials(1)%parameters(2))
+        scene%materials(1)%parameters%name = ['yield_stress', 'hardening   ']
+        scene%materials(1)%parameters%value = [1.0e7_wp, 0.0_wp]
+        deallocate (scene%initial)
+        allocate (scene%initial(1))
+        do c = 1, 3
+          scene%initial(1)%displacement_gradient(c, c) = exp(merge(1.0_wp, -0.5_wp, c == 1) &
+            & *strain(i)) - 1
+        end do
+        call run_scene(scene, options, fault)
+        if (allocated(fault)) then
+          call test_failed(error, fault%message)
+          return
+        end if
+        text = ''
+        if (file_exists(here//'/yielding/warnings.txt')) &
+          & call read_text_file(here//'/yielding/warnings.txt', text, fault)
+        call expect_true(error, (index(text, 'strained by more than 10 %') > 0) .eqv. law == 1, &
+          & 'small strains, case '//to_text(i)//': '//text)
+        call expect_true(error, (index(text, 'logarithmic strains beyond 0.4,') > 0) .eqv. &
+          & (law == 2 .and. mod(i, 2) == 1), 'large strains, case '//to_text(i)//': '//text)
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_yielding
 
 end module test_warnings

@@ -12,7 +12,7 @@ module pd_force_breaking
   use pd_law_material, only: never
   use pd_force_generic_bonds, only: refresh_slot
   use pd_force_generic_points, only: generic_energy_product, generic_point_damage, &
-    & generic_point_energy
+    & generic_energy_of_work
   use pd_force_model, only: model_type, bond_limit
   use pd_force_reference, only: energies_of_loss, point_damage, stretch_of_bond
   use pd_force_workspace, only: generic_workspace_type
@@ -142,8 +142,8 @@ contains
     slots = pack(slots, number > 0)
   end subroutine break_bonds
 
-  !> Energy density of slot `k` by the generic pass [J/m3]: as it is, and with the products of each
-  !> set of `others`.
+  !> Energy density of slot `k` by the generic pass [J/m3], with what has been dissipated since the
+  !> last commit: as it is, and with the products of each set of `others`.
   pure subroutine energies(family, model, laws, u, k, density, others, expansions)
     class(family_type), intent(in) :: family
     type(model_type), intent(in) :: model
@@ -156,7 +156,7 @@ contains
     integer :: o
 
     if (.not. present(laws)) call internal_fault('bonds of laws break without their history')
-    density(0) = generic_point_energy(family, model, laws, u, k)
+    density(0) = generic_energy_of_work(family, model, laws, u, k)
     do o = 1, ubound(density, 1)
       if (present(expansions)) then
         density(o) = generic_energy_product(family, model, laws, u, others(:, :, o), k, &

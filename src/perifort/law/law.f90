@@ -58,6 +58,8 @@ module pd_law_law
     logical :: corrected = .true.                !! it takes surface factors, if there are any
     logical :: plastic = .false.                 !! what it dissipates is plastic energy
     logical :: large_strains = .false.           !! it holds for bonds strained by any amount
+    real(wp) :: accurate_to = huge(1.0_wp)
+      !! largest logarithmic strain of a bond for which a law for large strains is accurate [-]
     logical :: softens = .false.                 !! `bond_damage` is not 0 for some intact bonds
     integer :: bond_history = 0                  !! reals of history of a bond
     integer :: point_history = 0                 !! reals of history of a point

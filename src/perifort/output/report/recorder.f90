@@ -25,7 +25,7 @@ module pd_output_report_recorder
   use pd_output_report_lines, only: iteration_line, place_of, reason_to_stop, relaxation_note
   use pd_output_report_rigid_surfaces, only: rigid_surfaces_type
   use pd_output_report_run_warnings, only: contact_warning, gradient_warning, &
-    & rotation_warning, strain_warning
+    & large_strain_warning, rotation_warning, strain_warning
   use pd_output_report_schedule, only: due_at, iteration_due, schedule_type
   use pd_output_results_results, only: results_type
   implicit none (type, external)
@@ -142,6 +142,8 @@ contains
         call warn_if_any(observer, 'contact', contact_warning(system, instant%time))
         if (.not. observer%warnings%has('strain')) &
           & call warn_if_any(observer, 'strain', strain_warning(system, instant%time))
+        if (.not. observer%warnings%has('large strain')) &
+          & call warn_if_any(observer, 'large strain', large_strain_warning(system, instant%time))
       end if
       call observer%results%put_warnings(observer%warnings%text())
       call observer%timer%stop('output')

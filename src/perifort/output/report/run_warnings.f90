@@ -7,10 +7,11 @@ module pd_output_report_run_warnings
   use pd_motion_system, only: system_type
   use pd_output_report_contact, only: touching_points
   use pd_output_report_rotation, only: turned_part
-  use pd_output_report_strain, only: find_large_strains, large_strain
+  use pd_output_report_strain, only: find_large_strains, find_strains_beyond, large_strain
   implicit none (type, external)
   private
-  public :: contact_warning, gradient_warning, rotation_warning, strain_warning
+  public :: contact_warning, gradient_warning, large_strain_warning, rotation_warning, &
+    & strain_warning
 
   !> Rotations that cause a warning with the projected dilatation: beyond 10 degrees its error is
   !> 1.5 % and more. So large a share of the points must have turned: a few may turn at the tip of a
@@ -68,6 +69,23 @@ contains
       & ' %, the most by '//to_text(100*stretch, 3)//' % (point '//to_text(point)// &
       & '): the material is linear in the strain and not valid for large strains'
   end function strain_warning
+
+  !> Strains are beyond those for which a law for large strains was found to be accurate.
+  function large_strain_warning(system, time) result(text)
+    type(system_type), intent(in) :: system   !! at the present displacements
+    real(wp), intent(in) :: time              !! [s]
+    character(:), allocatable :: text
+    integer :: number, point
+    real(wp) :: strain, limit
+
+    text = ''
+    call find_strains_beyond(system, number, point, strain, limit)
+    if (number > 0) text = 'at t = '//to_text(time)//' s intact bonds of '// &
+      & counted(number, 'point')//' have logarithmic strains beyond '//to_text(limit, 3)// &
+      & ', the most '//to_text(strain, 3)//' (point '//to_text(point)//'): model = '''// &
+      & trim(system%model%laws(system%body%material(system%body%slot(point)))%law%name)// &
+      & ''' was found to be accurate up to that; beyond, its flow stress and volume are off by more'
+  end function large_strain_warning
 
   !> Points have too few bonds for a gradient of the displacements, which a field of the output
   !> needs.
