@@ -34,12 +34,13 @@ contains
   !> bound do, or none were found.
   subroutine least_change(conditions, low, G, residual, iterations, found)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low                  !! smallest allowed weight, or `unbounded` [-]
+    real(wp), intent(in) :: low
+      !! smallest allowed weight, or `unbounded`; of Gb alone where it is found with Gd [-]
     real(wp), allocatable, intent(out) :: G(:)   !! (unknowns) weights [-]
     real(wp), intent(out) :: residual            !! largest error of a condition [-]
     integer, intent(out) :: iterations           !! of the conjugate gradients
     logical, intent(out) :: found
-    real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :)
+    real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :), lows(:)
     logical, allocatable :: free(:)
     type(level_type), allocatable :: levels(:)
     real(wp) :: value, before, slope, length, history(most_newton), allowed
@@ -49,6 +50,8 @@ contains
       allocate (z(rows, classes), r(rows, classes), step(rows, classes), source=0.0_wp)
       allocate (t(n), change(n), source=0.0_wp)
       allocate (G(n), free(n))
+      allocate (lows(n), source=low)
+      if (conditions%stretches > 0) lows(conditions%stretches + 1:) = unbounded
     end associate
     iterations = 0
     found = .false.
@@ -59,7 +62,7 @@ contains
       allowed = tolerance
       allocate (levels(0))
     end if
-    call weigh(conditions, low, z, t, G, r, before)
+    call weigh(conditions, lows, z, t, G, r, before)
     do newton = 1, most_newton
       residual = maxval(abs(r))
       found = residual <= allowed
@@ -74,13 +77,13 @@ contains
         end if
       end if
       if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) return
-      free = t + 1 > low
+      free = t + 1 > lows
       call solve(conditions, levels, free, r, step, iterations)
       slope = sum(r*step)
       length = 1.0_wp
       do halving = 1, 30
         tried = z + length*step
-        call weigh(conditions, low, tried, t, G, r, value)
+        call weigh(conditions, lows, tried, t, G, r, value)
         if (value <= before - 1.0e-4_wp*length*slope + 1.0e-13_wp*abs(before)) exit
         if (maxval(abs(r)) <= 0.5_wp*residual) exit
         length = length/2
@@ -103,7 +106,7 @@ contains
   !> Weights of multipliers z, what the conditions miss, and the function that is minimised in z.
   subroutine weigh(conditions, low, z, t, G, r, value)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low, z(:, :)
+    real(wp), intent(in) :: low(:), z(:, :)
     real(wp), intent(inout) :: t(:), G(:), r(:, :)
     real(wp), intent(out) :: value
     real(wp), allocatable :: of_one(:, :)
