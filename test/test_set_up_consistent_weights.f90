@@ -677,9 +677,9 @@ contains
       & fault%message)
   end subroutine test_outlines
 
-  !> The centres of tetrahedra four cells across, with their volumes and with volumes that are 0.8 to
-  !> 1.2 times as large: with surface areas that are not changed no weights Gb are positive, and the
-  !> body has negative eigenvalues.
+  !> The centres of tetrahedra four cells across, with their volumes and with volumes that are 0.8
+  !> to 1.2 times as large: with surface areas that are not changed no weights Gb are all positive,
+  !> and the body has negative eigenvalues.
   subroutine test_tetrahedra(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up

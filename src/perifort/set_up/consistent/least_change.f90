@@ -26,6 +26,8 @@ module pd_set_up_consistent_least_change
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
   integer, parameter :: across = 40                 !! points across that these are enough for
   real(wp), parameter :: part_of_step = 1.0e-6_wp   !! of the error that a step with grids leaves
+  !> The most of it while the weights at the bound of a cloud change from step to step.
+  real(wp), parameter :: most_of_step = 1.0e-2_wp
 
 contains
 
@@ -43,7 +45,7 @@ contains
     real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :), lows(:)
     logical, allocatable :: free(:)
     type(level_type), allocatable :: levels(:)
-    real(wp) :: value, before, slope, length, history(most_newton), allowed
+    real(wp) :: value, before, slope, length, history(most_newton), allowed, part
     integer :: newton, halving
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
@@ -78,7 +80,10 @@ contains
       end if
       if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) return
       free = t + 1 > lows
-      call solve(conditions, levels, free, r, step, iterations)
+      part = part_of_step
+      if (conditions%stretches > 0 .and. low > unbounded) part = max(part, min(most_of_step, &
+        & residual))
+      call solve(conditions, levels, free, part, r, step, iterations)
       slope = sum(r*step)
       length = 1.0_wp
       do halving = 1, 30
@@ -123,10 +128,11 @@ contains
 
   !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
   !> and r in its range but for what the bound cuts off.
-  subroutine solve(conditions, levels, free, r, step, iterations)
+  subroutine solve(conditions, levels, free, part, r, step, iterations)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: levels(:)
     logical, intent(in) :: free(:)
+    real(wp), intent(in) :: part  ! of the error that may be left where there are grids
     real(wp), intent(in) :: r(:, :)
     real(wp), intent(inout) :: step(:, :)
     integer, intent(inout) :: iterations
@@ -145,7 +151,7 @@ contains
     ! of a bounded solve the free unknowns change from step to step
     target = 0.02_wp*tolerance
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
-    if (size(levels) > 0) target = max(0.3_wp*tolerance, part_of_step*maxval(abs(r)))
+    if (size(levels) > 0) target = max(0.3_wp*tolerance, part*maxval(abs(r)))
     least = huge(1.0_wp)
     most = merge(most_iterations, nint(most_bounded*wider(conditions)), all(free))
     do i = 1, most
