@@ -1,6 +1,7 @@
 !> The linear conditions on the weights of bonds, and sums of them (doc/theory.md, 4): for each
-!> class of points a few rows, for each group of bonds an unknown. The coefficients of a bond are
-!> powers of its direction, so they are computed where they are needed.
+!> class of points a few rows, for each group of bonds an unknown. Where surface areas are unknowns,
+!> too, Gb, Gd and areas have one set of conditions. The coefficients of a bond are powers of its
+!> direction, so they are computed where they are needed.
 module pd_set_up_consistent_conditions
   use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
@@ -10,28 +11,35 @@ module pd_set_up_consistent_conditions
   use pd_set_up_consistent_groups, only: groups_type
   implicit none (type, external)
   private
-  public :: conditions_type, stretch_conditions, dilatation_conditions, sums_of, spread_over, &
-    & block_of
+  public :: conditions_type, stretch_conditions, dilatation_conditions, join_conditions, sums_of, &
+    & spread_over, block_of
 
-  integer, parameter :: most_rows = 10  !! of a class
+  integer, parameter :: most_rows = 19  !! of a class
 
-  !> sum over bonds of weight x coefficients = `right`.
+  !> sum over bonds of weight x coefficients = `right`. The unknowns are weights Gb, then weights
+  !> Gd, then components of areas. The rows of the stretch, n n n of the bonds, come before those
+  !> of the dilatation, n n, and n over |xi|. What is said of bonds holds for areas, too.
   type :: conditions_type
     integer :: dim = 0
-    logical :: cubic = .false.              !! n n n of the bonds; else n n, and n over |xi|
+    integer :: stretches = 0                !! unknowns that are Gb; there are such rows if any
+    integer :: dilatations = 0              !! unknowns that are Gd; there are such rows if any
+    integer :: before = 0                   !! rows of the stretch
     integer :: rows = 0                     !! of each class
     integer :: classes = 0
     integer :: unknowns = 0
     integer(i8), allocatable :: start(:)    !! (classes + 1) first bond of each class
     integer(i4), allocatable :: unknown(:)  !! of each bond
     real(wp), allocatable :: n(:, :)        !! (dim, bonds) unit vectors
-    real(wp), allocatable :: factor(:, :)   !! (2, bonds) of the powers; the second of n alone
+    real(wp), allocatable :: factor(:, :)
+      !! (2, bonds) of the powers; the second of n alone; of areas: for either kind of rows
     real(wp), allocatable :: right(:, :)    !! (rows, classes)
+    real(wp), allocatable :: of_area(:)
+      !! (classes) what rows of one kind have for a unit of `area`, as it was given
     integer(i8), allocatable :: first(:)    !! (unknowns + 1) first entry of each unknown
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
     ! where each class is a point, each unknown a bond with two ends or a component of an area, and
-    ! n n, and n over |xi|:
+    ! there are rows of the dilatation:
     real(wp), allocatable :: x(:, :)        !! (dim, points) positions [m]
     real(wp), allocatable :: strain(:)      !! (points) what makes a gradient multipliers of n n
     real(wp), allocatable :: shift(:)       !! (points) what makes a vector multipliers of n/|xi|
@@ -77,6 +85,7 @@ contains
         conditions%factor(:, first + 1:first + bonds%n) &
           & = conditions%factor(:, first + 1:first + bonds%n)/total
       end associate
+      conditions%of_area(c) = 1/(body%volume(k)*total)
       row = 0
       do x = 1, body%dim
         do y = x, body%dim
@@ -95,10 +104,8 @@ contains
   !> Conditions on Gd: theta is the strain's trace, and the force of equal p is that of the
   !> classical traction: t sum_j Gd vc V_j n_a n_b = d_ab, and t sum_j (a_k + a_j) Gd vc V_j
   !> n_a/|xi| = -A_a/V_k, with A the sum over regions of a x area. The second rows are multiplied
-  !> with the spacing over the largest a. With `free_area` the areas of some points are unknowns,
-  !> too: an unknown of such a point and axis changes the area by (its value - 1) x `free_area`.
-  subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions, model, &
-    & free_area)
+  !> with the spacing over the largest a.
+  subroutine dilatation_conditions(body, family, materials, a, groups, area, conditions, model)
     type(body_type), intent(in) :: body              !! that the groups were found for
     class(family_type), intent(in) :: family         !! whole
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
@@ -107,13 +114,11 @@ contains
     real(wp), intent(in) :: area(:, :)  !! (n_slots, dim) a x area, summed over regions [m2]
     type(conditions_type), intent(out) :: conditions
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
-    real(wp), intent(in), optional :: free_area(:)
-      !! (n_slots) unit of the unknown areas, 0 where an area is fixed; each point is a class [m2]
     type(bonds_type) :: bonds
     real(wp) :: gb, gd
     integer :: c, k, i, row, x, y
 
-    call begin(body%dim, .false., groups, conditions, free_area)
+    call begin(body%dim, .false., groups, conditions)
     call allocate_bonds(family, bonds)
     do c = 1, conditions%classes
       k = int(groups%first(c))
@@ -135,19 +140,8 @@ contains
           conditions%right(row, c) = merge(1.0_wp, 0.0_wp, x == y)
         end do
       end do
+      conditions%of_area(c) = body%spacing(k)/body%volume(k)
       conditions%right(row + 1:, c) = -area(k, :)*body%spacing(k)/body%volume(k)
-      if (.not. present(free_area)) cycle
-      if (.not. free_area(k) > 0.0_wp) cycle
-      associate (first => conditions%start(c) + bonds%n - 1, &
-        & unit => free_area(k)*body%spacing(k)/body%volume(k))
-        do x = 1, body%dim
-          conditions%n(:, first + x) = 0.0_wp
-          conditions%n(x, first + x) = 1.0_wp
-          conditions%factor(:, first + x) = [0.0_wp, unit]
-        end do
-        ! a value of 1 is no change
-        conditions%right(row + 1:, c) = conditions%right(row + 1:, c) + unit
-      end associate
     end do
     call turn(conditions)
     associate (first => conditions%first, n => groups%n_groups)
@@ -182,44 +176,98 @@ contains
     conditions%shift = conditions%shift/maxval(conditions%shift)
   end subroutine note_points
 
-  !> Room for the conditions of all classes. Unknown areas come after the groups, and after the
-  !> bonds of their class.
-  subroutine begin(dim, cubic, groups, conditions, free_area)
+  !> Conditions on Gb, Gd and surface areas: an unknown of a point with a free area and of an axis
+  !> changes that component by (its value - 1) x `unit`.
+  subroutine join_conditions(stretch, dilatation, mu, a, unit, conditions)
+    type(conditions_type), intent(in) :: stretch      !! for the areas as they are
+    type(conditions_type), intent(in) :: dilatation   !! of the same points; each a class
+    real(wp), intent(in) :: mu       !! what areas had been multiplied with in `stretch` [N/m2]
+    real(wp), intent(in) :: a        !! and in `dilatation` [-]
+    real(wp), intent(in) :: unit(:)  !! (classes) of the unknown areas, 0 where they are fixed [m2]
+    type(conditions_type), intent(out) :: conditions
+    real(wp) :: values(most_rows)
+    integer(i8) :: n, at, e
+    integer :: c, x, low, high
+
+    conditions%dim = stretch%dim
+    conditions%stretches = stretch%stretches
+    conditions%dilatations = dilatation%dilatations
+    conditions%before = stretch%rows
+    conditions%rows = stretch%rows + dilatation%rows
+    conditions%classes = stretch%classes
+    conditions%unknowns = stretch%unknowns + dilatation%unknowns
+    conditions%x = dilatation%x
+    conditions%strain = dilatation%strain
+    conditions%shift = dilatation%shift
+    conditions%spacing = dilatation%spacing
+    n = size(stretch%unknown, kind=i8) + size(dilatation%unknown, kind=i8) &
+      & + conditions%dim*count(unit > 0.0_wp)
+    allocate (conditions%start(conditions%classes + 1), source=1_i8)
+    allocate (conditions%unknown(n), conditions%n(conditions%dim, n), conditions%factor(2, n))
+    allocate (conditions%right(conditions%rows, conditions%classes))
+    conditions%right(:stretch%rows, :) = stretch%right
+    conditions%right(stretch%rows + 1:, :) = dilatation%right
+    at = 0_i8
+    do c = 1, conditions%classes
+      conditions%start(c) = at + 1
+      call append(stretch, 0)
+      call append(dilatation, stretch%unknowns)
+      do x = 1, merge(conditions%dim, 0, unit(c) > 0.0_wp)
+        at = at + 1
+        conditions%unknowns = conditions%unknowns + 1
+        conditions%unknown(at) = int(conditions%unknowns, i4)
+        conditions%n(:, at) = 0.0_wp
+        conditions%n(x, at) = 1.0_wp
+        conditions%factor(:, at) = unit(c)*[mu*stretch%of_area(c), a*dilatation%of_area(c)]
+        ! a value of 1 is no change
+        call coefficients(conditions, at, values, low, high)
+        conditions%right(low:high, c) = conditions%right(low:high, c) + values(low:high)
+      end do
+    end do
+    conditions%start(conditions%classes + 1) = at + 1
+    call turn(conditions)
+
+  contains
+
+    subroutine append(part, unknowns)
+      type(conditions_type), intent(in) :: part
+      integer, intent(in) :: unknowns  ! before those of this part
+
+      do e = part%start(c), part%start(c + 1) - 1
+        at = at + 1
+        conditions%unknown(at) = int(unknowns, i4) + part%unknown(e)
+        conditions%n(:, at) = part%n(:, e)
+        conditions%factor(:, at) = part%factor(:, e)
+      end do
+    end subroutine append
+
+  end subroutine join_conditions
+
+  !> Room for the conditions of all classes on Gb, or on Gd.
+  subroutine begin(dim, of_stretch, groups, conditions)
     integer, intent(in) :: dim
-    logical, intent(in) :: cubic
+    logical, intent(in) :: of_stretch
     type(groups_type), intent(in) :: groups
     type(conditions_type), intent(inout) :: conditions
-    real(wp), intent(in), optional :: free_area(:)
     integer(i8) :: n
-    integer :: c, x
 
     conditions%dim = dim
-    conditions%cubic = cubic
-    conditions%rows = merge(dim*(dim + 1)*(dim + 2)/6, dim*(dim + 1)/2 + dim, cubic)
-    conditions%classes = groups%n_classes
     conditions%unknowns = groups%n_groups
-    conditions%start = groups%start
-    if (present(free_area)) then
-      do c = 1, groups%n_classes
-        conditions%start(c + 1) = conditions%start(c) + groups%start(c + 1) - groups%start(c) &
-          & + merge(dim, 0, free_area(groups%first(c)) > 0.0_wp)
-      end do
-      allocate (conditions%unknown(conditions%start(groups%n_classes + 1) - 1))
-      do c = 1, groups%n_classes
-        n = conditions%start(c) + groups%start(c + 1) - groups%start(c)
-        conditions%unknown(conditions%start(c):n - 1) = &
-          & groups%group(groups%start(c):groups%start(c + 1) - 1)
-        do x = 1, merge(dim, 0, free_area(groups%first(c)) > 0.0_wp)
-          conditions%unknowns = conditions%unknowns + 1
-          conditions%unknown(n + x - 1) = int(conditions%unknowns, i4)
-        end do
-      end do
+    if (of_stretch) then
+      conditions%stretches = groups%n_groups
+      conditions%before = dim*(dim + 1)*(dim + 2)/6
+      conditions%rows = conditions%before
     else
-      conditions%unknown = groups%group
+      conditions%dilatations = groups%n_groups
+      conditions%rows = dim*(dim + 1)/2 + dim
     end if
+    conditions%classes = groups%n_classes
+    conditions%start = groups%start
+    conditions%unknown = groups%group
     n = size(conditions%unknown, kind=i8)
     allocate (conditions%n(dim, n), conditions%factor(2, n))
     allocate (conditions%right(conditions%rows, groups%n_classes))
+    allocate (conditions%of_area(groups%n_classes))
   end subroutine begin
 
   !> Note the bonds of each unknown.
@@ -250,34 +298,71 @@ contains
     end do
   end subroutine turn
 
-  !> The coefficients of bond `e`.
-  pure subroutine coefficients(conditions, e, values)
+  !> The coefficients of bond `e`: those from row `low` to row `high` are set, others are 0.
+  pure subroutine coefficients(conditions, e, values, low, high)
     type(conditions_type), intent(in) :: conditions
     integer(i8), intent(in) :: e
-    real(wp), intent(inout) :: values(:)  ! the first `rows` are set
+    real(wp), intent(inout) :: values(:)
+    integer, intent(out) :: low, high
+    integer :: row, x, y, z, u
+
+    u = int(conditions%unknown(e)) - conditions%stretches
+    associate (n => conditions%n(:, e), f => conditions%factor(:, e), dim => conditions%dim)
+      if (u > conditions%dilatations) then
+        call area_coefficients(conditions, e, values)
+        low = 1
+        high = conditions%rows
+      else if (u > 0) then
+        low = conditions%before + 1
+        high = conditions%rows
+        row = conditions%before
+        do x = 1, dim
+          do y = x, dim
+            row = row + 1
+            values(row) = f(1)*n(x)*n(y)
+          end do
+        end do
+        do x = 1, dim
+          values(row + x) = f(2)*n(x)
+        end do
+      else
+        low = 1
+        high = conditions%before
+        row = 0
+        do x = 1, dim
+          do y = x, dim
+            do z = y, dim
+              row = row + 1
+              values(row) = f(1)*n(x)*n(y)*n(z)
+            end do
+          end do
+        end do
+      end if
+    end associate
+  end subroutine coefficients
+
+  !> The coefficients of a component of an area: for the stretch n_a d_bc + n_b d_ac + n_c d_ab.
+  pure subroutine area_coefficients(conditions, e, values)
+    type(conditions_type), intent(in) :: conditions
+    integer(i8), intent(in) :: e
+    real(wp), intent(inout) :: values(:)
     integer :: row, x, y, z
 
     associate (n => conditions%n(:, e), f => conditions%factor(:, e), dim => conditions%dim)
       row = 0
       do x = 1, dim
         do y = x, dim
-          if (conditions%cubic) then
-            do z = y, dim
-              row = row + 1
-              values(row) = f(1)*n(x)*n(y)*n(z)
-            end do
-          else
+          do z = y, dim
             row = row + 1
-            values(row) = f(1)*n(x)*n(y)
-          end if
+            values(row) = f(1)*(merge(n(x), 0.0_wp, y == z) + merge(n(y), 0.0_wp, x == z) &
+              & + merge(n(z), 0.0_wp, x == y))
+          end do
         end do
       end do
-      if (conditions%cubic) return
-      do x = 1, dim
-        values(row + x) = f(2)*n(x)
-      end do
+      values(row + 1:conditions%rows - dim) = 0.0_wp
+      values(conditions%rows - dim + 1:conditions%rows) = f(2)*n
     end associate
-  end subroutine coefficients
+  end subroutine area_coefficients
 
   !> The sums of the conditions (rows, classes) for values of the unknowns.
   subroutine sums_of(conditions, y, sums)
@@ -286,16 +371,15 @@ contains
     real(wp), intent(inout) :: sums(:, :)  !! (rows, classes) set [-]
     real(wp) :: values(most_rows), sum(most_rows)
     integer(i8) :: e
-    integer :: c
+    integer :: c, low, high
 
     !$omp parallel do schedule(dynamic, 64) default(none) shared(conditions, y, sums) &
-    !$omp private(values, sum, e, c)
+    !$omp private(values, sum, e, c, low, high)
     do c = 1, conditions%classes
       sum = 0.0_wp
-      values = 0.0_wp
       do e = conditions%start(c), conditions%start(c + 1) - 1
-        call coefficients(conditions, e, values)
-        sum = sum + y(conditions%unknown(e))*values
+        call coefficients(conditions, e, values, low, high)
+        sum(low:high) = sum(low:high) + y(conditions%unknown(e))*values(low:high)
       end do
       sums(:, c) = sum(:conditions%rows)
     end do
@@ -308,17 +392,17 @@ contains
     real(wp), intent(inout) :: y(:)            !! (unknowns) set [-]
     real(wp) :: values(most_rows)
     integer(i8) :: i
-    integer :: u
+    integer :: u, low, high
 
     !$omp parallel do schedule(dynamic, 512) default(none) shared(conditions, multipliers, y) &
-    !$omp private(values, i, u)
+    !$omp private(values, i, u, low, high)
     do u = 1, conditions%unknowns
       y(u) = 0.0_wp
       do i = conditions%first(u), conditions%first(u + 1) - 1
         associate (e => conditions%bond(i))
-          call coefficients(conditions, e, values)
-          y(u) = y(u) + dot_product(values(:conditions%rows), &
-            & multipliers(:, conditions%class(e)))
+          call coefficients(conditions, e, values, low, high)
+          y(u) = y(u) + dot_product(values(low:high), &
+            & multipliers(low:high, conditions%class(e)))
         end associate
       end do
     end do
@@ -333,7 +417,7 @@ contains
     real(wp), intent(out) :: block(:, :)  !! (rows, rows) [-]
     real(wp) :: values(most_rows), of_unknown(most_rows)
     integer(i8) :: e, i
-    integer :: row
+    integer :: row, low, high
 
     block = 0.0_wp
     do e = conditions%start(c), conditions%start(c + 1) - 1
@@ -341,17 +425,18 @@ contains
         if (.not. free(u)) cycle
         ! all bonds of the class with this unknown, at the first of them
         of_unknown = 0.0_wp
-        values = 0.0_wp
+        low = 1
+        high = 0
         do i = conditions%first(u), conditions%first(u + 1) - 1
           if (conditions%class(conditions%bond(i)) /= c) cycle
           if (conditions%bond(i) < e) exit
-          call coefficients(conditions, conditions%bond(i), values)
-          of_unknown = of_unknown + values
+          call coefficients(conditions, conditions%bond(i), values, low, high)
+          of_unknown(low:high) = of_unknown(low:high) + values(low:high)
         end do
         if (i < conditions%first(u + 1)) cycle
       end associate
-      do row = 1, conditions%rows
-        block(:, row) = block(:, row) + of_unknown(row)*of_unknown(:conditions%rows)
+      do row = low, high
+        block(low:high, row) = block(low:high, row) + of_unknown(row)*of_unknown(low:high)
       end do
     end do
   end subroutine block_of

@@ -26,6 +26,8 @@ module pd_set_up_consistent_least_change
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
   integer, parameter :: across = 40                 !! points across that these are enough for
   real(wp), parameter :: part_of_step = 1.0e-6_wp   !! of the error that a step with grids leaves
+  !> The most of it while the weights at the bound of a cloud change from step to step.
+  real(wp), parameter :: most_of_step = 1.0e-2_wp
 
 contains
 
@@ -34,21 +36,24 @@ contains
   !> bound do, or none were found.
   subroutine least_change(conditions, low, G, residual, iterations, found)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low                  !! smallest allowed weight, or `unbounded` [-]
+    real(wp), intent(in) :: low
+      !! smallest allowed weight, or `unbounded`; of Gb alone where it is found with Gd [-]
     real(wp), allocatable, intent(out) :: G(:)   !! (unknowns) weights [-]
     real(wp), intent(out) :: residual            !! largest error of a condition [-]
     integer, intent(out) :: iterations           !! of the conjugate gradients
     logical, intent(out) :: found
-    real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :)
+    real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :), lows(:)
     logical, allocatable :: free(:)
     type(level_type), allocatable :: levels(:)
-    real(wp) :: value, before, slope, length, history(most_newton), allowed
+    real(wp) :: value, before, slope, length, history(most_newton), allowed, part
     integer :: newton, halving
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
       allocate (z(rows, classes), r(rows, classes), step(rows, classes), source=0.0_wp)
       allocate (t(n), change(n), source=0.0_wp)
       allocate (G(n), free(n))
+      allocate (lows(n), source=low)
+      if (conditions%stretches > 0) lows(conditions%stretches + 1:) = unbounded
     end associate
     iterations = 0
     found = .false.
@@ -59,7 +64,7 @@ contains
       allowed = tolerance
       allocate (levels(0))
     end if
-    call weigh(conditions, low, z, t, G, r, before)
+    call weigh(conditions, lows, z, t, G, r, before)
     do newton = 1, most_newton
       residual = maxval(abs(r))
       found = residual <= allowed
@@ -74,13 +79,16 @@ contains
         end if
       end if
       if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) return
-      free = t + 1 > low
-      call solve(conditions, levels, free, r, step, iterations)
+      free = t + 1 > lows
+      part = part_of_step
+      if (conditions%stretches > 0 .and. low > unbounded) part = max(part, min(most_of_step, &
+        & residual))
+      call solve(conditions, levels, free, part, r, step, iterations)
       slope = sum(r*step)
       length = 1.0_wp
       do halving = 1, 30
         tried = z + length*step
-        call weigh(conditions, low, tried, t, G, r, value)
+        call weigh(conditions, lows, tried, t, G, r, value)
         if (value <= before - 1.0e-4_wp*length*slope + 1.0e-13_wp*abs(before)) exit
         if (maxval(abs(r)) <= 0.5_wp*residual) exit
         length = length/2
@@ -103,7 +111,7 @@ contains
   !> Weights of multipliers z, what the conditions miss, and the function that is minimised in z.
   subroutine weigh(conditions, low, z, t, G, r, value)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low, z(:, :)
+    real(wp), intent(in) :: low(:), z(:, :)
     real(wp), intent(inout) :: t(:), G(:), r(:, :)
     real(wp), intent(out) :: value
     real(wp), allocatable :: of_one(:, :)
@@ -120,10 +128,11 @@ contains
 
   !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
   !> and r in its range but for what the bound cuts off.
-  subroutine solve(conditions, levels, free, r, step, iterations)
+  subroutine solve(conditions, levels, free, part, r, step, iterations)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: levels(:)
     logical, intent(in) :: free(:)
+    real(wp), intent(in) :: part  ! of the error that may be left where there are grids
     real(wp), intent(in) :: r(:, :)
     real(wp), intent(inout) :: step(:, :)
     integer, intent(inout) :: iterations
@@ -142,7 +151,7 @@ contains
     ! of a bounded solve the free unknowns change from step to step
     target = 0.02_wp*tolerance
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
-    if (size(levels) > 0) target = max(0.3_wp*tolerance, part_of_step*maxval(abs(r)))
+    if (size(levels) > 0) target = max(0.3_wp*tolerance, part*maxval(abs(r)))
     least = huge(1.0_wp)
     most = merge(most_iterations, nint(most_bounded*wider(conditions)), all(free))
     do i = 1, most

@@ -1,4 +1,5 @@
-!> A preconditioner for the conditions on Gd in bodies where each bond has a weight of its own.
+!> A preconditioner for the conditions on Gd in bodies where each bond has a weight of its own,
+!> alone or together with those on Gb.
 !>
 !> Multipliers S (of theta) and w (of the force) give a bond (S_k + S_j):nn/2 - (w_j - w_k).n/|xi|,
 !> which nearly vanishes where S is the symmetric gradient of a smooth w: the product of the
@@ -181,16 +182,18 @@ contains
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
     integer, intent(in) :: node(3)
-    integer, intent(in) :: u             !! unknown, with two ends, or one of an area
+    integer, intent(in) :: u             !! unknown, with two ends, or one of an area; 0 of a Gb
     real(wp) :: value, gradient(3)
     integer(i8) :: e, i
     integer :: k
 
     q = 0.0_wp
+    if (u <= conditions%stretches) return
     do i = conditions%first(u), conditions%first(u + 1) - 1
       e = conditions%bond(i)
       k = int(conditions%class(e))
       call spline_at(level, node, k, value, gradient)
+      if (u > conditions%stretches + conditions%dilatations) gradient = 0.0_wp
       ! seen from the other end the direction is the opposite one
       q = q + conditions%strain(k)*conditions%factor(1, e)*dot_product(gradient(:level%dim), &
         & conditions%n(:, conditions%bond(conditions%first(u)))) &
@@ -218,6 +221,7 @@ contains
         k = int(points(i))
         do e = conditions%start(k), conditions%start(k + 1) - 1
           u = int(conditions%unknown(e))
+          if (u <= conditions%stretches) cycle
           part = of_bond(conditions, level, node, u)**2
           ! a bond with both ends here is met twice
           j = other_end(conditions, u, k)
@@ -266,7 +270,7 @@ contains
     n = dim*nodes
     allocate (level%factor(n, n), source=0.0_wp)
     allocate (of_bonds(n, packet))
-    do first = 1, conditions%unknowns, packet
+    do first = conditions%stretches + 1, conditions%unknowns, packet
       last = min(conditions%unknowns, first + packet - 1)
       !$omp parallel default(none) private(q, u, number, column) &
       !$omp shared(conditions, level, of_bonds, first, last, nodes, dim, n)
@@ -389,9 +393,10 @@ contains
     real(wp), intent(inout) :: c(:, :)  !! (dim, splines) set
     real(wp) :: total(3), value, gradient(3)
     integer(i4), allocatable :: points(:)
-    integer :: rows(3, 3), number, node(3), i, k, x, y, dim
+    integer :: rows(3, 3), number, node(3), i, k, x, y, dim, before
 
     dim = level%dim
+    before = conditions%before
     rows = 0
     do x = 1, dim
       do y = 1, dim
@@ -399,7 +404,7 @@ contains
       end do
     end do
     !$omp parallel do schedule(dynamic, 8) default(none) &
-    !$omp shared(conditions, level, r, c, rows, dim) &
+    !$omp shared(conditions, level, r, c, rows, dim, before) &
     !$omp private(total, value, gradient, points, number, node, i, k, x, y)
     do number = 1, product(level%nodes)
       node = node_at(level, number)
@@ -409,9 +414,9 @@ contains
         k = int(points(i))
         call spline_at(level, node, k, value, gradient)
         do x = 1, dim
-          total(x) = total(x) + conditions%shift(k)*value*r(dim*(dim + 1)/2 + x, k)
+          total(x) = total(x) + conditions%shift(k)*value*r(before + dim*(dim + 1)/2 + x, k)
           do y = 1, dim
-            total(x) = total(x) + conditions%strain(k)*gradient(y)*r(rows(x, y), k)
+            total(x) = total(x) + conditions%strain(k)*gradient(y)*r(before + rows(x, y), k)
           end do
         end do
       end do
@@ -439,11 +444,11 @@ contains
             number = 1 + node(1) + level%nodes(1)*(node(2) + level%nodes(2)*node(3))
             call spline_at(level, node, k, value, gradient)
             do x = 1, dim
-              associate (row => dim*(dim + 1)/2 + x)
+              associate (row => conditions%before + dim*(dim + 1)/2 + x)
                 w(row, k) = w(row, k) + conditions%shift(k)*value*c(x, number)
               end associate
               do y = 1, dim
-                associate (row => row_of(dim, x, y))
+                associate (row => conditions%before + row_of(dim, x, y))
                   w(row, k) = w(row, k) + conditions%strain(k)*gradient(y)*c(x, number)
                 end associate
               end do

@@ -6,14 +6,14 @@ module pd_set_up_consistent_weights
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_meshes, only: surface_areas
-  use pd_body_side_areas, only: balance_sides, total_areas
+  use pd_body_side_areas, only: total_areas
   use pd_family_areas, only: area_vectors
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
   use pd_force_model, only: model_type
   use pd_law_material, only: material_type
   use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
-    & stretch_conditions
+    & join_conditions, stretch_conditions
   use pd_set_up_consistent_groups, only: find_groups, groups_type, spread_weights
   use pd_set_up_consistent_least_change, only: least_change, unbounded
   implicit none (type, external)
@@ -41,8 +41,8 @@ module pd_set_up_consistent_weights
 contains
 
   !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced where grids
-  !> touch or facets share it. The surface areas of a cloud change, except in space. An error is set
-  !> if a point of a lattice has no second one behind it, or if no weights fulfil the conditions.
+  !> touch or facets share it. The surface areas of a cloud change. An error is set if a point of a
+  !> lattice has no second one behind it, or if no weights fulfil the conditions.
   subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error, &
     & model)
     type(body_type), intent(inout) :: body
@@ -58,8 +58,7 @@ contains
     integer :: alone
 
     if (allocated(body%sides)) then
-      ! in space areas and Gb would have to be found together
-      if (all(body%sides%axis == 0) .and. body%dim < 3) then
+      if (all(body%sides%axis == 0)) then
         call weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
         return
       end if
@@ -96,9 +95,9 @@ contains
       & [.true., .true.], weights, stretch, dilatation, error)
   end subroutine consistent_weights
 
-  !> Weights of a cloud in the plane or on a line, and what its surface areas must be for them: an
-  !> outline knows them roughly only. The conditions on Gd depend on them most, and have them as
-  !> unknowns.
+  !> Weights of a cloud, and what its surface areas must be for them: an outline knows them roughly
+  !> only, and with its areas there may be no Gb above 0, and Gd that grow with the body. So Gb, Gd
+  !> and areas are unknowns of one set of conditions.
   subroutine weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
     type(body_type), intent(inout) :: body
     class(family_type), intent(in) :: family
@@ -108,45 +107,41 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(model_type), intent(in), optional :: model
     type(groups_type) :: groups
-    type(conditions_type) :: conditions
-    real(wp), allocatable :: Gb(:), Gd(:), unit(:)
+    type(conditions_type) :: of_stretch, of_dilatation, conditions
+    real(wp), allocatable :: G(:), unit(:), area(:, :)
     real(wp) :: a(size(materials)), mu(size(materials))
-    integer :: e, c, x, u
-    logical :: found  ! as before the change
+    integer :: e, c, u
 
     a = a_of(materials)
     mu = mu_of(materials, body%dim)
-    associate (sides => body%sides)
+    associate (sides => body%sides, n => groups%n_groups)
+      area = total_areas(sides, body%n_slots, body%dim)
+      call find_groups(body, family, area, 0, groups, error)
+      if (allocated(error)) return
+      call stretch_conditions(body, family, materials, groups, mu(1)*area, of_stretch, model)
+      call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, &
+        & model)
       allocate (unit(body%n_slots), source=0.0_wp)
       unit(sides%slot) = part_of_face*sides%face
-      associate (area => total_areas(sides, body%n_slots, body%dim))
-        call find_groups(body, family, area, 0, groups, error)
-        if (allocated(error)) return
-        call dilatation_conditions(body, family, materials, a, groups, a(1)*area, conditions, &
-          & model, unit)
-      end associate
-      call solve(conditions, [unbounded], .false., 'dilatation', Gd, dilatation, error)
+      call join_conditions(of_stretch, of_dilatation, mu(1), a(1), unit(groups%first), conditions)
+      call solve(conditions, bounds_of_stretch, .true., 'stretch and the dilatation', G, stretch, &
+        & error)
       if (allocated(error)) return
       do e = 1, size(sides%slot)
         c = int(groups%class(sides%slot(e)))
         if (c == 0) cycle
-        do x = 1, body%dim
-          u = int(conditions%unknown(conditions%start(c + 1) - 1 - body%dim + x))
-          sides%area(x, e) = sides%area(x, e) + (Gd(u) - 1)*unit(sides%slot(e))/a(1)
-        end do
+        u = int(conditions%unknown(conditions%start(c + 1) - body%dim))
+        sides%area(:, e) = sides%area(:, e) + (G(u:u + body%dim - 1) - 1)*unit(sides%slot(e))
       end do
-      ! what the tolerance leaves of the sums would stay in the conditions on Gb
-      call balance_sides(body%x, body%volume, sides, found)
-      call stretch_conditions(body, family, materials, groups, &
-        & mu(1)*total_areas(sides, body%n_slots, body%dim), conditions, model)
+      dilatation%residual = stretch%residual
+      stretch%unknowns = n
+      dilatation%unknowns = n
+      stretch%least = minval(G(:n))
+      stretch%greatest = maxval(G(:n))
+      dilatation%least = minval(G(n + 1:2*n))
+      dilatation%greatest = maxval(G(n + 1:2*n))
+      call spread_weights(body, family, groups, G(:n), G(n + 1:2*n), weights)
     end associate
-    Gd = Gd(:groups%n_groups)
-    dilatation%unknowns = groups%n_groups
-    dilatation%least = minval(Gd)
-    dilatation%greatest = maxval(Gd)
-    call solve(conditions, bounds_of_stretch, .true., 'stretch', Gb, stretch, error)
-    if (allocated(error)) return
-    call spread_weights(body, family, groups, Gb, Gd, weights)
   end subroutine weights_of_cloud
 
   !> Why a point without a second one behind its face is refused.
