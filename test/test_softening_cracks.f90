@@ -153,14 +153,14 @@ contains
     end do
   end subroutine observe_stretches
 
-  !> Load curves and dissipated energies with spacings and horizons from 1 to 1/2, within 5 % of
+  !> Load curves and dissipated energies with spacings and horizons from 1 to 5/8, within 5 % of
   !> each other. At this ratio a sum over the lattice counts 5.4 % less for a straight crack than
   !> the integral of Gc (doc/theory.md, 8): 0.946 Gc A is the least that a crack costs. Bonds beside
-  !> it that soften and unload again come on top; they are some 2 to 5 % here, so that 0.976 is
+  !> it that soften and unload again come on top: up to 6 % are accepted, so that 0.976 is
   !> asked for, to 3 %.
   subroutine test_spacings(error)
     type(error_type), allocatable, intent(out) :: error
-    integer, parameter :: points(*) = [48, 64, 96]
+    integer, parameter :: points(*) = [40, 48, 64]
     type(scene_type) :: scene
     type(set_up_type) :: set_up
     type(curve_type) :: curve(size(points))
