@@ -19,7 +19,7 @@ module pd_family_list
     & volume_none, horizon_of_bond, rule_of_bond
   implicit none (type, external)
   private
-  public :: list_family_type, new_list_family
+  public :: list_family_type, new_list_family, find_turns
 
   type, extends(family_type) :: list_family_type
     integer(i8), allocatable :: start(:)       !! first pack of each cluster (clusters + 1)
@@ -111,10 +111,8 @@ contains
     end if
     allocate (family%intact, source=family%bits)
     call count_bonds(family)
-    if (body%order%n_owned > 0 .and. n > body%order%n_owned) then
-      family%copies = body%slot(body%order%n_owned + 1:n)
-      call find_turns(family)
-    end if
+    if (body%order%n_owned > 0 .and. n > body%order%n_owned) &
+      & call find_turns(family, body%slot(body%order%n_owned + 1:n))
     family%spacing = body%spacing
     family%one_spacing = maxval(body%spacing(:n)) <= minval(body%spacing(:n))
     allocate (family%x(family%dim, family%n_slots), family%volume(family%n_slots), source=0.0_wp)
@@ -129,17 +127,19 @@ contains
     end if
   end subroutine new_list_family
 
-  !> Sort the clusters by whether they need something of copies: one of their own points is a copy,
-  !> or a member is.
-  subroutine find_turns(family)
-    type(list_family_type), intent(inout) :: family  !! with its copies and packs
+  !> Note which points are copies of other ranks' points, and sort the clusters by whether they need
+  !> something of these: one of their own points is a copy, or a member is.
+  subroutine find_turns(family, copies)
+    type(list_family_type), intent(inout) :: family  !! with its packs; knows its turns on return
+    integer(i4), intent(in) :: copies(:)             !! slots of the copies, any number
     integer(i1), allocatable :: copy(:)
     logical, allocatable :: late(:)
     integer(i8) :: e
     integer :: c
 
+    family%copies = copies
     allocate (copy(family%n_slots), source=0_i1)
-    copy(family%copies) = 1_i1
+    copy(copies) = 1_i1
     allocate (late(size(family%start) - 1))
     !$omp parallel do schedule(static) default(none) shared(family, copy, late) private(c, e)
     do c = 1, size(late)

@@ -14,8 +14,8 @@ module pd_force_workspace
   public :: at_volume, at_moved, at_p
   public :: all_blocks, early_blocks, late_blocks
 
-  !> Which blocks of a lattice or clusters of a list a pass takes: all, or those that need nothing of
-  !> copies of other ranks' points and then, in a call of its own, the others.
+  !> Which blocks of a lattice or clusters of a list a pass takes: all, or those that need nothing
+  !> of copies of other ranks' points and then, in a call of its own, the others.
   integer, parameter :: all_blocks = 0, early_blocks = 1, late_blocks = 2
 
   !> Where things stand in `at`: behind the position come volume, displacement and p.
