@@ -3,7 +3,7 @@ program main
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use pd_base_error, only: error_type
   use pd_base_text, only: printable
-  use pd_comm_world, only: abort_world, begin_world, end_world, wait_for_turn, world_type
+  use pd_comm_world, only: abort_world, begin_world, end_world, reports_error, world_type
   use pd_command_line, only: command_line_type, read_command_line
   use pd_commands, only: execute
   implicit none (type, external)
@@ -12,6 +12,7 @@ program main
   type(command_line_type) :: line
   type(error_type), allocatable :: error
   integer :: status
+  logical :: reports
 
   call begin_world(world)
   call read_command_line(line, error)
@@ -21,14 +22,14 @@ program main
   if (allocated(error)) then
     status = error%status
     flush (output_unit)
-    ! what all ranks have found together one reports; else the first to speak ends the others
+    ! what all have found together one is known to report; else the one that does ends the others
     if (error%everywhere) then
       call world%wait_for_all()
+      reports = .not. error%elsewhere
     else
-      call wait_for_turn(world)
+      reports = reports_error(world)
     end if
-    if (.not. (error%everywhere .and. error%elsewhere)) &
-      & write (error_unit, '(2a)') 'error: ', printable(error%message)
+    if (reports) write (error_unit, '(2a)') 'error: ', printable(error%message)
     flush (error_unit)
     if (.not. error%everywhere) call abort_world(status)
   end if

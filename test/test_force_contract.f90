@@ -2,18 +2,23 @@
 !> point by point, keep momentum, ignore rigid motions, be the gradient of the energy, and give the
 !> same bits on any number of threads.
 module test_force_contract
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: real128
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_base_kinds, only: wp, sp, i1, i4, i8
+  use pd_base_lanes, only: lanes
   use pd_base_numbers, only: pi
+  use pd_family_family, only: allocate_bonds, bonds_type
   use pd_family_lattice, only: lattice_family_type
-  use pd_family_list, only: list_family_type
+  use pd_family_list, only: find_turns, list_family_type
   use pd_family_volume, only: volume_none
   use pd_force_breaking, only: break_bonds, damage_of, strained_slots
   use pd_force_forces, only: energy_pass, internal_force, up_to_marks
+  use pd_force_list, only: list_dilatation, list_force
   use pd_force_model, only: force_options_type, model_type, options_of, p_of
   use pd_force_polynomial, only: fast_limit, fast_ranges, narrow, wide, single
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
+  use pd_force_workspace, only: all_blocks, early_blocks, late_blocks
   use comparisons, only: expect_close, max_abs
   use testdrive, only: error_type, new_unittest, unittest_type
   use bodies, only: expect, expect_true, rotation_matrix, shake, text_of
@@ -42,6 +47,7 @@ contains
       & new_unittest('the same bits on 1, 2 and 4 threads', test_threads), &
       & new_unittest('keys that collide change nothing', test_collisions), &
       & new_unittest('clusters of lists share tables', test_shared), &
+      & new_unittest('lists need nothing of copies early', test_early), &
       & new_unittest('the fast formulas keep their range for any critical stretch', test_critical)]
   end subroutine collect_force_contract
 
@@ -590,6 +596,103 @@ contains
       end do
     end do
   end function broken_by_definition
+
+  !> Passes over lists in two calls, of which the first has no values of copies, give the bits of
+  !> one call.
+  subroutine test_early(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: points(3, 3) = reshape([400, 1, 1, 50, 30, 1, 24, 13, 10], [3, 3])
+    type(subject_type) :: subject
+    real(wp), allocatable :: u(:, :)
+    logical :: breaking
+    integer :: dim, kind
+
+    do dim = 1, 3
+      do kind = 1, 3
+        breaking = kind == 2
+        subject = subject_type(kind='list', dim=dim, cloud=kind < 3, breaking=breaking, &
+          & two_materials=.true., points=points(:, dim))
+        call build(subject)
+        if (allocated(u)) deallocate (u)
+        allocate (u(subject%body%n_slots, dim), source=0.0_wp)
+        call shake(subject%body, some_gradient(0.0_wp), 0.012_wp*spacing, 43, u)
+        call compare_early(error, subject, u)
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_early
+
+  !> The same for one list, in which a part of the points are copies.
+  subroutine compare_early(error, subject, u)
+    type(error_type), allocatable, intent(inout) :: error
+    type(subject_type), intent(inout) :: subject
+    real(wp), intent(in), contiguous :: u(:, :)
+    real(wp), allocatable :: p(:), force(:, :), p_whole(:), force_whole(:, :), known(:, :)
+    integer(i1), allocatable :: strained(:), whole(:)
+    logical, allocatable :: copy(:)
+    logical :: needs
+    type(bonds_type) :: bonds
+    integer(i4), allocatable :: copies(:)
+    type(force_options_type) :: options
+    real(wp) :: border, nan
+    integer :: n, i, k
+
+    n = subject%body%n_slots
+    border = 0.7_wp*maxval(subject%body%x(:, 1))
+    allocate (copy(n))
+    do k = 1, n
+      copy(k) = subject%body%point(k) > 0 .and. subject%body%x(k, 1) > border
+    end do
+    copies = pack([(int(k, i4), k=1, n)], copy)
+    allocate (p_whole(n), source=0.0_wp)
+    allocate (force_whole(n, subject%dim), source=0.0_wp)
+    allocate (whole(merge(n, 0, subject%breaking)), source=0_i1)
+    p = p_whole
+    force = force_whole
+    strained = whole
+    options = options_of(subject%model)
+    nan = ieee_value(1.0_wp, ieee_quiet_nan)
+    select type (family => subject%family)
+    type is (list_family_type)
+      call list_dilatation(family, subject%model, options, &
+        & subject%workspace%list, u, p_whole, whole, all_blocks)
+      call list_force(family, subject%model, options, &
+        & subject%workspace%list, u, p_whole, force_whole, whole)
+
+      call find_turns(family, copies)
+      call expect_true(error, family%n_early > 0 .and. family%n_early < size(family%turn), &
+        & 'some clusters are early, some late')
+      call allocate_bonds(family, bonds)
+      do i = 1, size(family%turn)
+        needs = .false.
+        do k = lanes*(family%turn(i) - 1) + 1, lanes*family%turn(i)
+          call family%bonds_of(k, bonds)
+          needs = needs .or. copy(k) .or. any(copy(bonds%j(:bonds%n)))
+        end do
+        call expect_true(error, needs .eqv. i > family%n_early, 'late are those that need copies')
+      end do
+
+      known = u
+      known(copies, :) = nan
+      call list_dilatation(family, subject%model, options, &
+        & subject%workspace%list, known, p, strained, early_blocks)
+      known = u
+      call list_dilatation(family, subject%model, options, &
+        & subject%workspace%list, known, p, strained, late_blocks)
+      call expect_close(error, p, p_whole, 0.0_wp, 'dilatation in two calls')
+      p(copies) = nan
+      call list_force(family, subject%model, options, &
+        & subject%workspace%list, known, p, force, strained, early_blocks)
+      p(copies) = p_whole(copies)
+      call list_force(family, subject%model, options, &
+        & subject%workspace%list, known, p, force, strained, late_blocks)
+      call expect_close(error, force, force_whole, 0.0_wp, 'forces in two calls')
+      call expect_true(error, all(strained == whole), 'marks in two calls')
+      call expect_true(error, max_abs(force_whole) > 0.0_wp, 'there are forces')
+    class default
+      call expect_true(error, .false., 'a list')
+    end select
+  end subroutine compare_early
 
   !> Every term on, bits compared.
   subroutine test_threads(error)

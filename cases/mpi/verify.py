@@ -106,6 +106,21 @@ OVERLAP = """&scene dimension = 2 /
 &body lower = 0.97, 0.2 upper = 1.57, 0.8 points = 21, 21 /
 &time steps = 2 /
 """
+# Errors that all ranks find at once, several of them, and one alone: the initial velocity, and the
+# first point without one.
+NO_NUMBER = """&scene dimension = 2 /
+&material youngs_modulus = 2e11 density = 8e3 poissons_ratio = 0.3333 model = 'bond_based' /
+&body lower = 0, 0 upper = 1, 1 points = 40, 40 /
+&initial velocity_x = '{}' /
+&time steps = 2 /
+"""
+FINDERS = [
+    ("all ranks", "sqrt(x - 2)", 1),
+    ("the ranks with x > 0.6", "sqrt(0.6 - x)", 25),
+    ("the ranks at y > 0.5", "sqrt(0.5 - y)", 801),
+    ("the first rank", "sqrt(x + y - 0.03)", 1),
+    ("the last rank", "sqrt(1.97 - x - y)", 1600),
+]
 MOST_PIECES = 5
 PIECE = 0.12  # of the time that the run in one piece takes
 
@@ -325,6 +340,22 @@ def change_of_momentum(folder):
     found = [v.astype(float) for k, v in sorted(arrays(folder).items()) if k.startswith("outputs/velocity/")]
     change = max(np.abs((v - found[0]).sum(axis=0)).max() for v in found)
     return change / np.abs(found[0]).sum() if len(found) > 2 and np.isfinite(change) else np.inf
+
+
+def check_finders(case):
+    """The lowest of the ranks that find an error reports it, be they all or one."""
+    number = case.out / "no_number.nml"
+    number.parent.mkdir(parents=True, exist_ok=True)
+    for name, velocity, point in FINDERS:
+        number.write_text(NO_NUMBER.format(velocity), encoding="utf-8")
+        for n in (2, 4):
+            _, process = case.start(number, n)
+            begin = time.time()
+            errors = process.communicate()[1]
+            case.equal(f"error of {name}, {n} ranks: status", process.returncode, 1)
+            case.equal(f"error of {name}, {n} ranks: messages",
+                       re.findall(r"^error: .* at point (\d+) ", errors, re.M), [str(point)])
+            case.below(f"error of {name}, {n} ranks: ends within [s]", time.time() - begin, 10)
 
 
 def check_ends(case):
@@ -588,6 +619,7 @@ def main():
     check_memory(case)
     check_regrouped(case)
     check_sets(case)
+    check_finders(case)
     check_ends(case)
     case.finish()
 

@@ -19,6 +19,11 @@ contains
     end associate
   end procedure abort_world
 
+  module procedure reports_error
+    reports = .true.
+    if (world%ranks > 1) call internal_fault('there is no other rank')
+  end procedure reports_error
+
   module procedure add_all
     if (self%ranks > 1 .and. size(values) > 0) call internal_fault('there is no other rank')
   end procedure add_all

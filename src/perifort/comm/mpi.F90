@@ -2,18 +2,32 @@
 #ifdef PERIFORT_MPI
 submodule(pd_comm_world) messages
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Alltoall, MPI_Alltoallv, MPI_Barrier, &
-    & MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, MPI_Exscan, &
-    & MPI_Finalize, &
-    & MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, MPI_INFO_NULL, MPI_Init_thread, &
-    & MPI_Initialized, &
-    & MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, MPI_Isend, MPI_MAX, MPI_Request, MPI_STATUSES_IGNORE, &
-    & MPI_SUM, MPI_THREAD_FUNNELED, MPI_Waitall
+  use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
+  use mpi_f08, only: MPI_Abort, MPI_ADDRESS_KIND, MPI_Allreduce, MPI_Alltoall, MPI_Alltoallv, &
+    & MPI_Barrier, MPI_COMM_WORLD, MPI_Comm_rank, MPI_Comm_size, MPI_DOUBLE_PRECISION, &
+    & MPI_Exscan, MPI_Finalize, MPI_Finalized, MPI_Gather, MPI_Gatherv, MPI_IN_PLACE, &
+    & MPI_INFO_NULL, MPI_Init_thread, MPI_Initialized, MPI_INTEGER, MPI_INTEGER8, MPI_Irecv, &
+    & MPI_Isend, MPI_LOCK_EXCLUSIVE, MPI_MAX, MPI_MIN, MPI_Op, MPI_Request, &
+    & MPI_Rget_accumulate, MPI_STATUS_IGNORE, MPI_STATUSES_IGNORE, MPI_SUM, MPI_Test, &
+    & MPI_THREAD_FUNNELED, MPI_Waitall, MPI_Win, MPI_Win_allocate, MPI_Win_free, MPI_Win_lock, &
+    & MPI_Win_lock_all, MPI_Win_unlock, MPI_Win_unlock_all
   use pd_base_error, only: internal_fault
   use pd_base_order, only: place_in
   implicit none (type, external)
 
   integer, parameter :: tag = 7
+
+  ! Numbers in the memory of the first rank, which any rank changes without the first one's help, so
+  ! that ranks with an error need no other to agree on who reports it.
+  integer, parameter :: have_come = 0  ! ranks that have an error
+  integer, parameter :: lowest = 1     ! of them
+  integer, parameter :: claims = 2     ! of those that want to report, the first of which does
+  type(MPI_Win) :: board
+  logical :: has_board = .false.
+  integer, asynchronous :: put(1), got_back(1)  ! what is sent to the board, and comes back
+  real(wp), parameter :: turn = 1.0_wp              ! [s] how long a rank lets lower ones come
+  real(wp), parameter :: between_looks = 1.0e-3_wp  ! [s]
+  real(wp), parameter :: patience = 10.0_wp         ! [s] for what takes microseconds
 
 contains
 
@@ -25,6 +39,8 @@ contains
     if (.not. begun) call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_rank(MPI_COMM_WORLD, world%rank)
     call MPI_Comm_size(MPI_COMM_WORLD, world%ranks)
+    ! where another program has begun MPI, it reports errors
+    if (.not. begun .and. world%ranks > 1) call make_board(world)
   end procedure begin_world
 
   module procedure end_world
@@ -32,8 +48,95 @@ contains
 
     call MPI_Initialized(begun)
     call MPI_Finalized(ended)
-    if (begun .and. .not. ended) call MPI_Finalize()
+    if (.not. begun .or. ended) return
+    if (has_board) then
+      call MPI_Win_unlock_all(board)
+      call MPI_Win_free(board)
+      has_board = .false.
+    end if
+    call MPI_Finalize()
   end procedure end_world
+
+  !> Make the board, on which every rank may write from now on.
+  subroutine make_board(world)
+    type(world_type), intent(in) :: world
+    integer(MPI_ADDRESS_KIND) :: bytes
+    integer, pointer :: numbers(:)
+    integer :: of_number
+    type(c_ptr) :: memory
+
+    of_number = storage_size(of_number)/8
+    bytes = 0
+    if (world%rank == 0) bytes = 3*of_number
+    call MPI_Win_allocate(bytes, of_number, MPI_INFO_NULL, MPI_COMM_WORLD, memory, board)
+    if (world%rank == 0) then
+      call c_f_pointer(memory, numbers, [3])
+      call MPI_Win_lock(MPI_LOCK_EXCLUSIVE, 0, 0, board)
+      numbers(have_come + 1) = 0
+      numbers(lowest + 1) = world%ranks
+      numbers(claims + 1) = 0
+      call MPI_Win_unlock(0, board)
+    end if
+    call MPI_Barrier(MPI_COMM_WORLD)
+    call MPI_Win_lock_all(0, board)
+    has_board = .true.
+  end subroutine make_board
+
+  !> Change a number of the board by an operation with `value`, and get what it was before.
+  subroutine change_board(which, operation, value, before, done)
+    integer, intent(in) :: which            !! `have_come`, `lowest` or `claims`
+    type(MPI_Op), intent(in) :: operation
+    integer, intent(in) :: value
+    integer, intent(out) :: before
+    logical, intent(out) :: done            !! false: the first rank cannot be reached
+    type(MPI_Request) :: request
+    real(wp) :: begin
+
+    before = 0
+    put = value
+    begin = wall_time()
+    call MPI_Rget_accumulate(put, 1, MPI_INTEGER, got_back, 1, MPI_INTEGER, 0, &
+      & int(which, MPI_ADDRESS_KIND), 1, MPI_INTEGER, operation, board, request)
+    do
+      call MPI_Test(request, done, MPI_STATUS_IGNORE)
+      if (done .or. wall_time() - begin > patience) exit
+    end do
+    if (done) before = got_back(1)
+  end subroutine change_board
+
+  module procedure reports_error
+    real(wp) :: begin, waited
+    integer :: before, first, come
+    logical :: done
+
+    reports = .true.
+    if (.not. has_board) return
+    begin = wall_time()
+    call change_board(lowest, MPI_MIN, world%rank, first, done)
+    if (done) call change_board(have_come, MPI_SUM, 1, before, done)
+    if (.not. done) return  ! two messages are better than none
+    do
+      call change_board(have_come, MPI_SUM, 0, come, done)
+      if (done) call change_board(lowest, MPI_MIN, world%rank, first, done)
+      if (.not. done) return
+      waited = wall_time() - begin
+      if (first == world%rank .and. (come == world%ranks .or. waited > turn)) exit
+      if (waited > patience) exit
+      call pause_until(begin + waited + between_looks)
+    end do
+    call change_board(claims, MPI_SUM, 1, before, done)
+    reports = before == 0  ! so it is, too, where the first rank cannot be reached
+    ! who has claimed before writes, and then ends this rank
+    if (.not. reports) call pause_until(wall_time() + patience)
+  end procedure reports_error
+
+  !> Let time pass until a reading of the clock [s].
+  subroutine pause_until(time)
+    real(wp), intent(in) :: time
+
+    do while (wall_time() < time)
+    end do
+  end subroutine pause_until
 
   module procedure abort_world
     integer :: ranks

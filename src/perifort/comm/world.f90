@@ -7,7 +7,7 @@ module pd_comm_world
   use pd_base_order, only: ranks_type
   implicit none (type, external)
   private
-  public :: world_type, begin_world, end_world, abort_world, wait_for_turn, find_handles
+  public :: world_type, begin_world, end_world, abort_world, reports_error, find_handles
 
   !> Values on their way.
   type :: exchange_type
@@ -59,6 +59,15 @@ module pd_comm_world
       implicit none (type, external)
       integer, intent(in) :: status  !! exit status of all
     end subroutine abort_world
+
+    !> Before the message of an error that other ranks may have, too, or not: whether this rank
+    !> reports it. Of those that ask within a second it is the lowest one, and no other of the run
+    !> does. A rank that does not report returns only if it has not been ended for long.
+    module function reports_error(world) result(reports)
+      implicit none (type, external)
+      type(world_type), intent(in) :: world  !! the ranks of the program
+      logical :: reports
+    end function reports_error
 
     !> What a library that uses MPI itself must be given, as integers of MPI's older interface;
     !> -1 without MPI.
@@ -156,18 +165,5 @@ contains
     self%sharing = 0.0_wp
     self%summing = 0.0_wp
   end subroutine count_anew
-
-  !> Before an error message: let the first rank speak, which then ends the others. Most errors are
-  !> the same on all ranks.
-  subroutine wait_for_turn(world)
-    type(world_type), intent(in) :: world  !! the ranks of the program
-    real(wp), parameter :: turn = 0.5_wp   ! [s]
-    real(wp) :: start
-
-    if (world%rank == 0) return
-    start = wall_time()
-    do while (wall_time() - start < turn)
-    end do
-  end subroutine wait_for_turn
 
 end module pd_comm_world

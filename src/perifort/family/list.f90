@@ -19,7 +19,7 @@ module pd_family_list
     & volume_none, horizon_of_bond, rule_of_bond
   implicit none (type, external)
   private
-  public :: list_family_type, new_list_family
+  public :: list_family_type, new_list_family, find_turns
 
   type, extends(family_type) :: list_family_type
     integer(i8), allocatable :: start(:)       !! first pack of each cluster (clusters + 1)
@@ -36,6 +36,11 @@ module pd_family_list
                                                !! points, and no pack has two members
     real(wp), allocatable :: fraction(:, :)    !! v_c of every lane (lanes, packs), only where it is
                                                !! no simple formula, else of size 0
+    integer(i4), allocatable :: turn(:)        !! clusters, those that need nothing of copies of
+                                               !! other ranks' points first; not allocated where
+                                               !! there are no copies
+    integer :: n_early = 0                     !! how many come first
+    integer(i4), allocatable :: copies(:)      !! slots of copies, where there are some
     character(:), allocatable :: reason        !! why this family and no lattice
   contains
     procedure :: bonds_of
@@ -106,6 +111,8 @@ contains
     end if
     allocate (family%intact, source=family%bits)
     call count_bonds(family)
+    if (body%order%n_owned > 0 .and. n > body%order%n_owned) &
+      & call find_turns(family, body%slot(body%order%n_owned + 1:n))
     family%spacing = body%spacing
     family%one_spacing = maxval(body%spacing(:n)) <= minval(body%spacing(:n))
     allocate (family%x(family%dim, family%n_slots), family%volume(family%n_slots), source=0.0_wp)
@@ -119,6 +126,33 @@ contains
       allocate (family%fraction(lanes, 0))
     end if
   end subroutine new_list_family
+
+  !> Note which points are copies of other ranks' points, and sort the clusters by whether they need
+  !> something of these: one of their own points is a copy, or a member is.
+  subroutine find_turns(family, copies)
+    type(list_family_type), intent(inout) :: family  !! with its packs; knows its turns on return
+    integer(i4), intent(in) :: copies(:)             !! slots of the copies, any number
+    integer(i1), allocatable :: copy(:)
+    logical, allocatable :: late(:)
+    integer(i8) :: e
+    integer :: c
+
+    family%copies = copies
+    allocate (copy(family%n_slots), source=0_i1)
+    copy(copies) = 1_i1
+    allocate (late(size(family%start) - 1))
+    !$omp parallel do schedule(static) default(none) shared(family, copy, late) private(c, e)
+    do c = 1, size(late)
+      late(c) = any(copy(lanes*(c - 1) + 1:lanes*c) == 1_i1)
+      do e = family%start(c), family%start(c + 1) - 1
+        if (late(c)) exit
+        late(c) = any(copy(family%member(:, e)) == 1_i1)
+      end do
+    end do
+    family%n_early = count(.not. late)
+    family%turn = [pack([(int(c, i4), c=1, size(late))], .not. late), &
+      & pack([(int(c, i4), c=1, size(late))], late)]
+  end subroutine find_turns
 
   !> The number of bonds, and the most that one point and the most packs that one cluster has.
   subroutine count_bonds(family)
@@ -290,6 +324,7 @@ contains
     bytes = 11_i8*size(family%bits, kind=i8) + int(family%n_slots, i8)*8*(family%dim + 2) &
       & + 8_i8*size(family%start)
     if (allocated(family%fraction)) bytes = bytes + 8*size(family%fraction, kind=i8)
+    if (allocated(family%turn)) bytes = bytes + 4_i8*(size(family%turn) + size(family%copies))
   end function bytes
 
   !> How many bonds a pack has on average and why it is no lattice, in a line.

@@ -10,11 +10,10 @@ module pd_force_forces
   use pd_family_lattice, only: lattice_family_type
   use pd_force_composite, only: composite_dilatation, composite_energy, composite_force
   use pd_force_generic_pass, only: generic_energy, generic_force, generic_pulls
-  use pd_force_lattice, only: all_blocks, early_blocks, late_blocks, lattice_dilatation, &
-    & lattice_force, lattice_energy
+  use pd_force_lattice, only: lattice_dilatation, lattice_force, lattice_energy
   use pd_force_list, only: list_dilatation, list_force, list_energy
   use pd_force_model, only: force_options_type, model_type
-  use pd_force_workspace, only: workspace_type
+  use pd_force_workspace, only: all_blocks, early_blocks, late_blocks, workspace_type
   implicit none (type, external)
   private
   public :: internal_force, arriving_force, energy_pass
@@ -118,7 +117,9 @@ contains
       associate (colour => family%slabs%colour)
         has = colour(1) < colour(3) .and. colour(3) < colour(5)
       end associate
-    class default  ! the loops over lists take all clusters at once
+    type is (list_family_type)
+      if (allocated(family%turn)) has = family%n_early > 0
+    class default  ! a composite family has no copies
       continue
     end select
   end function has_early_blocks
@@ -220,11 +221,11 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)
     real(wp), intent(inout), contiguous :: p(:)
     integer(i1), intent(inout), contiguous :: strained(:)
-    integer, intent(in) :: blocks  !! of a lattice; others have all of them
+    integer, intent(in) :: blocks  !! of a lattice or a list; others have all of them
 
     select type (family)
     type is (list_family_type)
-      call list_dilatation(family, model, options, workspace%list, u, p, strained)
+      call list_dilatation(family, model, options, workspace%list, u, p, strained, blocks)
     type is (lattice_family_type)
       call lattice_dilatation(family, model, options, workspace%lattice, u, p, strained, blocks)
     type is (composite_family_type)
@@ -244,11 +245,11 @@ contains
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(inout), contiguous :: force(:, :)
     integer(i1), intent(inout), contiguous :: strained(:)
-    integer, intent(in) :: blocks  !! of a lattice; others have all of them
+    integer, intent(in) :: blocks  !! of a lattice or a list; others have all of them
 
     select type (family)
     type is (list_family_type)
-      call list_force(family, model, options, workspace%list, u, p, force, strained)
+      call list_force(family, model, options, workspace%list, u, p, force, strained, blocks)
     type is (lattice_family_type)
       call lattice_force(family, model, options, workspace%lattice, u, p, force, strained, blocks)
     type is (composite_family_type)

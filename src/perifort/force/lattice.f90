@@ -23,14 +23,11 @@ module pd_force_lattice
   use pd_force_polynomial, only: fast_limit, fast_terms, narrow, wide, single
   use pd_force_singles, only: split_displacements, round_dilatation, clear_sums, add_sums
   use pd_force_weights, only: prepare_blocks, weights_now, half_of
-  use pd_force_workspace, only: lattice_workspace_type, singles_type, weights_type
+  use pd_force_workspace, only: all_blocks, early_blocks, late_blocks, lattice_workspace_type, &
+    & singles_type, weights_type
   implicit none (type, external)
   private
-  public :: lattice_dilatation, lattice_force, lattice_energy, all_blocks, early_blocks, late_blocks
-
-  !> Which blocks a pass works through: those that need no values of copies of other ranks' points,
-  !> then those that do, or all in one call.
-  integer, parameter :: all_blocks = 0, early_blocks = 1, late_blocks = 2
+  public :: lattice_dilatation, lattice_force, lattice_energy
 
   !> Room of one thread.
   type :: scratch_type

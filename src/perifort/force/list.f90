@@ -17,7 +17,8 @@ module pd_force_list
   use pd_force_list_tables, only: make_tables
   use pd_force_model, only: early, force_options_type, model_type, options_of, p_of, t_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
-  use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p
+  use pd_force_workspace, only: all_blocks, at_moved, at_p, at_volume, early_blocks, late_blocks, &
+    & list_workspace_type
   implicit none (type, external)
   private
   public :: prepare_list, list_dilatation, list_force, list_energy
@@ -64,7 +65,7 @@ contains
 
   !> p_k = 2 a d delta theta_k of all slots. If bonds can break, `strained` gets 1 for slots with an
   !> intact bond beyond its limit.
-  subroutine list_dilatation(family, model, options, workspace, u, p, strained)
+  subroutine list_dilatation(family, model, options, workspace, u, p, strained, blocks)
     type(list_family_type), intent(in) :: family     !! the family
     type(model_type), intent(in) :: model            !! parameters of the slots
     type(force_options_type), intent(in) :: options  !! what the forces take in
@@ -75,19 +76,23 @@ contains
       !! (n_slots) 2 a d delta theta, set for all slots [N/m5]
     integer(i1), intent(inout), contiguous :: strained(:)
       !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
+    integer, intent(in), optional :: blocks
+      !! `early_blocks`, then, in a call of its own, `late_blocks`; `all_blocks` if absent
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
     integer(i1) :: strain
-    integer :: c, k, l
+    integer :: c, i, k, l, range(2)
 
     call prepare_list(family, model, workspace)
     call new_loops(family, model, options, for_theta, loops)
-    call gather_state(u, workspace)
+    call choose_clusters(family, blocks, range)
+    call gather_state(family, blocks, u, workspace)
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, workspace, p, strained, loops) &
-    !$omp private(work, sums, strain, c, k, l)
-    do c = 1, size(workspace%large)
+    !$omp shared(family, model, options, workspace, p, strained, loops, range) &
+    !$omp private(work, sums, strain, c, i, k, l)
+    do i = range(1), range(2)
+      c = cluster_of_turn(family, i)
       call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       strain = little
@@ -103,7 +108,7 @@ contains
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
   !> `list_dilatation` at the same displacements.
-  subroutine list_force(family, model, options, workspace, u, p, force, strained)
+  subroutine list_force(family, model, options, workspace, u, p, force, strained, blocks)
     type(list_family_type), intent(in) :: family        !! the family
     type(model_type), intent(in) :: model               !! parameters of the slots
     type(force_options_type), intent(in) :: options
@@ -116,24 +121,28 @@ contains
     real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
     integer(i1), intent(inout), contiguous :: strained(:)
       !! (n_slots) 1 for slots with a bond nearly at its limit, of size 0 if none can break
+    integer, intent(in), optional :: blocks
+      !! `early_blocks`, then, in a call of its own, `late_blocks`; `all_blocks` if absent
     type(loops_type) :: loops
     type(work_type) :: work
     real(wp) :: sums(lanes, 3)
     integer(i1) :: strain
-    integer :: c, d
+    integer :: c, d, i, range(2)
 
     call prepare_list(family, model, workspace)
     call new_loops(family, model, options, for_force, loops)
+    call choose_clusters(family, blocks, range)
     ! with a dilatation, the pass before has gathered the displacements
     if (options%dilatation) then
-      call gather_p(p, workspace)
+      call gather_p(family, blocks, p, workspace)
     else
-      call gather_state(u, workspace)
+      call gather_state(family, blocks, u, workspace)
     end if
     !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, workspace, force, strained, loops) &
-    !$omp private(work, sums, strain, c, d)
-    do c = 1, size(workspace%large)
+    !$omp shared(family, model, options, workspace, force, strained, loops, range) &
+    !$omp private(work, sums, strain, c, d, i)
+    do i = range(1), range(2)
+      c = cluster_of_turn(family, i)
       call take_up(family, workspace, c, work)
       if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
       ! the pass before has checked the strain
@@ -165,7 +174,7 @@ contains
     call prepare_list(family, model, workspace)
     options = options_of(model)
     call new_loops(family, model, options, for_energy, loops)
-    call gather_state(u, workspace)
+    call gather_state(family, all_blocks, u, workspace)
     !$omp parallel do schedule(dynamic, 32) default(none) &
     !$omp shared(family, model, options, workspace, energy, theta, loops) &
     !$omp private(work, sums, missed, c, k, l)
@@ -389,12 +398,20 @@ contains
   end subroutine run_loop
 
   !> Copy displacements, point by point: what a bond needs of its other end then stands in one
-  !> place.
-  subroutine gather_state(u, workspace)
+  !> place. Before late clusters those of copies have come, which alone are new.
+  subroutine gather_state(family, blocks, u, workspace)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in), optional :: blocks
     real(wp), intent(in), contiguous :: u(:, :)
     type(list_workspace_type), intent(inout) :: workspace
-    integer :: k
+    integer :: k, d
 
+    if (are_late(blocks)) then
+      do d = 1, size(u, 2)
+        workspace%at(at_moved + d, family%copies) = u(family%copies, d)
+      end do
+      return
+    end if
     select case (size(u, 2))
     case (3)
       !$omp parallel do schedule(static) default(none) shared(u, workspace) private(k)
@@ -412,16 +429,63 @@ contains
   end subroutine gather_state
 
   !> Copy the dilatation coefficients beside them.
-  subroutine gather_p(p, workspace)
+  subroutine gather_p(family, blocks, p, workspace)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in), optional :: blocks
     real(wp), intent(in), contiguous :: p(:)
     type(list_workspace_type), intent(inout) :: workspace
     integer :: k
 
+    if (are_late(blocks)) then
+      workspace%at(at_p, family%copies) = p(family%copies)
+      return
+    end if
     !$omp parallel do schedule(static) default(none) shared(p, workspace) private(k)
     do k = 1, size(p)
       workspace%at(at_p, k) = p(k)
     end do
   end subroutine gather_p
+
+  ! ---------------------------------------------------------------- which clusters
+
+  !> The first and the last turn of the clusters that a pass takes.
+  subroutine choose_clusters(family, blocks, range)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in), optional :: blocks
+    integer, intent(out) :: range(2)
+    integer :: which
+
+    which = all_blocks
+    if (present(blocks)) which = blocks
+    range = [1, size(family%start) - 1]
+    if (which == all_blocks) return
+    if (.not. allocated(family%turn)) call internal_fault('early clusters where none are late')
+    select case (which)
+    case (early_blocks)
+      range(2) = family%n_early
+    case (late_blocks)
+      range(1) = family%n_early + 1
+    case default
+      call internal_fault('a pass over unknown clusters')
+    end select
+  end subroutine choose_clusters
+
+  !> The cluster of a turn. Its sums are its own alone, and so do not depend on the turn.
+  pure integer function cluster_of_turn(family, i) result(c)
+    type(list_family_type), intent(in) :: family
+    integer, intent(in) :: i
+
+    c = i
+    if (allocated(family%turn)) c = int(family%turn(i))
+  end function cluster_of_turn
+
+  !> Whether a pass takes what was left by one before it.
+  pure logical function are_late(blocks)
+    integer, intent(in), optional :: blocks
+
+    are_late = .false.
+    if (present(blocks)) are_late = blocks == late_blocks
+  end function are_late
 
   ! ---------------------------------------------------------------- breaking
 

@@ -3,9 +3,9 @@
 module pd_force_tangent
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1
-  use pd_body_body, only: body_type, share_halo
+  use pd_body_body, only: body_type, start_halo
   use pd_family_family, only: family_type
-  use pd_force_forces, only: internal_force
+  use pd_force_forces, only: arriving_force, internal_force, whole
   use pd_force_model, only: force_options_type, model_type
   use pd_force_workspace, only: workspace_type
   implicit none (type, external)
@@ -88,29 +88,20 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)
       !! displacements (n_slots, dim) of this process' own points [m]
     real(wp), intent(inout), contiguous :: force(:, :)  !! (n_slots, dim) set for all slots [N/m3]
-    real(wp), allocatable :: shared(:, :)
+    real(wp), allocatable :: shared(:, :), p(:)
+    integer(i1), allocatable :: strained(:)
 
+    allocate (p(merge(body%n_slots, 0, options%dilatation)), source=0.0_wp)
+    allocate (strained(merge(body%n_slots, 0, model%breaking)), source=0_i1)
+    force = 0.0_wp  ! the passes leave out slots far from any point
     if (associated(body%order%ranks)) then
       shared = u
-      call share_halo(body, shared)
-      call forces_of(shared)
+      call start_halo(body, shared)
+      call arriving_force(body, family, model, options, workspace, shared, p, force, strained, &
+        & whole, of_copies=.true.)
     else
-      call forces_of(u)
+      call internal_force(body, family, model, options, workspace, u, p, force, strained)
     end if
-
-  contains
-
-    !> The same where displacements of points that other processes own are known.
-    subroutine forces_of(known)
-      real(wp), intent(in), contiguous :: known(:, :)
-      real(wp), allocatable :: p(:)
-      integer(i1), allocatable :: strained(:)
-
-      allocate (p(merge(body%n_slots, 0, options%dilatation)), source=0.0_wp)
-      allocate (strained(merge(body%n_slots, 0, model%breaking)), source=0_i1)
-      force = 0.0_wp  ! the passes leave out slots far from any point
-      call internal_force(body, family, model, options, workspace, known, p, force, strained)
-    end subroutine forces_of
   end subroutine bond_forces_at
 
   !> `moved` = `u` + `step` `w`.

@@ -12,6 +12,11 @@ module pd_force_workspace
   public :: workspace_type, lattice_workspace_type, list_workspace_type, weights_type, singles_type
   public :: composite_workspace_type, generic_workspace_type
   public :: at_volume, at_moved, at_p
+  public :: all_blocks, early_blocks, late_blocks
+
+  !> Which blocks of a lattice or clusters of a list a pass takes: all, or those that need nothing
+  !> of copies of other ranks' points and then, in a call of its own, the others.
+  integer, parameter :: all_blocks = 0, early_blocks = 1, late_blocks = 2
 
   !> Where things stand in `at`: behind the position come volume, displacement and p.
   integer, parameter :: at_volume = 4, at_moved = 4, at_p = 8
