@@ -38,7 +38,7 @@ contains
       & new_unittest('which scenes have one, and why others do not', test_choice), &
       & new_unittest('bonds are counted and listed as in a list', test_bonds), &
       & new_unittest('forces agree with the theory point by point', test_forces), &
-      & new_unittest('a crack through the joint grows as in a list', test_crack), &
+      & new_unittest('long: a crack through the joint grows as in a list', test_crack), &
       & new_unittest('cracks cut the bonds that they cut in a list', test_cuts), &
       & new_unittest('static equilibrium is that of a list', test_static), &
       & new_unittest('a cloud beside a lattice moves as in a list', test_cloud), &

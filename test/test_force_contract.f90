@@ -610,9 +610,11 @@ contains
     do dim = 1, 3
       do kind = 1, 3
         breaking = kind == 2
-        subject = subject_type(kind='list', dim=dim, cloud=kind < 3, breaking=breaking, &
-          & two_materials=.true., points=points(:, dim))
+        subject = subject_type(kind='list', dim=dim, dilatant=dim == 1, cloud=kind < 3, &
+          & breaking=breaking, two_materials=.true., points=points(:, dim))
         call build(subject)
+        call expect_true(error, subject%model%dilatation, 'there is a pass for the dilatation')
+        if (allocated(error)) return
         if (allocated(u)) deallocate (u)
         allocate (u(subject%body%n_slots, dim), source=0.0_wp)
         call shake(subject%body, some_gradient(0.0_wp), 0.012_wp*spacing, 43, u)

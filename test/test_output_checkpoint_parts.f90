@@ -18,7 +18,7 @@ contains
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
       & new_unittest('long: a law with a history', test_plastic), &
-      & new_unittest('temperatures that vary in time', test_heated), &
+      & new_unittest('long: temperatures that vary in time', test_heated), &
       & new_unittest('conditions that are expressions of t', test_expressions), &
       & new_unittest('pins in motion and in equilibrium', test_pins), &
       & new_unittest('contact with friction', test_contact), &

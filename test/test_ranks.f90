@@ -91,7 +91,7 @@ contains
       & new_unittest('a growing crack', test_crack), &
       & new_unittest('springs and dashpots', test_terms), &
       & new_unittest('contact of two halves', test_halves), &
-      & new_unittest('dynamic relaxation', test_relaxation), &
+      & new_unittest('long: dynamic relaxation', test_relaxation), &
       & new_unittest('dynamic relaxation of a bar', test_bar), &
       & new_unittest('conjugate gradients', test_gradients)]
   end subroutine collect_ranks

@@ -28,7 +28,7 @@ contains
   subroutine collect_set_up_toughness(testsuite)
     type(unittest_type), allocatable, intent(out) :: testsuite(:)
     testsuite = [ &
-      & new_unittest('rows of the table are what solves give', test_rows), &
+      & new_unittest('long: rows of the table are what solves give', test_rows), &
       & new_unittest('long: rows of 3D', test_rows_3d), &
       & new_unittest('the size of the disc does not matter', test_size), &
       & new_unittest('plane strain is plane stress of another ratio', test_planes), &

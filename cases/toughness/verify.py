@@ -272,11 +272,11 @@ def program(dim, kind, horizon, nu, critical="lattice"):
 
 
 def show_stress_along():
-    """What the stress along the crack changes: T = 0.95 K/sqrt(h) in an arm of h = 30 and 60 spacings."""
+    """What the stress along the crack changes: T = 0.95 K/sqrt(h) in an arm of h = 30, 60 and 120 spacings."""
     print("nu, T sqrt(dx)/K: largest G/Gc over that without T, root: the load")
     for nu in map(Fraction, ("1/5", "1/3", "35/100", "2/5")):
         alone = toughness(2, "linear", "3.015", nu).max()
-        for height in (30, 60):
+        for height in (30, 60, 120):
             along = 0.95 / np.sqrt(height)
             part = toughness(2, "linear", "3.015", nu, along=along).max() / alone
             print(f"{float(nu):.4g} {along:.3f}: {part:.3f} {np.sqrt(part):.3f}", flush=True)
