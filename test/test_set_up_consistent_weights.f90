@@ -636,14 +636,7 @@ contains
     integer :: i, c, d
 
     do i = 1, size(dims)
-      call put_cloud(i)
-      call ready_of_text(grid_scene(dims(i), "&body file = 'consistent.txt' /"//lf// &
-        & "&horizon surface_correction = 'consistent' /"), set_up, fault)
-      if (allocated(fault)) then
-        call test_failed(error, 'cloud '//text_of(real(i, wp))//': '//fault%message)
-        return
-      end if
-      call strain_all(set_up%system, 'cloud '//text_of(real(i, wp)), error)
+      call strain_cloud(i, dims(i), set_up, error)
       if (allocated(error)) return
       associate (body => set_up%system%body)
         area = total_areas(body%sides, body%n_slots, body%dim)
@@ -677,25 +670,36 @@ contains
       & fault%message)
   end subroutine test_outlines
 
+  !> Set up a cloud of `put_cloud` and hold it to all uniform strains.
+  subroutine strain_cloud(number, dim, set_up, error)
+    integer, intent(in) :: number, dim
+    type(set_up_type), intent(out) :: set_up
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable :: fault
+    character(:), allocatable :: name
+
+    name = 'cloud '//text_of(real(number, wp))
+    call put_cloud(number)
+    call ready_of_text(grid_scene(dim, "&body file = 'consistent.txt' /"//lf// &
+      & "&horizon surface_correction = 'consistent' /"), set_up, fault)
+    if (allocated(fault)) then
+      call test_failed(error, name//': '//fault%message)
+      return
+    end if
+    call strain_all(set_up%system, name, error)
+  end subroutine strain_cloud
+
   !> The centres of tetrahedra four cells across, with their volumes and with volumes that are 0.8
   !> to 1.2 times as large: with surface areas that are not changed no weights Gb are all positive,
   !> and the body has negative eigenvalues.
   subroutine test_tetrahedra(error)
     type(error_type), allocatable, intent(out) :: error
     type(set_up_type) :: set_up
-    type(fault_type), allocatable :: fault
     real(wp) :: lowest
     integer :: i
 
     do i = 5, 7, 2
-      call put_cloud(i)
-      call ready_of_text(grid_scene(3, "&body file = 'consistent.txt' /"//lf// &
-        & "&horizon surface_correction = 'consistent' /"), set_up, fault)
-      if (allocated(fault)) then
-        call test_failed(error, 'cloud '//text_of(real(i, wp))//': '//fault%message)
-        return
-      end if
-      call strain_all(set_up%system, 'cloud '//text_of(real(i, wp)), error)
+      call strain_cloud(i, 3, set_up, error)
       if (allocated(error)) return
       associate (Gb => set_up%system%model%weights%Gb)
         call expect_true(error, all(Gb > 0.049_wp), 'a weight Gb of '//text_of(minval(Gb)))

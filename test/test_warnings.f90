@@ -760,7 +760,6 @@ contains
     integer :: dim, i
     type(scene_type) :: scene
     type(run_options_type) :: options
-    type(fault_type), allocatable :: fault
     character(:), allocatable :: text
     real(wp), parameter :: strain(4) = [0.11_wp, -0.11_wp, 0.09_wp, 0.0_wp]
 
@@ -777,14 +776,8 @@ contains
         ! a turn is u_x = -x - y, u_y = x - y
         if (i == 4) scene%initial(1)%displacement_gradient(:2, :2) = &
           & reshape([-1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp], [2, 2])
-        call run_scene(scene, options, fault)
-        if (allocated(fault)) then
-          call test_failed(error, fault%message)
-          return
-        end if
-        text = ''
-        if (file_exists(here//'/strain/warnings.txt')) &
-          & call read_text_file(here//'/strain/warnings.txt', text, fault)
+        call run_for_warnings(scene, options, text, error)
+        if (allocated(error)) return
         call expect_true(error, (index(text, 'strained by more than 10 %') > 0) .eqv. i <= 2, &
           & to_text(dim)//'D, case '//to_text(i)//': '//text)
         if (allocated(error)) return
@@ -801,7 +794,6 @@ contains
     real(wp), parameter :: strain(4) = [0.42_wp, 0.38_wp, -0.42_wp, -0.38_wp]
     type(scene_type) :: scene
     type(run_options_type) :: options
-    type(fault_type), allocatable :: fault
     character(:), allocatable :: text
     integer :: law, i, c
 
@@ -822,14 +814,8 @@ contains
           scene%initial(1)%displacement_gradient(c, c) = exp(merge(1.0_wp, -0.5_wp, c == 1) &
             & *strain(i)) - 1
         end do
-        call run_scene(scene, options, fault)
-        if (allocated(fault)) then
-          call test_failed(error, fault%message)
-          return
-        end if
-        text = ''
-        if (file_exists(here//'/yielding/warnings.txt')) &
-          & call read_text_file(here//'/yielding/warnings.txt', text, fault)
+        call run_for_warnings(scene, options, text, error)
+        if (allocated(error)) return
         call expect_true(error, (index(text, 'strained by more than 10 %') > 0) .eqv. law == 1, &
           & 'small strains, case '//to_text(i)//': '//text)
         call expect_true(error, (index(text, 'logarithmic strains beyond 0.4,') > 0) .eqv. &
@@ -838,5 +824,20 @@ contains
       end do
     end do
   end subroutine test_yielding
+
+  !> Run a scene and get the text of its warnings; '' without any.
+  subroutine run_for_warnings(scene, options, text, error)
+    type(scene_type), intent(inout) :: scene
+    type(run_options_type), intent(in) :: options  !! with the folder of the results
+    character(:), allocatable, intent(out) :: text
+    type(error_type), allocatable, intent(inout) :: error
+    type(fault_type), allocatable :: fault
+
+    text = ''
+    call run_scene(scene, options, fault)
+    if (.not. allocated(fault) .and. file_exists(options%output_directory//'/warnings.txt')) &
+      & call read_text_file(options%output_directory//'/warnings.txt', text, fault)
+    if (allocated(fault)) call test_failed(error, fault%message)
+  end subroutine run_for_warnings
 
 end module test_warnings
