@@ -125,6 +125,7 @@ program main
   use test_scene_content_read, only: collect_scene_content_read
   use test_scene_content_reference, only: collect_scene_content_reference
   use test_scene_format_source, only: collect_scene_format_source
+  use test_scene_format_pieces, only: collect_scene_format_pieces
   use test_scene_format_table, only: collect_scene_format_table
   use test_scene_content_template, only: collect_scene_content_template
   use test_scene_format_values, only: collect_scene_format_values
@@ -265,6 +266,7 @@ program main
   call register('scene_content_read', collect_scene_content_read)
   call register('scene_content_reference', collect_scene_content_reference)
   call register('scene_format_source', collect_scene_format_source)
+  call register('scene_format_pieces', collect_scene_format_pieces)
   call register('scene_format_table', collect_scene_format_table)
   call register('scene_content_template', collect_scene_content_template)
   call register('scene_format_values', collect_scene_format_values)

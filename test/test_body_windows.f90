@@ -8,8 +8,8 @@ module test_body_windows
   use pd_body_division, only: divide_space, division_type, take_part, work_of_points
   use pd_body_generate, only: generate_body
   use pd_body_layers, only: layer_count_text, layer_count_type
-  use pd_body_windows, only: begin_work, has_windows, make_part, survey_points, survey_type, &
-    & work_of_windows
+  use pd_body_survey, only: survey_points, survey_type
+  use pd_body_windows, only: begin_work, make_part, work_of_windows
   use pd_scene_content_types, only: scene_type
   use pd_set_up_ranks, only: find_lowest, work_of_body
   use bodies, only: expect, expect_true
@@ -28,12 +28,15 @@ module test_body_windows
 
   !> Scenes: full boxes; shapes; cuts by shapes, expressions and regions; layers at one side, behind
   !> bodies, at a round corner for which two layers reach; bodies of several spacings, of which one
-  !> is cut away before the next cut; turned bodies.
+  !> is cut away before the next cut; turned bodies; clouds, also beside lattices, and one whose
+  !> finest points are cut away before the next cut.
   character(*), parameter :: box = "&body lower = 0 0 0 upper = 1.3 0.7 0.9 points = 13 7 9 /"// &
     & line
   character(*), parameter :: square = "&body name = 'square' lower = 0 0 upper = 1 1 points = "// &
     & "40 40 /"//line
-  character(700), parameter :: scenes(9) = [character(700) :: &
+  character(*), parameter :: cloud_file = 'build/test-windows-cloud.txt'
+  character(*), parameter :: cloud = "&body file = '"//cloud_file//"' /"//line
+  character(700), parameter :: scenes(12) = [character(700) :: &
     & bar//'&body lower = 0.3 upper = 1.4 points = 200 /'//line// &
     & "&boundary side = 'x_max' displacement_x = 0 /"//line, &
     & space//box//"&boundary side = 'z_min' displacement_z = 0 /"//line// &
@@ -59,7 +62,14 @@ module test_body_windows
     & "&remove shape = 'sphere' centre = 0.3 0.4 radius = 0.1 /"//line, &
     & space//"&body shape = 'cylinder' centre = 0 0 0 axis = 'z' radius = 0.4 height = 1 "// &
     & "spacing = 0.1 axis_1 = 1 1 0 axis_2 = 0 1 1 /"//line// &
-    & "&body lower = 3 0 0 upper = 3.5 0.5 0.5 points = 8 8 8 /"//line]
+    & "&body lower = 3 0 0 upper = 3.5 0.5 0.5 points = 8 8 8 /"//line, &
+    & plane//cloud, &
+    & plane//square//cloud//"&remove shape = 'box' lower = 2.2 upper = 2.5 0.9 /"//line// &
+    & "&remove shape = 'box' lower = 0.5125000001 0.5 upper = 0.8124999999 0.8 /"//line// &
+    & "&boundary side = 'x_min' body = 'square' displacement_x = 0 /"//line, &
+    & space//"&body name = 'block' lower = 0 0 0 upper = 1.3 0.7 0.9 points = 13 7 9 /"//line// &
+    & cloud//"&keep where = 'y + z < 0.9' /"//line// &
+    & "&boundary side = 'z_min' body = 'block' displacement_z = 0 /"//line]
 
 contains
 
@@ -68,7 +78,8 @@ contains
     testsuite = [ &
       & new_unittest('windows of any size have the points of the whole body', test_parts), &
       & new_unittest('ranks that count together find the same', test_together), &
-      & new_unittest('what is refused, in the same words', test_refused)]
+      & new_unittest('what is refused, in the same words', test_refused), &
+      & new_unittest('clouds that are refused, in the same words', test_refused_clouds)]
   end subroutine collect_body_windows
 
   !> Windows of one cell, of parts of rows, of rows, of planes, and of the whole body.
@@ -80,10 +91,10 @@ contains
     type(fault_type), allocatable :: fault
     integer :: i, c
 
+    call write_cloud()
     do i = 1, size(scenes)
       call expect_scene(error, trim(scenes(i)), scene)
       if (allocated(error)) return
-      call expect_true(error, has_windows(scene), 'lattices')
       do c = 1, size(cells)
         ! a window for each cell takes long
         if (cells(c) < 50 .and. i > 3) cycle
@@ -94,7 +105,31 @@ contains
         if (allocated(error)) return
       end do
     end do
+    call remove_cloud()
   end subroutine test_parts
+
+  !> A cloud in the plane z = 0.3, finer where x is larger, in an order without any order in space.
+  subroutine write_cloud()
+    integer, parameter :: n = 431
+    integer :: unit, i
+    real(wp) :: h, x, y
+
+    open (newunit=unit, file=cloud_file, status='replace', action='write')
+    write (unit, '(a)') '# x y z volume'
+    do i = 1, n
+      x = mod(i*0.618034_wp, 1.0_wp)
+      y = mod(i*0.7548777_wp, 1.0_wp)
+      h = 0.05_wp - 0.03_wp*x
+      write (unit, '(3(es24.16, 1x), es24.16)') 1.5_wp + x, y, 0.3_wp, 0.01_wp*h**2
+    end do
+    close (unit)
+  end subroutine write_cloud
+
+  subroutine remove_cloud()
+    integer :: unit
+    open (newunit=unit, file=cloud_file)
+    close (unit, status='delete')
+  end subroutine remove_cloud
 
   !> All that a survey and the parts of ranks know of the points.
   subroutine compare(scene, survey, number, error)
@@ -189,11 +224,12 @@ contains
     type(fault_type), allocatable :: fault
     type(work_of_windows) :: work
     type(division_type) :: division(ranks), expected
-    type(body_type) :: part, of_rank
+    type(body_type) :: part(ranks), of_rank
     integer, allocatable :: owner(:)
     logical :: enough, failed
     integer :: i, r
 
+    call write_cloud()
     do i = 1, size(scenes)
       call expect_scene(error, trim(scenes(i)), scene)
       if (allocated(error)) return
@@ -201,8 +237,8 @@ contains
       allocate (hub%of_rank(ranks))
       enough = .false.
       failed = .false.
-      !$omp parallel num_threads(ranks) default(none) private(r, fault, work) &
-      !$omp shared(scene, survey, fake, hub, division, enough, failed)
+      !$omp parallel num_threads(ranks) default(none) private(r, fault, work, owner) &
+      !$omp shared(scene, survey, fake, hub, division, part, enough, failed)
       if (omp_get_num_threads() == ranks) then
         r = omp_get_thread_num() + 1
         if (r == 1) enough = .true.
@@ -214,6 +250,7 @@ contains
         else
           call begin_work(scene, survey(r), 1, work)
           call divide_space(work, ranks, division(r))
+          call make_part(scene, survey(r), division(r), r - 1, survey(r)%none%delta, part(r), owner)
         end if
       end if
       !$omp end parallel
@@ -225,25 +262,26 @@ contains
       call divide_space(work, ranks, expected)
       do r = 1, ranks
         call expect_true(error, all(abs(division(r)%at - expected%at) <= 0.0_wp), 'cuts')
-        call make_part(scene, survey(r), division(r), r - 1, alone%none%delta, part, owner)
         call make_part(scene, alone, expected, r - 1, alone%none%delta, of_rank, owner)
-        call same_bodies(of_rank, part, error)
+        call same_bodies(of_rank, part(r), error)
         if (allocated(error)) return
       end do
     end do
+    call remove_cloud()
   end subroutine test_together
 
   !> The error of a scene that is made in one piece names the same point.
   subroutine test_refused(error)
     type(error_type), allocatable, intent(out) :: error
     character(*), parameter :: whole = plane//square
-    character(200), parameter :: faults(5) = [character(200) :: &
+    character(200), parameter :: faults(6) = [character(200) :: &
       & "&remove shape = 'box' lower = 0 0.1 upper = 1 0.2 /"//line// &
       & "&remove where = '1/max(0, (x - 0.0125)**2 + (y - 0.5125)**2 - 1.0e-6)' /"//line, &
       & "&remove shape = 'box' lower = -1 /"//line, &
       & "&keep shape = 'box' lower = 5 /"//line, &
       & "&boundary side = 'x_min' displacement_x = 0 /"//line//"&horizon length = 0.01 /"//line, &
-      & "&body shape = 'sphere' centre = 2 2 radius = 1.0e-3 spacing = 0.1 /"//line]
+      & "&body shape = 'sphere' centre = 2 2 radius = 1.0e-3 spacing = 0.1 /"//line, &
+      & cloud//"&remove where = '1/max(0, (x - 1.5)**2 - 0.1) - 1e6' /"//line]
     type(scene_type) :: scene
     type(survey_type) :: survey
     type(fault_type), allocatable :: fault, of_windows
@@ -251,6 +289,7 @@ contains
     real(wp) :: delta
     integer :: i
 
+    call write_cloud()
     do i = 1, size(faults)
       call expect_scene(error, whole//trim(faults(i)), scene)
       if (allocated(error)) return
@@ -260,6 +299,37 @@ contains
       if (allocated(error)) return
       call expect_true(error, fault%message == of_windows%message, of_windows%message)
     end do
+    call remove_cloud()
   end subroutine test_refused
+
+  !> The first point at fault of a cloud's file is reported, whichever window has it.
+  subroutine test_refused_clouds(error)
+    type(error_type), allocatable, intent(out) :: error
+    character(40), parameter :: rows(5) = [character(40) :: '1 2 0.3 0', '1 2 0.3 -1', &
+      & '1 2 0.31 1e-5', '1 2 0.3', '1 2 0.3 x']
+    type(scene_type) :: scene
+    type(survey_type) :: survey
+    type(fault_type), allocatable :: fault, of_windows
+    type(body_type) :: body
+    real(wp) :: delta
+    integer :: i, unit
+
+    call write_cloud()
+    call expect_scene(error, plane//square//cloud, scene)
+    if (allocated(error)) return
+    do i = 1, size(rows)
+      call write_cloud()
+      open (newunit=unit, file=cloud_file, status='old', action='write', position='append')
+      write (unit, '(a)') trim(rows(i)), '1 2 0.3 1e-5', '1 2 0.3 -5'
+      close (unit)
+      call generate_body(scene, body, delta, fault)
+      call survey_points(scene, survey, of_windows, cells=33)
+      call expect_true(error, allocated(fault) .and. allocated(of_windows), 'no error')
+      if (allocated(error)) return
+      call expect_true(error, fault%message == of_windows%message, of_windows%message)
+      call expect_true(error, index(fault%message, cloud_file//':433') > 0, fault%message)
+    end do
+    call remove_cloud()
+  end subroutine test_refused_clouds
 
 end module test_body_windows

@@ -6,7 +6,8 @@ module test_family_slabs
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: body_type, owned
   use pd_body_division, only: divide_space, division_type
-  use pd_body_windows, only: begin_work, make_part, survey_points, survey_type, work_of_windows
+  use pd_body_survey, only: survey_points, survey_type
+  use pd_body_windows, only: begin_work, make_part, work_of_windows
   use pd_set_up_prepare, only: set_up_type
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_family_lattice, only: grid_at, lattice_family_type, new_lattice_family

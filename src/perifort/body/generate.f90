@@ -1,20 +1,20 @@
-!> Points of a scene: lattices, also inside of surfaces (`pd_body_surfaces`), clouds, meshes
-!> (`pd_body_meshes`), removed shapes, and the layers that boundaries add (`pd_body_layers`).
+!> Points of a scene: lattices, also inside of surfaces (`pd_body_surfaces`), clouds
+!> (`pd_body_clouds`), meshes (`pd_body_meshes`), removed shapes, and the layers that boundaries add
+!> (`pd_body_layers`).
 !>
 !> Order (that of the results): body by body, a lattice's points x fastest, then y, then z; then
 !> the layers in the order of their boundary groups.
 module pd_body_generate
   use pd_base_kinds, only: wp, i2, i4
-  use pd_base_error, only: error_type, fail
-  use pd_base_text, only: newline, to_text, with_unit
+  use pd_base_error, only: error_type
+  use pd_base_text, only: to_text, with_unit
   use pd_base_warnings, only: warnings_type
   use pd_scene_content_types, only: body_group, has_cut_cells, has_own_horizons, has_refinement, &
     & is_lattice, scene_type, is_set, unset, words_of_body
-  use pd_scene_format_file, only: resolve_path
-  use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_format_table, only: table_type, read_table
+  use pd_scene_content_rules, only: scene_fault
   use pd_body_body, only: body_type, grid_type, lattice_type, skin_type, allocate_points, &
     & append_points, keep_points
+  use pd_body_clouds, only: cloud_points
   use pd_body_meshes, only: keep_part, material_number, mesh_body
   use pd_body_mesh_part, only: part_type
   use pd_body_lattices, only: box_of_cells, lattice_grid, lattice_of, place_in
@@ -313,45 +313,6 @@ contains
     delta = scene%horizon%ratio*largest_spacing
     if (is_set(scene%horizon%length)) delta = scene%horizon%length
   end function horizon_of
-
-  !> Points of a cloud file: columns x y z volume. Coordinates that the dimension doesn't use must
-  !> be the same for all points.
-  subroutine cloud_points(scene, i, depth, body, error)
-    type(scene_type), intent(in) :: scene
-    integer, intent(in) :: i
-    real(wp), intent(in) :: depth
-    type(body_type), intent(out) :: body
-    type(error_type), allocatable, intent(out) :: error
-    type(table_type) :: table
-    character(:), allocatable :: path
-    integer :: worst, c
-
-    path = resolve_path(trim(scene%bodies(i)%file), scene%file)
-    call read_table(path, table, error, columns=4)
-    call place_fault(error, scene, 'body', i, 'file')
-    if (allocated(error)) return
-    call allocate_points(body, scene%header%dimension, size(table%values, 2))
-    body%x = transpose(table%values(:body%dim, :))
-    body%volume = table%values(4, :)
-    worst = minloc(body%volume, dim=1)
-    if (body%volume(worst) <= 0.0_wp) then
-      call fail(error, &
-        & 'every point of a cloud needs a positive volume (the fourth column), but here '// &
-        & 'it is '//to_text(body%volume(worst))//newline//' --> '//path//':'// &
-        & to_text(table%lines(worst)))
-      return
-    end if
-    body%spacing = (body%volume/depth)**(1.0_wp/body%dim)
-    do c = body%dim + 1, 3
-      worst = maxloc(abs(table%values(c, :) - table%values(c, 1)), dim=1)
-      if (abs(table%values(c, worst) - table%values(c, 1)) <= touch*maxval(body%spacing)) cycle
-      call fail(error, 'a scene of dimension '//to_text(body%dim)//' has no direction '// &
-        & 'xyz'(c:c)//', but the points of the cloud differ in it: '// &
-        & to_text(table%values(c, 1))//' and '//to_text(table%values(c, worst))//newline// &
-        & ' --> '//path//':'//to_text(table%lines(worst)))
-      return
-    end do
-  end subroutine cloud_points
 
   !> Number of `grid` among the body's grids; a new one is added. Grids that coincide are one.
   integer(i2) function number_of_grid(body, grid) result(number)

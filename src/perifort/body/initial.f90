@@ -2,12 +2,15 @@
 module pd_body_initial
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_base_error, only: error_type
+  use pd_base_order, only: ascending_order
   use pd_base_text, only: to_text
   use pd_scene_content_types, only: scene_type, is_given, is_set
   use pd_scene_format_file, only: resolve_path
   use pd_scene_content_expressions, only: varies_in_time
   use pd_scene_content_rules, only: place_fault, scene_fault
-  use pd_scene_format_table, only: table_type, read_table
+  use pd_scene_format_given, only: name_length
+  use pd_scene_format_pieces, only: find_pieces, piece_type, read_piece
+  use pd_scene_format_table, only: table_type
   use pd_body_body, only: body_type, number_at
   use pd_body_choice, only: values_on
   use pd_body_regions, only: region_mask
@@ -111,49 +114,73 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(18), parameter :: known(7) = [character(18) :: 'displacement_x', 'displacement_y', &
       & 'displacement_z', 'velocity_x', 'velocity_y', 'velocity_z', 'temperature_change']
+    integer, parameter :: most = 32768  ! rows that are in memory at once
     character(:), allocatable :: path
+    character(name_length), allocatable :: names(:)
+    type(piece_type), allocatable :: pieces(:)
     type(table_type) :: table
-    integer(i8) :: points
-    integer :: column, which
+    integer(i4), allocatable :: slots(:)
+    integer(i8) :: points, rows, before
+    integer :: p, next, first
 
     path = resolve_path(trim(scene%initial(number)%file), scene%file)
-    call read_table(path, table, error, allowed=pack(known, of_dimension(body%dim)))
+    call find_pieces(path, most, pieces, error)
     call place_fault(error, scene, 'initial', number, 'file')
     if (allocated(error)) return
     points = int(body%n_points, i8)
     if (associated(body%order%ranks)) points = body%order%n_global
-    if (size(table%values, 2, kind=i8) /= points) then
-      call scene_fault(error, scene, 'initial', number, 'file', 'the initial state in '//path// &
-        & ' has '//to_text(size(table%values, 2))//' rows, but the scene has '// &
-        & to_text(points)//' points (layers included)', &
+    rows = sum(int(pieces%rows, i8)) - 1
+    slots = pack([(int(p, i4), p=1, body%n_slots)], body%point > 0)
+    slots = slots(ascending_order(number_at(body, slots)))
+    before = 0_i8
+    next = 1
+    do p = 1, size(pieces)
+      ! the first row is the header
+      first = next
+      do while (next <= size(slots))
+        if (number_at(body, slots(next)) > before + pieces(p)%rows - merge(1, 0, p == 1)) exit
+        next = next + 1
+      end do
+      if (p == 1) then
+        call read_piece(path, pieces(p), table, error, allowed=pack(known, of_dimension(body%dim)))
+        names = table%names
+      else if (next > first) then
+        call read_piece(path, pieces(p), table, error, columns=size(names))
+      end if
+      call place_fault(error, scene, 'initial', number, 'file')
+      if (.not. allocated(error) .and. rows /= points) call scene_fault(error, scene, 'initial', &
+        & number, 'file', 'the initial state in '//path//' has '//to_text(rows)//' rows, but '// &
+        & 'the scene has '//to_text(points)//' points (layers included)', &
         & 'one row per point is expected, in the order of the results')
-      return
-    end if
-    do column = 1, size(table%names)
-      which = findloc(known == table%names(column), .true., dim=1)
-      select case (which)
-      case (1:3)
-        call take_column(body, table%values(column, :), u(:, which))
-      case (4:6)
-        call take_column(body, table%values(column, :), v(:, which - 3))
-      case default  ! the last of the known names
-        call take_column(body, table%values(column, :), temperature_change)
-        where (body%point > 0) heated_by = int(number, i2)
-      end select
+      if (allocated(error)) return
+      call take_rows(slots(first:next - 1))
+      before = before + pieces(p)%rows - merge(1, 0, p == 1)
     end do
+
+  contains
+
+    !> Give slots, copies included, the values of their rows.
+    subroutine take_rows(here)
+      integer(i4), intent(in) :: here(:)  !! with points of this piece
+      integer :: i, column, which, row
+
+      do column = 1, size(names)
+        which = findloc(known == names(column), .true., dim=1)
+        do i = 1, size(here)
+          row = int(number_at(body, here(i)) - before)
+          select case (which)
+          case (1:3)
+            u(here(i), which) = table%values(column, row)
+          case (4:6)
+            v(here(i), which - 3) = table%values(column, row)
+          case default  ! the last of the known names
+            temperature_change(here(i)) = table%values(column, row)
+            heated_by(here(i)) = int(number, i2)
+          end select
+        end do
+      end do
+    end subroutine take_rows
   end subroutine state_from_file
-
-  !> Give every slot with a point, copies included, the value of its row.
-  pure subroutine take_column(body, of_rows, of_slots)
-    type(body_type), intent(in) :: body
-    real(wp), intent(in) :: of_rows(:)      !! (points of all ranks)
-    real(wp), intent(inout) :: of_slots(:)  !! (n_slots)
-    integer :: k
-
-    do k = 1, body%n_slots
-      if (body%point(k) > 0) of_slots(k) = of_rows(number_at(body, k))
-    end do
-  end subroutine take_column
 
   !> Which columns a dimension has.
   pure function of_dimension(dim) result(has)

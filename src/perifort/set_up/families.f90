@@ -6,7 +6,7 @@ module pd_set_up_families
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_lattices, only: axes_of
-  use pd_body_windows, only: survey_type
+  use pd_body_survey, only: survey_type
   use pd_family_composite, only: composite_family_type, composite_suits, new_composite_family
   use pd_family_lattice, only: cells_between, lattice_family_type, lattice_suits, &
     & new_lattice_family

@@ -9,7 +9,6 @@ module pd_set_up_memory
   use pd_scene_content_types, only: has_grid, has_own_horizons, is_lattice, is_set, laws_of, &
     & scene_type
   use pd_body_generate, only: horizon_of
-  use pd_body_windows, only: has_windows
   implicit none (type, external)
   private
   public :: check_memory, predicted_memory, any_critical
@@ -17,23 +16,19 @@ module pd_set_up_memory
 contains
 
   !> An error if the lattice bodies of a scene need more memory than there is, at the body with the
-  !> most points. Refined cells are known when `points` are. Of several ranks each needs its part,
-  !> and the positions of all points for a moment, if some are no lattice; how many ranks share a
-  !> machine is not known.
+  !> most points. Refined cells are known when `points` are. Of several ranks each needs its part;
+  !> how many ranks share a machine is not known.
   subroutine check_memory(scene, error, points, ranks)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(error_type), allocatable, intent(out) :: error  !! too many points
     integer, intent(in), optional :: points  !! number of them; absent: those of the lattices
     integer, intent(in), optional :: ranks   !! how many there are; 1 if absent
-    real(wp), parameter :: per_position = 60.0_wp  ! while points are made [bytes]
     real(wp) :: need, there, number
 
     number = sum(numbers_of_points(scene))
     if (present(points)) number = points
     need = predicted_memory(scene, points)
-    if (present(ranks)) then
-      if (ranks > 1) need = need/ranks + merge(0.0_wp, per_position*number, has_windows(scene))
-    end if
+    if (present(ranks)) need = need/ranks
     there = real(available_memory(), wp)
     if (need <= there) return
     call scene_fault(error, scene, 'body', largest_body(scene), 'points', 'the scene has '// &

@@ -14,7 +14,7 @@ module pd_set_up_prepare
   use pd_body_overlap, only: check_lattices
   use pd_body_surface_stl, only: read_stl
   use pd_body_surface_surface, only: surface_type
-  use pd_body_windows, only: agree_on_error, has_windows, survey_points, survey_type
+  use pd_body_survey, only: agree_on_error, survey_points, survey_type
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_family_crack_surface, only: cut_by_facets, points_on_facets
@@ -44,7 +44,7 @@ module pd_set_up_prepare
   use pd_set_up_horizons, only: check_horizons, rule_of_scene
   use pd_set_up_materials, only: materials_of_scene
   use pd_set_up_memory, only: check_memory
-  use pd_set_up_ranks, only: bonds_of_ranks, broken_bonds, check_ranks, divide_body, &
+  use pd_set_up_ranks, only: bonds_of_ranks, broken_bonds, check_ranks, &
     & divide_survey, find_lowest, join_ranks, reproducible_layer
   use pd_set_up_plan, only: plan_type, make_plan
   use pd_set_up_substeps, only: arrange_substeps, check_step
@@ -96,13 +96,12 @@ contains
     integer, allocatable :: owner(:)
     type(family_choice_type) :: choice
     type(survey_type) :: survey
-    logical :: divided, in_windows, reproducible
+    logical :: divided, reproducible
     integer :: i, ranks, blocks
 
     ranks = 1
     if (present(world)) ranks = world%ranks
     divided = ranks > 1
-    in_windows = divided .and. has_windows(scene)
     call check_memory(scene, error, ranks=ranks)
     if (.not. allocated(error) .and. divided) call check_ranks(scene, error)
     if (.not. allocated(error) .and. divided .and. present(terms)) call fail(error, &
@@ -111,7 +110,7 @@ contains
     if (present(threads)) call set_up%team%begin(threads)
     associate (system => set_up%system, timer => set_up%timer)
       call timer%start('points')
-      if (in_windows) then
+      if (divided) then
         call survey_points(scene, survey, error, world, world%rank, world%ranks)
         if (.not. allocated(error)) call check_number(scene, survey%none%order%n_global, error)
         if (allocated(error)) return
@@ -141,7 +140,7 @@ contains
       if (present(world)) reproducible = world%reproducible
       blocks = 1
       if (reproducible) blocks = reproducible_layer(scene%header%precision == 'mixed')
-      if (in_windows) then
+      if (divided) then
         call divide_survey(scene, rule, blocks, world, survey, system%body, owner, error)
         if (allocated(error)) return
         call check_lattices(scene, system%body, error)
@@ -149,14 +148,11 @@ contains
         if (allocated(error)) return
         call choose_family(scene, rule, system%body, laws, .true., choice, error, survey)
       else
-        call choose_family(scene, rule, system%body, laws, divided .or. reproducible, choice, error)
+        call choose_family(scene, rule, system%body, laws, reproducible, choice, error)
       end if
       if (allocated(error)) return
-      if (reproducible .and. .not. in_windows) call find_lowest(system%body)
+      if (reproducible .and. .not. divided) call find_lowest(system%body)
       system%body%order%reproducible = reproducible
-      if (divided .and. .not. in_windows) call divide_body(scene, rule, blocks, world, &
-        & system%body, owner, error)
-      if (allocated(error)) return
       call make_family(scene, rule, choice, system, error)
       if (allocated(error)) return
       if (divided) call join_ranks(world, system%body, owner)

@@ -7,9 +7,10 @@ module pd_set_up_ranks
   use pd_base_reduce, only: count_of_ranks
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
-  use pd_body_division, only: divide_space, division_type, take_part, work_of_points
+  use pd_body_division, only: divide_space, division_type, work_of_points
   use pd_body_lattices, only: coordinate
-  use pd_body_windows, only: begin_work, make_part, survey_type, work_of_windows
+  use pd_body_survey, only: survey_type
+  use pd_body_windows, only: begin_work, make_part, work_of_windows
   use pd_comm_world, only: world_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_volume, only: reach, volume_rule_type
@@ -17,7 +18,7 @@ module pd_set_up_ranks
   use pd_scene_content_types, only: has_refinement, scene_type, is_set
   implicit none (type, external)
   private
-  public :: check_ranks, divide_body, divide_survey, find_lowest, work_of_body, join_ranks, &
+  public :: check_ranks, divide_survey, find_lowest, work_of_body, join_ranks, &
     & bonds_of_ranks, broken_bonds, reproducible_layer
 
   character(*), parameter :: one_rank = 'on one rank it can'
@@ -89,34 +90,13 @@ contains
     points = merge(2*lanes, lanes, mixed)
   end function reproducible_layer
 
-  !> Reduce a body to the points of this rank and copies of others. An error if some rank would have
-  !> no point.
-  subroutine divide_body(scene, rule, blocks, world, body, owner, error)
-    type(scene_type), intent(in) :: scene
-    type(volume_rule_type), intent(in) :: rule     !! how far bonds reach
-    integer, intent(in) :: blocks                  !! cuts across x lie between so many points of
-                                                   !! a lattice's rows; 1: between any
-    type(world_type), intent(inout), target :: world
-    type(body_type), intent(inout) :: body         !! in point order, with all points
-    integer, allocatable, intent(out) :: owner(:)  !! rank that owns each copy, from 0
-    type(error_type), allocatable, intent(out) :: error
-    type(work_of_points) :: work
-    type(division_type) :: division
-
-    call work_of_body(body, blocks, work)
-    call divide_space(work, world%ranks, division)
-    call check_division(scene, division, error)
-    if (allocated(error)) return
-    call take_part(division, world%rank, reach(rule, body%largest_spacing, body%dim), body, owner)
-    body%order%ranks => world
-  end subroutine divide_body
-
   !> Make the points of this rank and copies of others, without all points. An error if some rank
   !> would have no point.
   subroutine divide_survey(scene, rule, blocks, world, survey, body, owner, error)
     type(scene_type), intent(in), target :: scene
     type(volume_rule_type), intent(in) :: rule     !! how far bonds reach
-    integer, intent(in) :: blocks                  !! as in `divide_body`
+    integer, intent(in) :: blocks                  !! cuts across x lie between so many points of
+                                                   !! a lattice's rows; 1: between any
     type(world_type), intent(inout), target :: world
     type(survey_type), intent(in), target :: survey  !! of the points of all ranks
     type(body_type), intent(out) :: body           !! in point order
@@ -172,7 +152,7 @@ contains
   !> The work of a body's points, all alike.
   subroutine work_of_body(body, blocks, work)
     type(body_type), intent(in) :: body              !! with all points, in any slots
-    integer, intent(in) :: blocks                    !! as in `divide_body`
+    integer, intent(in) :: blocks                    !! as in `divide_survey`
     type(work_of_points), intent(out) :: work
     real(wp) :: spacing
     integer :: c

@@ -6,7 +6,10 @@ module pd_scene_format_file
   use pd_base_text, only: with_unit
   implicit none (type, external)
   private
-  public :: read_text_file, resolve_path, line_type, split_lines
+  public :: read_text_file, find_text_file, resolve_path, line_type, split_lines, byte_order_mark
+
+  !> What some programs write before a text in UTF-8.
+  character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
   !> One line of text, of any length, without its end mark.
   type :: line_type
@@ -26,15 +29,10 @@ contains
     integer :: unit, status
     integer(i8) :: length
     character(512) :: reason
-    logical :: exists
 
     text = ''
-    inquire (file=path, exist=exists, size=length)
-    if (.not. exists) then
-      call fail(error, "cannot find the file '"//path//"'")
-    else if (length <= 0_i8) then
-      call fail(error, "the file '"//path//"' is empty, or no plain file")
-    else if (length > available_memory()/copies) then
+    call find_text_file(path, length, error)
+    if (.not. allocated(error) .and. length > available_memory()/copies) then
       call fail(error, "the file '"//path//"' is too large: its "//with_unit(real(length, wp), &
         & 'B', 3)//' are more than can be read with '// &
         & with_unit(real(available_memory(), wp), 'B', 3)//' of memory')
@@ -56,6 +54,21 @@ contains
       call fail(error, "cannot read the file '"//path//"': "//trim(reason))
     end if
   end subroutine read_text_file
+
+  !> How long a file is. An error if it is not there, or if it is empty, as a pipe is.
+  subroutine find_text_file(path, length, error)
+    character(*), intent(in) :: path       !! of the file
+    integer(i8), intent(out) :: length     !! [bytes]
+    type(error_type), allocatable, intent(out) :: error
+    logical :: exists
+
+    inquire (file=path, exist=exists, size=length)
+    if (.not. exists) then
+      call fail(error, "cannot find the file '"//path//"'")
+    else if (length <= 0_i8) then
+      call fail(error, "the file '"//path//"' is empty, or no plain file")
+    end if
+  end subroutine find_text_file
 
   !> Where a file named in a scene is: absolute names as they are; others are looked for in the
   !> folder of `scene_file`, then in the working directory. If it is in neither, the name in the
@@ -84,14 +97,13 @@ contains
   subroutine split_lines(text, lines)
     character(*), intent(in) :: text  !! of a file, with its line ends
     type(line_type), allocatable, intent(out) :: lines(:)  !! (lines), without their ends
-    character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
     character(*), parameter :: line_feed = achar(10), carriage_return = achar(13)
     integer(i8) :: i, first, begin
     integer :: pass, count
 
     begin = 1_i8
-    if (len(text) >= 3) then
-      if (text(:3) == byte_order_mark) begin = 4_i8
+    if (len(text) >= len(byte_order_mark)) then
+      if (text(:len(byte_order_mark)) == byte_order_mark) begin = len(byte_order_mark) + 1
     end if
     do pass = 1, 2
       count = 0

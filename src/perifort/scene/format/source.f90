@@ -5,6 +5,7 @@
 !> ignore or report without a place.
 module pd_scene_format_source
   use pd_base_error, only: error_type, fail
+  use pd_base_kinds, only: i8
   use pd_base_text, only: is_control, lower_case, to_text, newline
   use pd_scene_format_file, only: line_type, split_lines
   implicit none (type, external)
@@ -45,6 +46,7 @@ module pd_scene_format_source
     type(token_type), allocatable :: tokens(:)
     integer :: section_count = 0, entry_count = 0, token_count = 0
     integer :: option_count = 0  !! lines at the end that are options of the command line
+    integer(i8) :: before = 0_i8  !! lines of the file before these
     logical :: in_memory = .false.     !! the text of a scene in memory: places are groups and keys
   end type source_type
 
@@ -435,7 +437,7 @@ contains
       call fail(error, text)
       return
     end if
-    number = to_text(line)
+    number = to_text(source%before + line)
     place = source%file//':'//number
     if (line > size(source%lines) - source%option_count) then
       number = ''

@@ -3,7 +3,7 @@
 !> A row per line, columns parted by blanks, tabs or commas, `#` starts a comment; the first line
 !> may name the columns.
 module pd_scene_format_table
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i8
   use pd_base_error, only: error_type
   use pd_base_text, only: join, lower_case, nearest_name, to_text
   use pd_scene_format_file, only: read_text_file, split_lines
@@ -12,13 +12,13 @@ module pd_scene_format_table
   use pd_scene_format_values, only: parse_real, largest_real
   implicit none (type, external)
   private
-  public :: table_type, read_table, read_table_text, column_of
+  public :: table_type, read_table, read_table_text, column_of, content_begins
 
   !> A table as read.
   type :: table_type
     character(name_length), allocatable :: names(:)  !! of the columns, size 0 without a header
     real(wp), allocatable :: values(:, :)            !! (column, row)
-    integer, allocatable :: lines(:)                 !! the line of each row
+    integer(i8), allocatable :: lines(:)             !! the line of each row in the file
   end type table_type
 
   character(*), parameter :: separators = ' ,'//achar(9)
@@ -47,7 +47,7 @@ contains
   end subroutine read_table
 
   !> Read a table from its text, with the errors of `read_table`.
-  subroutine read_table_text(text, name, table, error, columns, allowed)
+  subroutine read_table_text(text, name, table, error, columns, allowed, before)
     character(*), intent(in) :: text                  !! of the file
     character(*), intent(in) :: name                  !! of the file, for messages
     type(table_type), intent(out) :: table            !! as it stands in the text
@@ -56,11 +56,14 @@ contains
                                                       !! in the first row
     character(*), intent(in), optional :: allowed(:)  !! (any number), names of columns, '*' for
                                                       !! any; absent: no header
+    integer(i8), intent(in), optional :: before       !! lines of the file before the text; 0 if
+                                                      !! absent
     type(source_type) :: source
     integer :: line, last, row, wide
     logical :: named
 
     source%file = name
+    if (present(before)) source%before = before
     call split_lines(text, source%lines)
     call check_text(source, error)
     if (allocated(error)) return
@@ -82,7 +85,7 @@ contains
       if (wide == 0) wide = count_words(source%lines(line)%text(:last))
       if (.not. allocated(table%values)) allocate (table%values(wide, size(source%lines)))
       row = row + 1
-      table%lines(row) = line
+      table%lines(row) = source%before + line
       call read_row(source, line, last, table%values(:, row), error)
       if (allocated(error)) return
     end do
@@ -200,6 +203,16 @@ contains
         & verify(text(mark + 1 + signs:final), '0123456789') == 0
     end do
   end function is_plain
+
+  !> What a character at the begin of a line means, or after separators there: whether it is the
+  !> first of a word, or of a comment, so that the line has no content.
+  pure subroutine content_begins(character, has_content, in_comment)
+    character, intent(in) :: character
+    logical, intent(out) :: has_content, in_comment
+
+    in_comment = character == '#'
+    has_content = .not. in_comment .and. index(separators, character) == 0
+  end subroutine content_begins
 
   !> The last character before a comment and blanks, 0 for an empty line.
   pure integer function content_end(text) result(last)

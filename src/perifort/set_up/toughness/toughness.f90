@@ -11,7 +11,7 @@ module pd_set_up_toughness_toughness
   use pd_law_laws, only: law_item_type
   use pd_law_material, only: material_type
   use pd_law_weighted, only: weighted_law_type
-  use pd_scene_content_types, only: has_own_horizons, scene_type
+  use pd_scene_content_types, only: has_grid, has_own_horizons, scene_type
   use pd_set_up_toughness_grow, only: grow_crack, subject_type, toughness_type
   use pd_set_up_toughness_table, only: look_up
   implicit none (type, external)
@@ -62,7 +62,7 @@ contains
     reason = ''
     if (scene%header%dimension == 1) then
       reason = 'a bar has no crack that grows'
-    else if (any(body%grid == 0)) then
+    else if (.not. all(has_grid(scene%bodies))) then
       reason = 'some points are a cloud'
     else
       spacing = body%largest_spacing
