@@ -40,6 +40,7 @@ program main
   use test_body_surfaces, only: collect_body_surfaces
   use test_body_waves, only: collect_body_waves
   use test_body_windows, only: collect_body_windows
+  use test_body_work, only: collect_body_work
   use test_command_line, only: collect_command_line
   use test_driver, only: collect_driver
   use test_extremes_contrast, only: collect_extremes_contrast
@@ -166,6 +167,7 @@ program main
   call register('body_turned', collect_body_turned)
   call register('body_division', collect_body_division)
   call register('body_windows', collect_body_windows)
+  call register('body_work', collect_body_work)
   call register('body_generate', collect_body_generate)
   call register('body_layers', collect_body_layers)
   call register('law_contract', collect_law_contract)

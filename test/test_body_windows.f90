@@ -4,14 +4,16 @@ module test_body_windows
   use omp_lib, only: omp_get_num_threads, omp_get_thread_num
   use pd_base_error, only: fault_type => error_type
   use pd_base_kinds, only: wp, i8
+  use pd_base_lanes, only: lanes
   use pd_body_body, only: body_type
   use pd_body_division, only: divide_space, division_type, take_part, work_of_points
   use pd_body_generate, only: generate_body
   use pd_body_layers, only: layer_count_text, layer_count_type
   use pd_body_survey, only: survey_points, survey_type
   use pd_body_windows, only: begin_work, make_part, work_of_windows
+  use pd_body_work, only: work_rule_type
   use pd_scene_content_types, only: scene_type
-  use pd_set_up_ranks, only: find_lowest, work_of_body
+  use pd_set_up_ranks, only: bounds_of_bodies, find_lowest, rule_of_work, work_of_body
   use bodies, only: expect, expect_true
   use test_ranks, only: fake_type, hub_type
   use test_scene_expect, only: expect_scene, line
@@ -29,14 +31,14 @@ module test_body_windows
   !> Scenes: full boxes; shapes; cuts by shapes, expressions and regions; layers at one side, behind
   !> bodies, at a round corner for which two layers reach; bodies of several spacings, of which one
   !> is cut away before the next cut; turned bodies; clouds, also beside lattices, and one whose
-  !> finest points are cut away before the next cut.
+  !> finest points are cut away before the next cut; contact.
   character(*), parameter :: box = "&body lower = 0 0 0 upper = 1.3 0.7 0.9 points = 13 7 9 /"// &
     & line
   character(*), parameter :: square = "&body name = 'square' lower = 0 0 upper = 1 1 points = "// &
     & "40 40 /"//line
   character(*), parameter :: cloud_file = 'build/test-windows-cloud.txt'
   character(*), parameter :: cloud = "&body file = '"//cloud_file//"' /"//line
-  character(700), parameter :: scenes(12) = [character(700) :: &
+  character(700), parameter :: scenes(14) = [character(700) :: &
     & bar//'&body lower = 0.3 upper = 1.4 points = 200 /'//line// &
     & "&boundary side = 'x_max' displacement_x = 0 /"//line, &
     & space//box//"&boundary side = 'z_min' displacement_z = 0 /"//line// &
@@ -69,7 +71,12 @@ module test_body_windows
     & "&boundary side = 'x_min' body = 'square' displacement_x = 0 /"//line, &
     & space//"&body name = 'block' lower = 0 0 0 upper = 1.3 0.7 0.9 points = 13 7 9 /"//line// &
     & cloud//"&keep where = 'y + z < 0.9' /"//line// &
-    & "&boundary side = 'z_min' body = 'block' displacement_z = 0 /"//line]
+    & "&boundary side = 'z_min' body = 'block' displacement_z = 0 /"//line, &
+    & plane//square//"&body name = 'block' lower = 0.2 1 upper = 0.7 1.3 points = 20 12 /"//line// &
+    & "&contact between = 'square', 'block' friction = 0.1 /"//line, &
+    & plane//square//"&body name = 'ball' shape = 'sphere' centre = 1.3 0.5 radius = 0.28 "// &
+    & "spacing = 0.02 /"//line//"&remove where = 'sin(40*x) > 0.6' /"//line// &
+    & "&contact between = 'all' normals = 'centres' distance = 0.03 /"//line]
 
 contains
 
@@ -85,7 +92,7 @@ contains
   !> Windows of one cell, of parts of rows, of rows, of planes, and of the whole body.
   subroutine test_parts(error)
     type(error_type), allocatable, intent(out) :: error
-    integer, parameter :: cells(5) = [1, 5, 50, 700, 1000000]
+    integer, parameter :: cells(5) = [1, 5, 48, 704, 1000000]
     type(scene_type) :: scene
     type(survey_type) :: survey
     type(fault_type), allocatable :: fault
@@ -97,11 +104,11 @@ contains
       if (allocated(error)) return
       do c = 1, size(cells)
         ! a window for each cell takes long
-        if (cells(c) < 50 .and. i > 3) cycle
+        if (cells(c) < lanes .and. i > 3) cycle
         call survey_points(scene, survey, fault, cells=cells(c))
         if (allocated(fault)) call test_failed(error, fault%message)
         if (allocated(error)) return
-        call compare(scene, survey, i, error)
+        call compare(scene, survey, i, mod(cells(c), lanes) == 0, error)
         if (allocated(error)) return
       end do
     end do
@@ -132,18 +139,21 @@ contains
   end subroutine remove_cloud
 
   !> All that a survey and the parts of ranks know of the points.
-  subroutine compare(scene, survey, number, error)
+  subroutine compare(scene, survey, number, whole_blocks, error)
     type(scene_type), intent(in), target :: scene
     type(survey_type), intent(in), target :: survey
     integer, intent(in) :: number
+    logical, intent(in) :: whole_blocks   !! windows have whole blocks of cells
     type(error_type), allocatable, intent(inout) :: error
     type(layer_count_type), allocatable :: counts(:)
     type(fault_type), allocatable :: fault
     type(body_type) :: whole, of_rank, part
     type(work_of_points) :: work
     type(work_of_windows) :: of_windows
+    type(work_rule_type) :: costs, same_costs
     type(division_type) :: division, same
     integer, allocatable :: owner(:), owner_of_part(:)
+    real(wp), dimension(3, size(scene%bodies)) :: lower, upper
     real(wp) :: delta
     integer :: ranks, r, g, blocks, l
 
@@ -170,14 +180,21 @@ contains
       call expect_true(error, all(abs(survey%lowest(:whole%dim, g) - whole%grids(g)%lowest) &
         & <= 0.0_wp), 'the lowest point of a grid')
     end do
+    call bounds_of_bodies(whole, lower, upper)
+    call rule_of_work(scene, delta, maxval(whole%spacing), lower, upper, costs)
+    call rule_of_work(scene, delta, maxval(whole%spacing), survey%lower, survey%upper, same_costs)
+    call expect_true(error, size(costs%zones) == size(same_costs%zones), 'zones of contact')
+    call expect_true(error, size(costs%zones) > 0 .eqv. size(scene%contacts) > 0, 'no zone')
+    if (allocated(error)) return
     do ranks = 1, 6
       blocks = merge(8, 1, ranks == 2)
-      call work_of_body(whole, blocks, work)
+      call work_of_body(whole, blocks, work, costs)
       call divide_space(work, ranks, division)
-      call begin_work(scene, survey, blocks, of_windows)
+      call begin_work(scene, survey, same_costs, blocks, of_windows)
       call divide_space(of_windows, ranks, same)
-      call expect_true(error, all(same%axis == division%axis) .and. all(same%half &
-        & == division%half) .and. all(abs(same%at - division%at) <= 0.0_wp) .and. &
+      ! windows that cut blocks of cells make more of them
+      if (whole_blocks) call expect_true(error, all(same%axis == division%axis) .and. &
+        & all(same%half == division%half) .and. all(abs(same%at - division%at) <= 0.0_wp) .and. &
         & all(abs(same%work - division%work) <= 0.0_wp), 'the division')
       if (allocated(error)) return
       do r = 0, ranks - 1
@@ -223,6 +240,7 @@ contains
     type(hub_type), target :: hub
     type(fault_type), allocatable :: fault
     type(work_of_windows) :: work
+    type(work_rule_type) :: costs
     type(division_type) :: division(ranks), expected
     type(body_type) :: part(ranks), of_rank
     integer, allocatable :: owner(:)
@@ -237,18 +255,20 @@ contains
       allocate (hub%of_rank(ranks))
       enough = .false.
       failed = .false.
-      !$omp parallel num_threads(ranks) default(none) private(r, fault, work, owner) &
+      !$omp parallel num_threads(ranks) default(none) private(r, fault, work, costs, owner) &
       !$omp shared(scene, survey, fake, hub, division, part, enough, failed)
       if (omp_get_num_threads() == ranks) then
         r = omp_get_thread_num() + 1
         if (r == 1) enough = .true.
         fake(r)%rank = r
         fake(r)%hub => hub
-        call survey_points(scene, survey(r), fault, fake(r), r - 1, ranks, 37)
+        call survey_points(scene, survey(r), fault, fake(r), r - 1, ranks, 40)
         if (allocated(fault)) then
           failed = .true.
         else
-          call begin_work(scene, survey(r), 1, work)
+          call rule_of_work(scene, survey(r)%none%delta, survey(r)%none%largest_spacing, &
+            & survey(r)%lower, survey(r)%upper, costs)
+          call begin_work(scene, survey(r), costs, 1, work)
           call divide_space(work, ranks, division(r))
           call make_part(scene, survey(r), division(r), r - 1, survey(r)%none%delta, part(r), owner)
         end if
@@ -258,7 +278,9 @@ contains
       call expect_true(error, .not. failed, 'the points cannot be counted')
       call survey_points(scene, alone, fault)
       if (allocated(error) .or. allocated(fault)) return
-      call begin_work(scene, alone, 1, work)
+      call rule_of_work(scene, alone%none%delta, alone%none%largest_spacing, alone%lower, &
+        & alone%upper, costs)
+      call begin_work(scene, alone, costs, 1, work)
       call divide_space(work, ranks, expected)
       do r = 1, ranks
         call expect_true(error, all(abs(division(r)%at - expected%at) <= 0.0_wp), 'cuts')

@@ -8,7 +8,9 @@ module test_family_slabs
   use pd_body_division, only: divide_space, division_type
   use pd_body_survey, only: survey_points, survey_type
   use pd_body_windows, only: begin_work, make_part, work_of_windows
+  use pd_body_work, only: work_rule_type
   use pd_set_up_prepare, only: set_up_type
+  use pd_set_up_ranks, only: rule_of_work
   use pd_family_family, only: allocate_bonds, bonds_type
   use pd_family_lattice, only: grid_at, lattice_family_type, new_lattice_family
   use pd_family_volume, only: reach, volume_rule_number, volume_rule_type
@@ -131,6 +133,7 @@ contains
     type(scene_type), target :: scene
     type(survey_type), target :: survey
     type(work_of_windows) :: work
+    type(work_rule_type) :: costs
     type(division_type) :: division
     type(body_type) :: body
     type(lattice_family_type) :: family
@@ -147,10 +150,11 @@ contains
       call survey_points(scene, survey, fault)
       if (allocated(fault)) call test_failed(error, fault%message)
       if (allocated(error)) return
+      call rule_of_work(scene, survey%none%delta, spacing, survey%lower, survey%upper, costs)
       rule%delta = survey%none%delta
       rule%kind = volume_rule_number('linear')
       do fixed = 0, 1
-        call begin_work(scene, survey, merge(lanes, 1, fixed == 1), work)
+        call begin_work(scene, survey, costs, merge(lanes, 1, fixed == 1), work)
         call divide_space(work, ranks, division)
         do r = 0, ranks - 1
           call make_part(scene, survey, division, r, reach(rule, spacing, 3), body, owner)

@@ -90,8 +90,8 @@ contains
       call tell(summary_before(scene, system, plan, measures, set_up%cut, &
         & set_up%warnings, set_up%notes, set_up%team%threads()))
       call tell_lines(overview(scene, system, .not. plan%relaxes))
-      if (options%ranks > 0) call tell_lines(table_of_ranks(system%body, system%family, &
-        & options%ranks))
+      if (options%ranks > 0) call tell_lines(table_of_ranks(scene, system%body, &
+        & system%family, options%ranks))
       call estimate(scene, fields_of(options), system, plan, &
         & schedule_of(scene, plan, system%family%n_bonds), set_up%timer%total(), times)
       call tell_lines(times)

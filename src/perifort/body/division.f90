@@ -27,7 +27,7 @@ module pd_body_division
     real(wp), allocatable :: lower(:, :)     !! (dim, parts) [m]
     real(wp), allocatable :: upper(:, :)     !! (dim, parts) [m]
     integer, allocatable :: part_of(:)       !! (0:ranks - 1) the part of each rank
-    real(wp), allocatable :: work(:)         !! (0:ranks - 1) of each rank, in units of the points'
+    real(wp), allocatable :: work(:)         !! (0:ranks - 1) of each rank
   end type division_type
 
   !> Where the work is.

@@ -54,8 +54,8 @@ module pd_body_survey
     type(body_type) :: none                    !! a body without points: its grids and lattices, its
                                                !! horizon and spacings, and how many points there
                                                !! are; `lowest` of grids is not set
-    real(wp) :: lower(3) = huge(1.0_wp)        !! the least and the largest positions [m]
-    real(wp) :: upper(3) = -huge(1.0_wp)
+    real(wp), allocatable :: lower(:, :)       !! (3, bodies) the least and the largest positions
+    real(wp), allocatable :: upper(:, :)       !! of each body, layers included [m]
     real(wp), allocatable :: lowest(:, :)      !! (3, grids) the same along the axes of each grid,
     real(wp), allocatable :: highest(:, :)     !! of its points [m]
     type(layer_count_type), allocatable :: counts(:)  !! (layers) what their columns came to
@@ -101,6 +101,7 @@ contains
     if (scene%header%dimension == 2) survey%depth = scene%header%thickness
     if (scene%header%dimension == 1) survey%depth = scene%header%area
     allocate (survey%windows(0), survey%clouds(size(scene%bodies)))
+    allocate (survey%lower(3, size(scene%bodies)), survey%upper(3, size(scene%bodies)))
     associate (none => survey%none)
       call allocate_points(none, scene%header%dimension, 0)
       deallocate (none%lattices)
@@ -384,14 +385,15 @@ contains
     type(survey_type), intent(inout) :: survey
     integer, intent(in) :: w
     type(body_type), intent(in) :: points
-    integer :: c, g
+    integer :: b, c, g
 
     survey%windows(w)%n = points%n_points
     if (points%n_points == 0) return
-    g = survey%grid(survey%windows(w)%body)
+    b = survey%windows(w)%body
+    g = survey%grid(b)
     do c = 1, points%dim
-      survey%lower(c) = min(survey%lower(c), minval(points%x(:, c)))
-      survey%upper(c) = max(survey%upper(c), maxval(points%x(:, c)))
+      survey%lower(c, b) = min(survey%lower(c, b), minval(points%x(:, c)))
+      survey%upper(c, b) = max(survey%upper(c, b), maxval(points%x(:, c)))
       if (g == 0) cycle
       associate (along => coordinate(survey%none%grids(g), points%x, c))
         survey%lowest(c, g) = min(survey%lowest(c, g), minval(along))
@@ -442,18 +444,25 @@ contains
   !> How far the points of all ranks reach.
   subroutine share_bounds(survey)
     type(survey_type), intent(inout) :: survey
-    real(wp) :: values(6 + 2*size(survey%lowest))
-    integer :: n
 
     if (.not. associated(survey%together)) return
-    n = size(survey%lowest)
-    values = [-survey%lower, survey%upper, reshape(-survey%lowest, [n]), &
-      & reshape(survey%highest, [n])]
-    call survey%together%take_largest(values)
-    survey%lower = -values(:3)
-    survey%upper = values(4:6)
-    survey%lowest = reshape(-values(7:6 + n), shape(survey%lowest))
-    survey%highest = reshape(values(7 + n:), shape(survey%highest))
+    call share_least(survey%lower, survey%upper)
+    call share_least(survey%lowest, survey%highest)
+
+  contains
+
+    !> The least and the largest values of all ranks.
+    subroutine share_least(least, largest)
+      real(wp), intent(inout) :: least(:, :), largest(:, :)
+      real(wp) :: values(2*size(least))
+      integer :: n
+
+      n = size(least)
+      values = [-reshape(least, [n]), reshape(largest, [n])]
+      call survey%together%take_largest(values)
+      least = reshape(-values(:n), shape(least))
+      largest = reshape(values(n + 1:), shape(largest))
+    end subroutine share_least
   end subroutine share_bounds
 
   !> The outermost cells that any rank has seen of the sides of layers.
@@ -500,6 +509,7 @@ contains
     if (survey%windows(w)%layer > 0) then
       call layer_cells(scene, survey%none%dim, survey%none%grids, survey%layers, &
         & survey%windows(w)%layer, survey%windows(w)%side, first, last, survey%depth, points, n)
+      points%lattices = survey%none%lattices
       return
     end if
     if (survey%grid(b) == 0_i2) then

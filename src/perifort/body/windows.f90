@@ -8,15 +8,17 @@ module pd_body_windows
   use pd_body_clouds, only: points_of_rows
   use pd_body_division, only: box_of, division_type, owner_of, take_part, work_of_points, work_type
   use pd_body_survey, only: make_points, survey_type, window_type
+  use pd_body_work, only: work_of, work_rule_type
   use pd_scene_content_types, only: scene_type
   implicit none (type, external)
   private
   public :: work_of_windows, begin_work, make_part
 
-  !> The work of all points, each with a weight of 1.
+  !> The work of all points.
   type, extends(work_type) :: work_of_windows
     type(scene_type), pointer, private :: scene => null()
     type(survey_type), pointer, private :: survey => null()
+    type(work_rule_type), private :: rule
   contains
     procedure :: add_to => add_windows
   end type work_of_windows
@@ -32,9 +34,10 @@ module pd_body_windows
 contains
 
   !> The work of the points that have been counted.
-  subroutine begin_work(scene, survey, blocks, work)
+  subroutine begin_work(scene, survey, rule, blocks, work)
     type(scene_type), intent(in), target :: scene    !! must stay where it is as long as the work,
     type(survey_type), intent(in), target :: survey  !! and so must what is known of its points
+    type(work_rule_type), intent(in) :: rule         !! what points cost
     integer, intent(in) :: blocks                    !! cuts across x lie between so many points of
                                                      !! a row; 1: between any
     type(work_of_windows), intent(out) :: work       !! ready for `divide_space`
@@ -42,11 +45,12 @@ contains
 
     work%scene => scene
     work%survey => survey
+    work%rule = rule
     work%dim = survey%none%dim
     associate (spacing => survey%none%least_spacing)
       do c = 1, work%dim
-        work%lower(c) = survey%lower(c) - spacing/2
-        work%upper(c) = survey%upper(c) + spacing/2
+        work%lower(c) = minval(survey%lower(c, :)) - spacing/2
+        work%upper(c) = maxval(survey%upper(c, :)) + spacing/2
         work%layer(c) = spacing
       end do
       work%layer(1) = blocks*spacing
@@ -72,9 +76,9 @@ contains
       call make_points(self%scene, self%survey, w, self%survey%windows(w)%first, &
         & self%survey%windows(w)%last, points, error)
       if (allocated(error)) call internal_fault('points that could be counted')
+      work%weight = work_of(self%rule, points, points%slot)
       call move_alloc(points%x, work%x)
       if (allocated(work%part)) deallocate (work%part)
-      work%weight = spread(1.0_wp, 1, size(work%x, 1))
       call work%add_to(division, first, start, axis, histogram)
     end do
     if (associated(self%survey%together)) call self%survey%together%add_all(histogram)

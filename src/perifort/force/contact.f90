@@ -27,7 +27,7 @@ module pd_force_contact
     & renew_vicinity, sum_vicinity, vicinity_type
   implicit none (type, external)
   private
-  public :: contact_type, new_contact
+  public :: contact_type, new_contact, skin_between
 
   real(wp), parameter :: skin_between = 0.5_wp   !! of the smaller spacing, of bodies apart
   real(wp), parameter :: skin_within = 0.09_wp   !! where bonded neighbours would be candidates

@@ -4,9 +4,11 @@ module pd_output_report_ranks
   use pd_base_text, only: line => labelled_line, to_text, with_unit
   use pd_body_body, only: body_type, gather
   use pd_body_division, only: box_of, divide_space, division_type, owner_of, work_of_points
+  use pd_body_work, only: work_rule_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_volume, only: reach
-  use pd_set_up_ranks, only: work_of_body
+  use pd_scene_content_types, only: scene_type
+  use pd_set_up_ranks, only: bounds_of_bodies, rule_of_work, work_of_body
   implicit none (type, external)
   private
   public :: table_of_ranks
@@ -23,8 +25,9 @@ module pd_output_report_ranks
 contains
 
   !> The tree of cuts with the points, bonds and halo of each rank, and how well they are balanced:
-  !> the largest work over the mean one.
-  function table_of_ranks(body, family, ranks) result(text)
+  !> the largest over the mean of the work by which space is cut, of bonds and of points.
+  function table_of_ranks(scene, body, family, ranks) result(text)
+    type(scene_type), intent(in) :: scene      !! the scene of the body
     type(body_type), intent(in) :: body        !! with all points, arranged in slots
     class(family_type), intent(in) :: family   !! of the body
     integer, intent(in) :: ranks               !! how many there would be
@@ -32,19 +35,29 @@ contains
     type(work_of_points) :: work
     type(division_type) :: division
     type(share_type), allocatable :: shares(:)
-    real(wp) :: mean
+    type(work_rule_type) :: rule
+    real(wp), dimension(3, size(scene%bodies)) :: lower, upper
 
-    call work_of_body(body, 1, work)
+    call bounds_of_bodies(body, lower, upper)
+    call rule_of_work(scene, body%delta, body%largest_spacing, lower, upper, rule)
+    call work_of_body(body, 1, work, rule)
     call divide_space(work, ranks, division)
     call find_shares(body, family, division, shares)
-    mean = real(sum(shares%bonds), wp)/ranks
-    text = line('ranks', to_text(ranks)//': the largest has '//to_text(maxval(shares%bonds) &
-      & /max(mean, 1.0_wp), 4)//' times the mean number of bonds, '//to_text(maxval(shares%points) &
-      & /(real(sum(shares%points), wp)/ranks), 4)//' times that of points')
+    text = line('ranks', to_text(ranks)//': the largest has '// &
+      & over_mean(division%work)//' times the mean of the predicted work, '// &
+      & over_mean(real(shares%bonds, wp))//' times that of bonds, '// &
+      & over_mean(real(shares%points, wp))//' times that of points')
     text = text//line('', 'halos are '//to_text(100*real(sum(shares%halo), wp) &
       & /max(1_i8, sum(shares%points)), 3)//' % of the points')
     if (ranks <= most_lines) call add_part(division, 1, shares, 1, text)
   end function table_of_ranks
+
+  !> The largest of some numbers over their mean.
+  pure function over_mean(values) result(text)
+    real(wp), intent(in) :: values(:)
+    character(:), allocatable :: text
+    text = to_text(maxval(values)*size(values)/max(sum(values), tiny(1.0_wp)), 4)
+  end function over_mean
 
   !> Points, bonds and halos of all ranks.
   subroutine find_shares(body, family, division, shares)
