@@ -1,9 +1,9 @@
 !> The linear conditions on the weights of bonds, and sums of them (doc/theory.md, 4): for each
 !> class of points a few rows, for each group of bonds an unknown. Where surface areas are unknowns,
 !> too, Gb, Gd and areas have one set of conditions. The coefficients of a bond are powers of its
-!> direction, so they are computed where they are needed.
+!> direction: where they would take too much memory they are computed whenever they are needed.
 module pd_set_up_consistent_conditions
-  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_kinds, only: wp, i1, i4, i8
   use pd_body_body, only: body_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_force_model, only: bond_factors_of, model_type
@@ -15,6 +15,7 @@ module pd_set_up_consistent_conditions
     & spread_over, block_of
 
   integer, parameter :: most_rows = 19  !! of a class
+  integer(i8), parameter :: most_stored = 25000000_i8  !! coefficients (200 MB)
 
   !> sum over bonds of weight x coefficients = `right`. The unknowns are weights Gb, then weights
   !> Gd, then components of areas. The rows of the stretch, n n n of the bonds, come before those
@@ -38,6 +39,9 @@ module pd_set_up_consistent_conditions
     integer(i8), allocatable :: first(:)    !! (unknowns + 1) first entry of each unknown
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
+    real(wp), allocatable :: stored(:)      !! coefficients bond by bond, if there are not too many
+    integer(i8), allocatable :: place(:)    !! (bonds + 1) of a bond's first one
+    integer(i1), allocatable :: low(:)      !! (bonds) its row
     ! where each class is a point, each unknown a bond with two ends or a component of an area, and
     ! there are rows of the dilatation:
     real(wp), allocatable :: x(:, :)        !! (dim, points) positions [m]
@@ -296,7 +300,33 @@ contains
         next(u) = next(u) + 1
       end do
     end do
+    call store(conditions)
   end subroutine turn
+
+  !> Keep the coefficients, if there is room.
+  subroutine store(conditions)
+    type(conditions_type), intent(inout) :: conditions
+    real(wp) :: values(most_rows)
+    integer(i8) :: e, n
+    integer :: low, high, pass
+
+    allocate (conditions%place(size(conditions%unknown, kind=i8) + 1))
+    do pass = 1, 2
+      n = 1_i8
+      do e = 1, size(conditions%unknown, kind=i8)
+        conditions%place(e) = n
+        call coefficients(conditions, e, values, low, high)
+        if (pass == 2) then
+          conditions%stored(n:n + high - low) = values(low:high)
+          conditions%low(e) = int(low, i1)
+        end if
+        n = n + high - low + 1
+      end do
+      conditions%place(e) = n
+      if (n > most_stored) exit
+      if (pass == 1) allocate (conditions%stored(n - 1), conditions%low(e - 1))
+    end do
+  end subroutine store
 
   !> The coefficients of bond `e`: those from row `low` to row `high` are set, others are 0.
   pure subroutine coefficients(conditions, e, values, low, high)
@@ -370,16 +400,26 @@ contains
     real(wp), intent(in) :: y(:)           !! (unknowns) [-]
     real(wp), intent(inout) :: sums(:, :)  !! (rows, classes) set [-]
     real(wp) :: values(most_rows), sum(most_rows)
-    integer(i8) :: e
-    integer :: c, low, high
+    integer(i8) :: e, p
+    integer :: c, low, high, row
+    logical :: kept
 
-    !$omp parallel do schedule(dynamic, 64) default(none) shared(conditions, y, sums) &
-    !$omp private(values, sum, e, c, low, high)
+    kept = allocated(conditions%stored)
+    !$omp parallel do schedule(dynamic, 64) default(none) shared(conditions, y, sums, kept) &
+    !$omp private(values, sum, e, p, c, low, high, row)
     do c = 1, conditions%classes
       sum = 0.0_wp
       do e = conditions%start(c), conditions%start(c + 1) - 1
-        call coefficients(conditions, e, values, low, high)
-        sum(low:high) = sum(low:high) + y(conditions%unknown(e))*values(low:high)
+        if (kept) then
+          row = conditions%low(e)
+          do p = conditions%place(e), conditions%place(e + 1) - 1
+            sum(row) = sum(row) + y(conditions%unknown(e))*conditions%stored(p)
+            row = row + 1
+          end do
+        else
+          call coefficients(conditions, e, values, low, high)
+          sum(low:high) = sum(low:high) + y(conditions%unknown(e))*values(low:high)
+        end if
       end do
       sums(:, c) = sum(:conditions%rows)
     end do
@@ -390,21 +430,31 @@ contains
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: multipliers(:, :)  !! (rows, classes) [-]
     real(wp), intent(inout) :: y(:)            !! (unknowns) set [-]
-    real(wp) :: values(most_rows)
-    integer(i8) :: i
-    integer :: u, low, high
+    real(wp) :: values(most_rows), sum
+    integer(i8) :: i, p
+    integer :: u, low, high, row
+    logical :: kept
 
-    !$omp parallel do schedule(dynamic, 512) default(none) shared(conditions, multipliers, y) &
-    !$omp private(values, i, u, low, high)
+    kept = allocated(conditions%stored)
+    !$omp parallel do schedule(dynamic, 512) default(none) &
+    !$omp shared(conditions, multipliers, y, kept) private(values, sum, i, p, u, low, high, row)
     do u = 1, conditions%unknowns
-      y(u) = 0.0_wp
+      sum = 0.0_wp
       do i = conditions%first(u), conditions%first(u + 1) - 1
         associate (e => conditions%bond(i))
-          call coefficients(conditions, e, values, low, high)
-          y(u) = y(u) + dot_product(values(low:high), &
-            & multipliers(low:high, conditions%class(e)))
+          if (kept) then
+            row = conditions%low(e)
+            do p = conditions%place(e), conditions%place(e + 1) - 1
+              sum = sum + conditions%stored(p)*multipliers(row, conditions%class(e))
+              row = row + 1
+            end do
+          else
+            call coefficients(conditions, e, values, low, high)
+            sum = sum + dot_product(values(low:high), multipliers(low:high, conditions%class(e)))
+          end if
         end associate
       end do
+      y(u) = sum
     end do
   end subroutine spread_over
 

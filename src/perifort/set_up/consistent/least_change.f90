@@ -16,8 +16,10 @@ module pd_set_up_consistent_least_change
 
   real(wp), parameter :: unbounded = -1.0e30_wp  !! the bound that is none
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
-  real(wp), parameter :: uneven = 1.0e-10_wp        !! of those of points that all differ [-]
-  real(wp), parameter :: rounding = 5.0e-10_wp      !! of those that more steps do not lower [-]
+  real(wp), parameter :: uneven = 1.0e-10_wp
+    !! of those of points that all differ, and of others that more steps do not lower [-]
+  real(wp), parameter :: rounding = 5.0e-10_wp
+    !! of those of points that all differ that more steps do not lower [-]
   real(wp), parameter :: much = 1.0e3_wp            !! growth of an error that is rounding
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
@@ -31,9 +33,9 @@ module pd_set_up_consistent_least_change
 
 contains
 
-  !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12, or where each bond has a
-  !> weight of its own to 1e-10 (5e-10 if rounding leaves that); otherwise no weights above the
-  !> bound do, or none were found.
+  !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12 (1e-10 if rounding leaves
+  !> that), or where each bond has a weight of its own to 1e-10 (5e-10); otherwise no weights above
+  !> the bound do, or none were found.
   subroutine least_change(conditions, low, G, residual, iterations, found)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: low
@@ -74,7 +76,7 @@ contains
       if (newton > patience) then
         if (residual > 0.5_wp*history(newton - patience)) then
           ! thousands of points that all differ leave more rounding
-          found = size(levels) > 0 .and. residual <= rounding
+          found = residual <= merge(rounding, uneven, size(levels) > 0)
           return
         end if
       end if

@@ -375,54 +375,103 @@ contains
     c = reshape(level%scale*all_of_it, shape(c))
   end subroutine solve
 
-  !> The row of the conditions with the product of two components.
-  pure integer function row_of(dim, one, other) result(row)
-    integer, intent(in) :: dim, one, other
-    integer :: x, y
-    x = min(one, other)
-    y = max(one, other)
-    row = (x - 1)*dim - (x - 1)*(x - 2)/2 + y - x + 1
-  end function row_of
+  !> The rows of the conditions with the products of two components, behind those of the stretch.
+  pure function rows_of(dim) result(rows)
+    integer, intent(in) :: dim
+    integer :: rows(3, 3)
+    integer :: x, y, row
 
-  !> The sums of a residual over splines: for each spline by its points cell by cell, so that they
-  !> have the same bits on any number of threads.
+    rows = 0
+    row = 0
+    do x = 1, dim
+      do y = x, dim
+        row = row + 1
+        rows(x, y) = row
+        rows(y, x) = row
+      end do
+    end do
+  end function rows_of
+
+  !> The sums of a residual over splines: cell by cell over its points, then over the cells that a
+  !> spline reaches, so that they have the same bits on any number of threads.
   subroutine gather(conditions, level, r, c)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
     real(wp), intent(in) :: r(:, :)
     real(wp), intent(inout) :: c(:, :)  !! (dim, splines) set
-    real(wp) :: total(3), value, gradient(3)
-    integer(i4), allocatable :: points(:)
-    integer :: rows(3, 3), number, node(3), i, k, x, y, dim, before
+    real(wp), allocatable :: of_cell(:, :, :)
+    real(wp) :: shifts(3), strains(3, 3), value(64), gradient(3, 64)
+    integer :: rows(3, 3), number, node(3), cell(3), i, k, l, m, n, x, dim, before
 
     dim = level%dim
+    n = 4**dim
     before = conditions%before
-    rows = 0
-    do x = 1, dim
-      do y = 1, dim
-        rows(x, y) = row_of(dim, x, y)
-      end do
-    end do
-    !$omp parallel do schedule(dynamic, 8) default(none) &
-    !$omp shared(conditions, level, r, c, rows, dim, before) &
-    !$omp private(total, value, gradient, points, number, node, i, k, x, y)
-    do number = 1, product(level%nodes)
-      node = node_at(level, number)
-      total = 0.0_wp
-      call points_under(level, node, points)
-      do i = 1, size(points)
-        k = int(points(i))
-        call spline_at(level, node, k, value, gradient)
+    rows = rows_of(dim)
+    allocate (of_cell(dim, n, product(level%cells)))
+    !$omp parallel default(none) shared(conditions, level, r, c, of_cell, rows, dim, before, n) &
+    !$omp private(shifts, strains, value, gradient, number, node, cell, i, k, l, m, x)
+    !$omp do schedule(dynamic, 8)
+    do number = 1, product(level%cells)
+      of_cell(:, :, number) = 0.0_wp
+      do i = int(level%start(number)), int(level%start(number + 1)) - 1
+        k = int(level%order(i))
+        call splines_at(level, k, value, gradient)
+        shifts(:dim) = conditions%shift(k)*r(before + dim*(dim + 1)/2 + 1:before &
+          & + dim*(dim + 1)/2 + dim, k)
         do x = 1, dim
-          total(x) = total(x) + conditions%shift(k)*value*r(before + dim*(dim + 1)/2 + x, k)
-          do y = 1, dim
-            total(x) = total(x) + conditions%strain(k)*gradient(y)*r(before + rows(x, y), k)
+          strains(:dim, x) = conditions%strain(k)*r(before + rows(:dim, x), k)
+        end do
+        do m = 1, n
+          do x = 1, dim
+            of_cell(x, m, number) = of_cell(x, m, number) + shifts(x)*value(m) &
+              & + sum(strains(:dim, x)*gradient(:dim, m))
           end do
         end do
       end do
-      c(:, number) = total(:dim)
     end do
+    !$omp do schedule(dynamic, 64)
+    do number = 1, product(level%nodes)
+      node = node_at(level, number)
+      c(:, number) = 0.0_wp
+      do m = 1, n
+        l = m - 1
+        cell = node - [mod(l, 4), mod(l/4, 4), l/16]
+        if (any(cell < 0) .or. any(cell >= level%cells)) cycle
+        c(:, number) = c(:, number) + of_cell(:, m, cell_number(level, cell))
+      end do
+    end do
+    !$omp end parallel
   end subroutine gather
+
+  !> All splines that reach point k, x fastest, and their gradients.
+  pure subroutine splines_at(level, k, value, gradient)
+    type(level_type), intent(in) :: level
+    integer, intent(in) :: k                  !! point
+    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
+    real(wp), intent(inout) :: gradient(:, :) !! (3, 4**dim) dim of them are set [1/m]
+    real(wp) :: v, s
+    integer :: m, n, i, j, d
+
+    associate (of => level%value(:, :, k), slope => level%slope(:, :, k))
+      value(:4) = of(:, 1)
+      gradient(1, :4) = slope(:, 1)
+      n = 4
+      do d = 2, level%dim
+        ! the first last, since the others are made of what it replaces
+        do i = 4, 1, -1
+          v = of(i, d)
+          s = slope(i, d)
+          do m = 1, n
+            j = (i - 1)*n + m
+            gradient(d, j) = value(m)*s
+            gradient(:d - 1, j) = gradient(:d - 1, m)*v
+            value(j) = value(m)*v
+          end do
+        end do
+        n = 4*n
+      end do
+    end associate
+  end subroutine splines_at
 
   !> The multipliers of splines, added to those of the points.
   subroutine spread_out(conditions, level, c, w)
@@ -430,30 +479,36 @@ contains
     type(level_type), intent(in) :: level
     real(wp), intent(in) :: c(:, :)     !! (dim, splines)
     real(wp), intent(inout) :: w(:, :)  !! (rows, points), added to
-    real(wp) :: value, gradient(3)
-    integer :: i, j, l, k, x, y, number, node(3), dim
+    real(wp) :: shifts(3), strains(3, 3), value(64), gradient(3, 64)
+    integer :: rows(3, 3), k, x, y, m, number, node(3), dim, l, before
 
     dim = level%dim
-    !$omp parallel do schedule(static) default(none) shared(conditions, level, c, w, dim) &
-    !$omp private(value, gradient, i, j, l, k, x, y, number, node)
+    before = conditions%before
+    rows = rows_of(dim)
+    !$omp parallel do schedule(static) default(none) &
+    !$omp shared(conditions, level, c, w, dim, rows, before) &
+    !$omp private(shifts, strains, value, gradient, k, x, y, m, number, node, l)
     do k = 1, conditions%classes
-      do l = 0, merge(3, 0, dim > 2)
-        do j = 0, merge(3, 0, dim > 1)
-          do i = 0, 3
-            node = level%cell(:, k) + [i, j, l]
-            number = 1 + node(1) + level%nodes(1)*(node(2) + level%nodes(2)*node(3))
-            call spline_at(level, node, k, value, gradient)
-            do x = 1, dim
-              associate (row => conditions%before + dim*(dim + 1)/2 + x)
-                w(row, k) = w(row, k) + conditions%shift(k)*value*c(x, number)
-              end associate
-              do y = 1, dim
-                associate (row => conditions%before + row_of(dim, x, y))
-                  w(row, k) = w(row, k) + conditions%strain(k)*gradient(y)*c(x, number)
-                end associate
-              end do
-            end do
-          end do
+      call splines_at(level, k, value, gradient)
+      shifts = 0.0_wp
+      strains = 0.0_wp
+      do m = 1, 4**dim
+        l = m - 1
+        node = level%cell(:, k) + [mod(l, 4), mod(l/4, 4), l/16]
+        number = 1 + node(1) + level%nodes(1)*(node(2) + level%nodes(2)*node(3))
+        do x = 1, dim
+          shifts(x) = shifts(x) + value(m)*c(x, number)
+          strains(:dim, x) = strains(:dim, x) + gradient(:dim, m)*c(x, number)
+        end do
+      end do
+      do x = 1, dim
+        associate (row => before + dim*(dim + 1)/2 + x)
+          w(row, k) = w(row, k) + conditions%shift(k)*shifts(x)
+        end associate
+        do y = 1, dim
+          associate (row => before + rows(x, y))
+            w(row, k) = w(row, k) + conditions%strain(k)*strains(y, x)
+          end associate
         end do
       end do
     end do
