@@ -69,6 +69,14 @@ CLOUD = """
 &time TIME /
 &output every = 50, fields = 'displacement', 'damage', 'stress', precision = 'double' /
 """
+LONG_CLOUD = """
+&scene dimension = 3 /
+&body file = 'cloud_{rows}.txt' /
+&material model = 'bond_based', youngs_modulus = 1.0e9, density = 1000.0 /
+&horizon surface_correction = 'none' /
+&time steps = 2 /
+&output every = 2, fields = 'displacement' /
+"""
 PULLED = {"LEFT": "velocity_x = -10.0", "RIGHT": "velocity_x = 10.0", "TIME": "steps = 150"}
 CLOUDS = [
     ("small strain", PULLED, ()),
@@ -548,23 +556,43 @@ def check_memory(case):
     """The most memory of all ranks together is little more than that of one rank alone. Were all
     points made on each rank, it would be 3.4 times as much.
     """
-    used = {}
-    for points in (30, 900):
-        path = case.out / f"bar_{points}.nml"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(BAR.format(points=points, length=points / 30), encoding="utf-8")
-        _, process = case.start(path, 1)
-        _, status, usage = os.wait4(process.pid, 0)
-        case.equal(f"bar of {points} rows: status", status, 0)
-        used[points, 1] = usage.ru_maxrss * 1024.0
-        _, process = case.start(path, MEMORY_RANKS, quiet=False)
-        text = process.communicate()[0]
-        found = re.search(r"peak memory .* of all ([\d.]+) ([kMG]?)B", text)
-        used[points, MEMORY_RANKS] = float(found.group(1)) * scaling.UNITS[found.group(2)] \
-            if found else np.inf
-    one, all_ranks = (used[900, n] - used[30, n] for n in (1, MEMORY_RANKS))
-    case.below(f"{MEMORY_RANKS} ranks: memory of the points, of that on one rank", all_ranks / one,
-               1.6)
+    for what, write in (("a bar", write_bar), ("a cloud", write_long_cloud)):
+        used = {}
+        for rows in (30, 900):
+            path = write(case, rows)
+            _, process = case.start(path, 1)
+            _, status, usage = os.wait4(process.pid, 0)
+            case.equal(f"{what} of {rows} rows: status", status, 0)
+            used[rows, 1] = usage.ru_maxrss * 1024.0
+            _, process = case.start(path, MEMORY_RANKS, quiet=False)
+            text = process.communicate()[0]
+            found = re.search(r"peak memory .* of all ([\d.]+) ([kMG]?)B", text)
+            used[rows, MEMORY_RANKS] = float(found.group(1)) * scaling.UNITS[found.group(2)] \
+                if found else np.inf
+        one, all_ranks = (used[900, n] - used[30, n] for n in (1, MEMORY_RANKS))
+        case.below(f"{what} on {MEMORY_RANKS} ranks: memory of the points, of that on one rank",
+                   all_ranks / one, 1.6)
+
+
+def write_bar(case, rows):
+    """A bar of so many rows of points along its length."""
+    path = case.out / f"bar_{rows}.nml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(BAR.format(points=rows, length=rows / 30), encoding="utf-8")
+    return path
+
+
+def write_long_cloud(case, rows):
+    """A bar of jittered points, 20 times as many rows, in a file that has them in any order."""
+    chance = np.random.default_rng(3)
+    x = 0.001 * np.stack(np.meshgrid(*(np.arange(n) for n in (20 * rows, 5, 5)))).reshape(3, -1)
+    x += 0.0001 * chance.random(x.shape)
+    table = np.column_stack([chance.permutation(x.T), np.full(x.shape[1], 1.0e-9)])
+    case.out.mkdir(parents=True, exist_ok=True)
+    np.savetxt(case.out / f"cloud_{rows}.txt", table, fmt="%.9g")
+    path = case.out / f"cloud_{rows}.nml"
+    path.write_text(LONG_CLOUD.format(rows=rows), encoding="utf-8")
+    return path
 
 
 def wait_for(path, seconds=60):
