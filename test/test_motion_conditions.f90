@@ -1,13 +1,14 @@
 !> Imposed motion, loads and initial states: exact values at any time.
 module test_motion_conditions
   use pd_base_kinds, only: wp
+  use pd_base_text, only: to_text
   use pd_base_error, only: fault_type => error_type
   use pd_set_up_prepare, only: set_up_type
   use pd_motion_curve, only: curve_type, constant_curve, ramp, table_curve
   use pd_motion_system, only: add_loads, evaluate
   use pd_scene_content_types, only: scene_type
   use comparisons, only: expect_close, max_abs
-  use testdrive, only: error_type, new_unittest, unittest_type
+  use testdrive, only: error_type, new_unittest, test_failed, unittest_type
   use bodies, only: prepare_run, at_point, box_scene, expect, expect_true, ready
   implicit none (type, external)
   private
@@ -25,6 +26,7 @@ contains
       & new_unittest('loads have the prescribed sum', test_loads), &
       & new_unittest('initial gradients and regions', test_initial), &
       & new_unittest('initial states from a file are in the order of points', test_file), &
+      & new_unittest('a file of initial states in pieces', test_long_file), &
       & new_unittest('uniform heating: free expansion has no force', test_heating), &
       & new_unittest('plane strain expands by 1 + nu', test_plane_strain)]
   end subroutine collect_motion_conditions
@@ -250,6 +252,55 @@ contains
     open (newunit=unit, file='test-initial.txt')
     close (unit, status='delete')
   end subroutine test_file
+
+  !> More rows than are read at once: 40,000, of which the last are in a second piece; then faults in
+  !> the header, in the first row and in the last one.
+  subroutine test_long_file(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: n = 200
+    character(*), parameter :: name = 'test-initial-long.txt'
+    character(20), parameter :: lines(3) = [character(20) :: 'velocity_q', '1.0 2.0', 'x']
+    integer, parameter :: faulty(3) = [1, 2, n*n + 1]
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    integer :: unit, i, f
+
+    call box_scene([n, n], 1.0_wp, 0.3_wp, scene)
+    deallocate (scene%initial)
+    allocate (scene%initial(1))
+    scene%initial(1)%file = name
+    do f = 0, size(lines)
+      open (newunit=unit, file=name, status='replace', action='write')
+      do i = 1, n*n + 1
+        if (f > 0) then
+          if (i == faulty(f)) then
+            write (unit, '(a)') trim(lines(f))
+            cycle
+          end if
+        end if
+        if (i == 1) write (unit, '(a)') 'velocity_y'
+        if (i > 1) write (unit, '(es14.6)') 1.0e-3_wp*(i - 1)
+      end do
+      close (unit)
+      call prepare_run(scene, set_up, fault)
+      if (f == 0) then
+        if (allocated(fault)) call test_failed(error, fault%message)
+        if (allocated(error)) return
+        associate (body => set_up%system%body, v => set_up%system%state%v)
+          call expect_true(error, all(abs(v(body%slot, 2) - [(1.0e-3_wp*i, i=1, n*n)]) &
+            & <= 1.0e-12_wp), 'velocities of all rows')
+        end associate
+      else
+        call expect_true(error, allocated(fault), 'accepted: '//lines(f))
+        if (allocated(error)) return
+        call expect_true(error, index(fault%message, name//':'//to_text(faulty(f))//achar(10)) &
+          & > 0, fault%message)
+      end if
+    end do
+    open (newunit=unit, file=name)
+    close (unit, status='delete')
+  end subroutine test_long_file
 
   !> u = alpha dT x relaxes a free body that is uniformly hot: every bond's mechanical stretch is 0.
   !> The force that is left is rounding of that of a held hot body.

@@ -143,7 +143,6 @@ contains
       end do
       if (p == 1) then
         call read_piece(path, pieces(p), table, error, allowed=pack(known, of_dimension(body%dim)))
-        names = table%names
       else if (next > first) then
         call read_piece(path, pieces(p), table, error, columns=size(names))
       end if
@@ -153,6 +152,7 @@ contains
         & 'the scene has '//to_text(points)//' points (layers included)', &
         & 'one row per point is expected, in the order of the results')
       if (allocated(error)) return
+      if (p == 1) names = table%names
       call take_rows(slots(first:next - 1))
       before = before + pieces(p)%rows - merge(1, 0, p == 1)
     end do

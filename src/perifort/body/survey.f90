@@ -193,7 +193,7 @@ contains
   subroutine add_all_columns(together, values)
     class(ranks_type), intent(inout) :: together
     real(wp), intent(inout) :: values(:, :)
-    real(wp) :: flat(size(values))
+    real(wp), allocatable :: flat(:)
 
     flat = reshape(values, [size(values)])
     call together%add_all(flat)
@@ -406,7 +406,7 @@ contains
   subroutine add_counts(survey, counts)
     type(survey_type), intent(inout) :: survey
     integer(i8), intent(inout) :: counts(:, :)
-    real(wp) :: values(size(counts, 1), size(counts, 2))
+    real(wp), allocatable :: values(:, :)
 
     if (.not. associated(survey%together)) return
     values = real(counts, wp)
@@ -434,9 +434,9 @@ contains
   subroutine share_windows(survey, first)
     type(survey_type), intent(inout) :: survey
     integer, intent(in) :: first
-    integer(i8) :: counts(1, size(survey%windows) - first + 1)
+    integer(i8), allocatable :: counts(:, :)
 
-    counts(1, :) = survey%windows(first:)%n
+    counts = reshape(survey%windows(first:)%n, [1, size(survey%windows) - first + 1])
     call add_counts(survey, counts)
     survey%windows(first:)%n = counts(1, :)
   end subroutine share_windows

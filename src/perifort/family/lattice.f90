@@ -87,8 +87,10 @@ contains
       reason = 'some points are a cloud, a mesh or cut cells'
     else if (any_of_ranks(body%order, any(listed))) then
       reason = 'bonds join bodies on different grids'
-    else
+    else if (present(cells)) then
       call grids_fit(body, rule, suits, reason, cells)
+    else
+      call grids_fit(body, rule, suits, reason)
     end if
   end subroutine lattice_suits
 

@@ -136,7 +136,11 @@ contains
       call fail(error, "cannot read the file '"//path//"': "//trim(reason))
       return
     end if
-    call read_table_text(text, path, table, error, columns, allowed, before=piece%lines)
+    if (present(allowed)) then
+      call read_table_text(text, path, table, error, columns, allowed, before=piece%lines)
+    else
+      call read_table_text(text, path, table, error, columns, before=piece%lines)
+    end if
   end subroutine read_piece
 
 end module pd_scene_format_pieces

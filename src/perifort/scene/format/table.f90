@@ -43,7 +43,11 @@ contains
 
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call read_table_text(text, path, table, error, columns, allowed)
+    if (present(allowed)) then
+      call read_table_text(text, path, table, error, columns, allowed)
+    else
+      call read_table_text(text, path, table, error, columns)
+    end if
   end subroutine read_table
 
   !> Read a table from its text, with the errors of `read_table`.
