@@ -253,8 +253,8 @@ contains
     close (unit, status='delete')
   end subroutine test_file
 
-  !> More rows than are read at once: 40,000, of which the last are in a second piece; then faults in
-  !> the header, in the first row and in the last one.
+  !> More rows than are read at once: 40,000, of which the last are in a second piece; then faults
+  !> in the header, in the first row and in the last one.
   subroutine test_long_file(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: n = 200
