@@ -259,8 +259,9 @@ contains
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: n = 200
     character(*), parameter :: name = 'test-initial-long.txt'
-    character(20), parameter :: lines(3) = [character(20) :: 'velocity_q', '1.0 2.0', 'x']
-    integer, parameter :: faulty(3) = [1, 2, n*n + 1]
+    ! the first file has no fault
+    character(20), parameter :: lines(0:3) = [character(20) :: '', 'velocity_q', '1.0 2.0', 'x']
+    integer, parameter :: faulty(0:3) = [0, 1, 2, n*n + 1]
     type(scene_type) :: scene
     type(set_up_type) :: set_up
     type(fault_type), allocatable :: fault
@@ -270,17 +271,16 @@ contains
     deallocate (scene%initial)
     allocate (scene%initial(1))
     scene%initial(1)%file = name
-    do f = 0, size(lines)
+    do f = 0, ubound(lines, 1)
       open (newunit=unit, file=name, status='replace', action='write')
       do i = 1, n*n + 1
-        if (f > 0) then
-          if (i == faulty(f)) then
-            write (unit, '(a)') trim(lines(f))
-            cycle
-          end if
+        if (i == faulty(f)) then
+          write (unit, '(a)') trim(lines(f))
+        else if (i == 1) then
+          write (unit, '(a)') 'velocity_y'
+        else
+          write (unit, '(es14.6)') 1.0e-3_wp*(i - 1)
         end if
-        if (i == 1) write (unit, '(a)') 'velocity_y'
-        if (i > 1) write (unit, '(es14.6)') 1.0e-3_wp*(i - 1)
       end do
       close (unit)
       call prepare_run(scene, set_up, fault)
