@@ -17,8 +17,11 @@ module test_set_up_consistent_weights
   use pd_motion_system, only: system_type
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_scene_content_read, only: read_scene_text
+  use pd_motion_loads, only: load_type
   use pd_scene_content_types, only: scene_type
   use pd_set_up_consistent_weights, only: solution_type, weights_of_areas
+  use pd_set_up_consistent_least_change, only: unbounded
+  use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_move, only: move
   use pd_set_up_prepare, only: prepare, set_up_type
   use comparisons, only: expect_close, max_abs
@@ -56,6 +59,7 @@ contains
       & new_unittest('long: the centres of tetrahedra', test_tetrahedra), &
       & new_unittest('long: a large cloud', test_large_cloud), &
       & new_unittest('meshes of every shape in the plane', test_meshes), &
+      & new_unittest('tetrahedra and discs with surface areas of their own', test_own_areas), &
       & new_unittest('a pulled mesh is strained uniformly', test_pulled_mesh), &
       & new_unittest('what consistent weights do not serve of meshes is refused', &
       & test_refused_meshes), &
@@ -179,7 +183,7 @@ contains
         call area_vectors(system%body, system%family, m%shear_modulus, of_stretch, alone)
         call area_vectors(system%body, system%family, [sign(1.0_wp, m(1)%a)], of_dilatation, alone)
         call weights_of_areas(system%body, system%family, m, of_stretch, of_dilatation, .true., &
-          & [.false., .false.], weights, b, d, fault)
+          & [unbounded], weights, b, d, fault)
         if (allocated(fault)) then
           call test_failed(error, fault%message)
           return
@@ -258,12 +262,14 @@ contains
     allocate (p(merge(system%body%n_slots, 0, system%model%dilatation)), source=0.0_wp)
     allocate (energy(system%body%n_slots), strained(0))
     associate (body => system%body, m => system%model%materials)
-      if (allocated(body%sides)) then
+      if (allocated(body%surface_area)) then
+        of_mu = body%surface_area
+      else if (allocated(body%sides)) then
         of_mu = total_areas(body%sides, body%n_slots, body%dim)
-        of_lambda = maxval(lame_of(m, body%dim))*of_mu
-        of_mu = maxval(shear_of(m, body%dim))*of_mu
       else if (size(body%parts) > 0) then
         call surface_areas(body, of_mu, fault)
+      end if
+      if (allocated(of_mu)) then
         of_lambda = maxval(lame_of(m, body%dim))*of_mu
         of_mu = maxval(shear_of(m, body%dim))*of_mu
       else
@@ -368,38 +374,102 @@ contains
   end subroutine ready_of_text
 
   !> Every uniform strain on warped meshes, with one point for each element and with several.
-  !> Triangles with one point, whose diagonals are all alike, have no weights that leave the body
-  !> stable, and are refused.
+  !> Triangles with one point, whose diagonals are all alike, have stable weights only with surface
+  !> areas of their own: with a load on a side they are refused.
   subroutine test_meshes(error)
     type(error_type), allocatable, intent(out) :: error
     integer, parameter :: several(4:8) = [3, 6, 4, 9, 4]
     type(set_up_type) :: set_up
     type(fault_type), allocatable :: fault
-    character(:), allocatable :: text
+    character(:), allocatable :: text, name
+    logical :: own
     integer :: s, r
 
     ! triangles of 3 and 6 nodes, quadrilaterals of 4, 8 and 9
     do s = 4, 8
       do r = 1, 2
+        own = s < 6 .and. r == 1
+        name = 'shape '//text_of(real(s, wp))//' with '//text_of(real(r, wp))
         call put_mesh(s, merge(1, several(s), r == 1), '0.4', text)
         call ready_of_text(text, set_up, fault)
-        if (s < 6 .and. r == 1) then
-          call expect_true(error, allocated(fault), 'not refused')
-          if (allocated(error)) return
-          call expect_true(error, index(fault%message, 'makes this body unstable') > 0, &
-            & fault%message)
-          if (allocated(error)) return
-          cycle
-        end if
         if (allocated(fault)) then
-          call test_failed(error, 'shape '//text_of(real(s, wp))//': '//fault%message)
+          call test_failed(error, name//': '//fault%message)
           return
         end if
-        call strain_all(set_up%system, 'shape '//text_of(real(s, wp)), error)
+        call expect_true(error, allocated(set_up%system%body%surface_area) .eqv. own, &
+          & 'own areas: '//name)
+        if (allocated(error)) return
+        call strain_all(set_up%system, name, error)
+        if (allocated(error)) return
+        if (.not. own) cycle
+        call ready_of_text(text//"&load side = 'part:LEFT' pressure = 1 /"//lf, set_up, fault)
+        call expect_true(error, allocated(fault), 'not refused: '//name)
+        if (allocated(error)) return
+        call expect_true(error, index(fault%message, 'makes this body unstable') > 0, fault%message)
         if (allocated(error)) return
       end do
     end do
   end subroutine test_meshes
+
+  !> Every uniform strain on a mesh of tetrahedra, and on discs of a lattice that have no stable
+  !> weights for the areas of their faces. Points on which a load acts keep these.
+  subroutine test_own_areas(error)
+    type(error_type), allocatable, intent(out) :: error
+    real(wp), parameter :: radii(*) = [3.0_wp, 7.0_wp, 8.0_wp]
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    type(fault_type), allocatable :: fault
+    type(load_type), allocatable :: loads(:)
+    type(sample_type) :: sample
+    character(:), allocatable :: n, text
+    real(wp), allocatable :: of_faces(:, :)
+    integer :: i, alone
+
+    call block_sample(9, [3, 3, 3], [0.06_wp, 0.06_wp, 0.06_wp], sample)
+    call write_file('consistent.msh', gmsh_text(sample, 4, .true., .false.))
+    call strain_text(grid_scene(3, "&body name = 'part' mesh = 'consistent.msh' /"//lf// &
+      & "&horizon surface_correction = 'consistent' /"), 'tetrahedra')
+    do i = 1, size(radii)
+      n = number_text(nint(2*radii(i)))
+      text = grid_scene(2, '&body lower = 0, 0 upper = '//n//', '//n//' points = '//n//', '//n// &
+        & ' /'//lf//"&keep shape = 'sphere' centre = "//text_of(radii(i))//', '// &
+        & text_of(radii(i))//' radius = '//text_of(radii(i))//' /'//lf// &
+        & "&horizon surface_correction = 'consistent' /"//lf)
+      call strain_text(text, 'disc of '//n)
+    end do
+    if (allocated(error)) return
+    text = text//"&load side = 'x_min' pressure = 1 /"//lf
+    call strain_text(text, 'loaded disc')
+    if (allocated(error)) return
+    call read_scene_text(text, 'build/consistent.nml', scene, fault)
+    associate (body => set_up%system%body, family => set_up%system%family)
+      call loads_of_scene(scene, body, family, loads, fault)
+      call area_vectors(body, family, [1.0_wp], of_faces, alone)
+      associate (slots => loads(1)%slots)
+        call expect_true(error, size(slots) > 0 .and. all(abs(body%surface_area(slots, :) &
+          & - of_faces(slots, :)) <= 0.0_wp), 'a load acts on other areas')
+        call expect_true(error, any(abs(body%surface_area - of_faces) > 1.0e-3_wp*maxval(abs( &
+          & of_faces))), 'no area has changed')
+      end associate
+    end associate
+
+  contains
+
+    subroutine strain_text(text, what)
+      character(*), intent(in) :: text, what
+
+      if (allocated(error)) return
+      call ready_of_text(text, set_up, fault)
+      if (allocated(fault)) then
+        call test_failed(error, what//': '//fault%message)
+        return
+      end if
+      call expect_true(error, allocated(set_up%system%body%surface_area), 'own areas: '//what)
+      if (allocated(error)) return
+      call strain_all(set_up%system, what, error)
+    end subroutine strain_text
+
+  end subroutine test_own_areas
 
   !> Pressure on the ends of a straight mesh strains it by sigma/E along and -nu sigma/E across, to
   !> the square of the strain of 5e-8; what is held is a point.
@@ -639,7 +709,7 @@ contains
       call strain_cloud(i, dims(i), set_up, error)
       if (allocated(error)) return
       associate (body => set_up%system%body)
-        area = total_areas(body%sides, body%n_slots, body%dim)
+        area = body%surface_area
         moment = matmul(transpose(area), body%x)
         do c = 1, body%dim
           call expect(error, sum(area(:, c)), 0.0_wp, 1.0e-9_wp*sum(abs(area)), 'sum of areas')
@@ -837,7 +907,7 @@ contains
     allocate (theta(body%n_slots))
     a(body%slot, :) = matmul(area, transpose(R(:2, :2)))
     call weights_of_areas(body, family, [material], material%shear_modulus*a, &
-      & sign(1.0_wp, material%a)*a, .false., [.true., .true.], model%weights, b, d, fault)
+      & sign(1.0_wp, material%a)*a, .false., [0.05_wp], model%weights, b, d, fault)
     if (allocated(fault)) then
       call test_failed(error, fault%message)
       return
@@ -1336,17 +1406,14 @@ contains
     call box_scene([10, 1], spacing, 0.3_wp, scene)
     scene%horizon%surface_correction = 'consistent'
     call refused(scene, 'lower the dimension', error)
-    ! of one material, unstable by weights below 0: two rows of points, and a disc
+    ! of one material, unstable by weights below 0: two rows of points with loads on their sides
     call box_scene([6, 2], spacing, 0.3_wp, scene)
     scene%horizon%surface_correction = 'consistent'
-    call refused(scene, 'round and thin parts', error)
-    call box_scene([14, 14], spacing, 0.3_wp, scene)
-    scene%horizon%surface_correction = 'consistent'
-    deallocate (scene%kept)
-    allocate (scene%kept(1))
-    scene%kept(1)%shape = 'sphere'
-    scene%kept(1)%centre(:2) = 7*spacing
-    scene%kept(1)%radius = 7*spacing
+    deallocate (scene%loads)
+    allocate (scene%loads(2))
+    scene%loads(1)%side = 'y_min'
+    scene%loads(2)%side = 'y_max'
+    scene%loads%pressure = 1.0_wp
     call refused(scene, 'round and thin parts', error)
   end subroutine test_refused
 

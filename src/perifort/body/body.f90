@@ -70,6 +70,8 @@ module pd_body_body
     type(lattice_type), allocatable :: lattices(:)  !! (bodies of the scene)
     type(side_areas_type), allocatable :: sides  !! of the arranged points, where weights of bonds
                                                  !! need balanced ones
+    real(wp), allocatable :: surface_area(:, :) !! (n_slots, dim) outward areas that were found with
+                                                 !! weights of bonds, if any were [m2]
   end type body_type
 
   interface take

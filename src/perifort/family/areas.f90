@@ -33,16 +33,29 @@ contains
     integer, intent(out) :: alone             !! a slot without a second point, or 0
     type(bonds_type) :: bonds
     real(wp) :: face, part
-    integer :: k, c, s, other, behind, next(-1:1, body%dim)
+    integer :: k, c, s, other, behind, a, before, ahead(-1:1, body%dim), next(-1:1, body%dim)
+    logical :: inside, one_value
 
     alone = 0
+    before = 0
+    inside = .false.
+    one_value = maxval(value) <= minval(value)
     allocate (area(body%n_slots, body%dim), source=0.0_wp)
     call allocate_bonds(family, bonds)
     do k = 1, body%n_slots
       if (body%point(k) == 0) cycle
-      call family%bonds_of(k, bonds)
+      ! in the next slot of a row the family mostly is alike
+      a = family%alike(k)
+      if (a /= before) then
+        before = a
+        call family%bonds_of(k, bonds)
+        call next_points(body, bonds, k, next)
+        ahead = merge(next - k, 0, next > 0)
+        inside = all(next > 0)
+      end if
+      if (inside .and. one_value) cycle
+      next = merge(k + ahead, 0, ahead /= 0)
       face = body%volume(k)/body%spacing(k)
-      call next_points(body, bonds, k, next)
       do c = 1, body%dim
         do s = -1, 1, 2
           other = next(s, c)

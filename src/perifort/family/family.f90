@@ -88,7 +88,8 @@ module pd_family_family
 contains
 
   !> A slot, the same for all slots whose families are known to be alike (same material, same
-  !> members at the same offsets), so that what follows from the family alone is computed once.
+  !> members at the same offsets, their slots the same number ahead), so that what follows from the
+  !> family alone is computed once.
   pure integer function alike(family, k)
     class(family_type), intent(in) :: family
       !! the family; this version knows of no slots that are alike

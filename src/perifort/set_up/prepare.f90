@@ -34,7 +34,8 @@ module pd_set_up_prepare
   use pd_scene_format_file, only: resolve_path
   use pd_set_up_bounds, only: check_bounds
   use pd_set_up_course_warnings, only: warn_of_idle_heat
-  use pd_set_up_consistent_rules, only: check_consistent, prepare_surface, weigh_bonds
+  use pd_set_up_consistent_rules, only: check_consistent, loaded_sides, &
+    & prepare_surface, weigh_bonds
   use pd_set_up_conditions, only: motions_of_scene, heating_of_scene, in_no_fail_zones
   use pd_set_up_loads, only: loads_of_scene
   use pd_set_up_terms, only: add_contacts_of_scene, add_dashpots_of_scene, add_springs_of_scene, &
@@ -97,6 +98,7 @@ contains
     type(family_choice_type) :: choice
     type(survey_type) :: survey
     logical :: divided, reproducible
+    logical, allocatable :: loaded(:)
     integer :: i, ranks, blocks
 
     ranks = 1
@@ -196,6 +198,7 @@ contains
       if (allocated(error)) return
       call loads_of_scene(scene, system%body, system%family, loads, error)
       if (allocated(error)) return
+      loaded = loaded_sides(scene, system%body, loads)
       call add_loads_to(system%terms, loads)
       call gravity_of_scene(scene, system%body, materials, loads)
       call add_loads_to(system%terms, loads)
@@ -215,7 +218,7 @@ contains
       if (system%model%surface) call leave_uncorrected(scene, system%motions, system%model%D, &
         & system%model%S)
       if (scene%horizon%surface_correction == 'consistent') then
-        call weigh_bonds(scene, system, materials, error)
+        call weigh_bonds(scene, system, materials, loaded, error)
         if (allocated(error)) return
       end if
       call find_weakest(system%body, system%family, system%model)

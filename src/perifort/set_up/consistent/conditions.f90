@@ -12,7 +12,13 @@ module pd_set_up_consistent_conditions
   implicit none (type, external)
   private
   public :: conditions_type, stretch_conditions, dilatation_conditions, join_conditions, sums_of, &
-    & spread_over, block_of
+    & spread_over, block_of, kind_of, of_stretches, of_dilatation, triple_products, &
+    & area_products
+
+  !> What an unknown is.
+  integer, parameter :: of_stretches = 1   !! a weight Gb
+  integer, parameter :: of_dilatation = 2  !! a weight Gd
+  integer, parameter :: of_area = 3        !! a component of an area
 
   integer, parameter :: most_rows = 19  !! of a class
   integer(i8), parameter :: most_stored = 25000000_i8  !! coefficients (200 MB)
@@ -42,12 +48,13 @@ module pd_set_up_consistent_conditions
     real(wp), allocatable :: stored(:)      !! coefficients bond by bond, if there are not too many
     integer(i8), allocatable :: place(:)    !! (bonds + 1) of a bond's first one
     integer(i1), allocatable :: low(:)      !! (bonds) its row
-    ! where each class is a point, each unknown a bond with two ends or a component of an area, and
-    ! there are rows of the dilatation:
-    real(wp), allocatable :: x(:, :)        !! (dim, points) positions [m]
-    real(wp), allocatable :: strain(:)      !! (points) what makes a gradient multipliers of n n
-    real(wp), allocatable :: shift(:)       !! (points) what makes a vector multipliers of n/|xi|
-    real(wp) :: spacing = 0.0_wp            !! mean of the points [m]
+    logical :: alone = .false.              !! whether each unknown is of one bond, or an area's
+    ! what multipliers of smooth fields depend on:
+    real(wp) :: spacing = 0.0_wp            !! mean of the classes' first points [m]
+    real(wp), allocatable :: x(:, :)        !! (dim, classes) positions of these points [m]
+    real(wp), allocatable :: stiffness(:)   !! (classes) what makes a field multipliers of n n n
+    real(wp), allocatable :: strain(:)      !! (classes) what makes a gradient multipliers of n n
+    real(wp), allocatable :: shift(:)       !! (classes) what makes a vector multipliers of n/|xi|
   end type conditions_type
 
 contains
@@ -69,7 +76,8 @@ contains
     real(wp) :: total, q, gb, gd
     integer :: c, k, i, row, x, y, z
 
-    call begin(body%dim, .true., groups, conditions)
+    call begin(body, .true., groups, conditions)
+    allocate (conditions%stiffness(conditions%classes))
     call allocate_bonds(family, bonds)
     do c = 1, conditions%classes
       k = int(groups%first(c))
@@ -90,6 +98,7 @@ contains
           & = conditions%factor(:, first + 1:first + bonds%n)/total
       end associate
       conditions%of_area(c) = 1/(body%volume(k)*total)
+      conditions%stiffness(c) = body%volume(k)*total
       row = 0
       do x = 1, body%dim
         do y = x, body%dim
@@ -102,6 +111,8 @@ contains
         end do
       end do
     end do
+    ! their size is of no account
+    conditions%stiffness = conditions%stiffness/maxval(conditions%stiffness)
     call turn(conditions)
   end subroutine stretch_conditions
 
@@ -122,7 +133,7 @@ contains
     real(wp) :: gb, gd
     integer :: c, k, i, row, x, y
 
-    call begin(body%dim, .false., groups, conditions)
+    call begin(body, .false., groups, conditions)
     call allocate_bonds(family, bonds)
     do c = 1, conditions%classes
       k = int(groups%first(c))
@@ -148,15 +159,12 @@ contains
       conditions%right(row + 1:, c) = -area(k, :)*body%spacing(k)/body%volume(k)
     end do
     call turn(conditions)
-    associate (first => conditions%first, n => groups%n_groups)
-      if (all(first(2:n + 1) - first(:n) == 2_i8)) &
-        & call note_points(body, materials, a, groups, conditions)
-    end associate
+    call note_smooth(body, materials, a, groups, conditions)
   end subroutine dilatation_conditions
 
   !> Note what multipliers of smooth fields depend on: with w V/(t spacing) for the force and
   !> a V/t times the symmetric gradient of w for theta, a bond gets as good as nothing.
-  subroutine note_points(body, materials, a, groups, conditions)
+  subroutine note_smooth(body, materials, a, groups, conditions)
     type(body_type), intent(in) :: body
     type(material_type), intent(in) :: materials(:)
     real(wp), intent(in) :: a(:)
@@ -164,21 +172,18 @@ contains
     type(conditions_type), intent(inout) :: conditions
     integer :: c, k
 
-    allocate (conditions%x(body%dim, conditions%classes))
     allocate (conditions%strain(conditions%classes), conditions%shift(conditions%classes))
     do c = 1, conditions%classes
       k = int(groups%first(c))
-      conditions%x(:, c) = body%x(k, :)
       associate (part => body%volume(k)/materials(body%material(k))%t)
         conditions%strain(c) = part*a(body%material(k))
         conditions%shift(c) = part/body%spacing(k)
       end associate
-      conditions%spacing = conditions%spacing + body%spacing(k)/conditions%classes
     end do
     ! their size is of no account; so pivots and diagonals are of the order of 1
     conditions%strain = conditions%strain/maxval(conditions%shift)
     conditions%shift = conditions%shift/maxval(conditions%shift)
-  end subroutine note_points
+  end subroutine note_smooth
 
   !> Conditions on Gb, Gd and surface areas: an unknown of a point with a free area and of an axis
   !> changes that component by (its value - 1) x `unit`.
@@ -201,6 +206,7 @@ contains
     conditions%classes = stretch%classes
     conditions%unknowns = stretch%unknowns + dilatation%unknowns
     conditions%x = dilatation%x
+    conditions%stiffness = stretch%stiffness
     conditions%strain = dilatation%strain
     conditions%shift = dilatation%shift
     conditions%spacing = dilatation%spacing
@@ -248,13 +254,15 @@ contains
   end subroutine join_conditions
 
   !> Room for the conditions of all classes on Gb, or on Gd.
-  subroutine begin(dim, of_stretch, groups, conditions)
-    integer, intent(in) :: dim
+  subroutine begin(body, of_stretch, groups, conditions)
+    type(body_type), intent(in) :: body
     logical, intent(in) :: of_stretch
     type(groups_type), intent(in) :: groups
     type(conditions_type), intent(inout) :: conditions
     integer(i8) :: n
+    integer :: c, dim
 
+    dim = body%dim
     conditions%dim = dim
     conditions%unknowns = groups%n_groups
     if (of_stretch) then
@@ -272,7 +280,26 @@ contains
     allocate (conditions%n(dim, n), conditions%factor(2, n))
     allocate (conditions%right(conditions%rows, groups%n_classes))
     allocate (conditions%of_area(groups%n_classes))
+    allocate (conditions%x(dim, groups%n_classes))
+    do c = 1, groups%n_classes
+      conditions%x(:, c) = body%x(groups%first(c), :)
+    end do
+    conditions%spacing = sum(body%spacing(groups%first))/groups%n_classes
   end subroutine begin
+
+  !> What an unknown is.
+  pure integer function kind_of(conditions, u) result(kind)
+    type(conditions_type), intent(in) :: conditions
+    integer, intent(in) :: u  !! unknown
+
+    if (u <= conditions%stretches) then
+      kind = of_stretches
+    else if (u <= conditions%stretches + conditions%dilatations) then
+      kind = of_dilatation
+    else
+      kind = of_area
+    end if
+  end function kind_of
 
   !> Note the bonds of each unknown.
   subroutine turn(conditions)
@@ -300,6 +327,9 @@ contains
         next(u) = next(u) + 1
       end do
     end do
+    associate (bonds => conditions%stretches + conditions%dilatations, first => conditions%first)
+      conditions%alone = all(first(2:bonds + 1) - first(:bonds) == 2_i8)
+    end associate
     call store(conditions)
   end subroutine turn
 
@@ -334,65 +364,72 @@ contains
     integer(i8), intent(in) :: e
     real(wp), intent(inout) :: values(:)
     integer, intent(out) :: low, high
-    integer :: row, x, y, z, u
+    integer :: row, x, y
 
-    u = int(conditions%unknown(e)) - conditions%stretches
-    associate (n => conditions%n(:, e), f => conditions%factor(:, e), dim => conditions%dim)
-      if (u > conditions%dilatations) then
-        call area_coefficients(conditions, e, values)
+    associate (n => conditions%n(:, e), f => conditions%factor(:, e), dim => conditions%dim, &
+      & before => conditions%before)
+      select case (kind_of(conditions, int(conditions%unknown(e))))
+      case (of_stretches)
         low = 1
+        high = before
+        call triple_products(n, values)
+        values(:high) = f(1)*values(:high)
+      case (of_dilatation)
+        low = before + 1
         high = conditions%rows
-      else if (u > 0) then
-        low = conditions%before + 1
-        high = conditions%rows
-        row = conditions%before
+        row = before
         do x = 1, dim
           do y = x, dim
             row = row + 1
             values(row) = f(1)*n(x)*n(y)
           end do
         end do
-        do x = 1, dim
-          values(row + x) = f(2)*n(x)
-        end do
-      else
+        values(row + 1:high) = f(2)*n
+      case default
         low = 1
-        high = conditions%before
-        row = 0
-        do x = 1, dim
-          do y = x, dim
-            do z = y, dim
-              row = row + 1
-              values(row) = f(1)*n(x)*n(y)*n(z)
-            end do
-          end do
-        end do
-      end if
+        high = conditions%rows
+        call area_products(n, values)
+        values(:before) = f(1)*values(:before)
+        values(before + 1:high - dim) = 0.0_wp
+        values(high - dim + 1:high) = f(2)*n
+      end select
     end associate
   end subroutine coefficients
 
-  !> The coefficients of a component of an area: for the stretch n_a d_bc + n_b d_ac + n_c d_ab.
-  pure subroutine area_coefficients(conditions, e, values)
-    type(conditions_type), intent(in) :: conditions
-    integer(i8), intent(in) :: e
-    real(wp), intent(inout) :: values(:)
+  !> n_a n_b n_c, row by row.
+  pure subroutine triple_products(n, values)
+    real(wp), intent(in) :: n(:)            !! (dim) [-]
+    real(wp), intent(inout) :: values(:)    !! the first 1, 4 or 10 are set
     integer :: row, x, y, z
 
-    associate (n => conditions%n(:, e), f => conditions%factor(:, e), dim => conditions%dim)
-      row = 0
-      do x = 1, dim
-        do y = x, dim
-          do z = y, dim
-            row = row + 1
-            values(row) = f(1)*(merge(n(x), 0.0_wp, y == z) + merge(n(y), 0.0_wp, x == z) &
-              & + merge(n(z), 0.0_wp, x == y))
-          end do
+    row = 0
+    do x = 1, size(n)
+      do y = x, size(n)
+        do z = y, size(n)
+          row = row + 1
+          values(row) = n(x)*n(y)*n(z)
         end do
       end do
-      values(row + 1:conditions%rows - dim) = 0.0_wp
-      values(conditions%rows - dim + 1:conditions%rows) = f(2)*n
-    end associate
-  end subroutine area_coefficients
+    end do
+  end subroutine triple_products
+
+  !> n_a d_bc + n_b d_ac + n_c d_ab, row by row.
+  pure subroutine area_products(n, values)
+    real(wp), intent(in) :: n(:)            !! (dim) [-]
+    real(wp), intent(inout) :: values(:)    !! the first 1, 4 or 10 are set
+    integer :: row, x, y, z
+
+    row = 0
+    do x = 1, size(n)
+      do y = x, size(n)
+        do z = y, size(n)
+          row = row + 1
+          values(row) = merge(n(x), 0.0_wp, y == z) + merge(n(y), 0.0_wp, x == z) &
+            & + merge(n(z), 0.0_wp, x == y)
+        end do
+      end do
+    end do
+  end subroutine area_products
 
   !> The sums of the conditions (rows, classes) for values of the unknowns.
   subroutine sums_of(conditions, y, sums)

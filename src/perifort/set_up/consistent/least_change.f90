@@ -18,25 +18,24 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
   real(wp), parameter :: uneven = 1.0e-10_wp
     !! of those of points that all differ, and of others that more steps do not lower [-]
-  real(wp), parameter :: rounding = 5.0e-10_wp
-    !! of those of points that all differ that more steps do not lower [-]
   real(wp), parameter :: much = 1.0e3_wp            !! growth of an error that is rounding
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
   integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
+  integer, parameter :: most_shared = 1500          !! of such a step where bonds share weights
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
   integer, parameter :: across = 40                 !! points across that these are enough for
   real(wp), parameter :: part_of_step = 1.0e-6_wp   !! of the error that a step with grids leaves
-  !> The most of it while the weights at the bound of a cloud change from step to step.
+  !> The most of it while the weights at the bound change from step to step.
   real(wp), parameter :: most_of_step = 1.0e-2_wp
 
 contains
 
   !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12 (1e-10 if rounding leaves
-  !> that), or where each bond has a weight of its own to 1e-10 (5e-10); otherwise no weights above
-  !> the bound do, or none were found.
-  subroutine least_change(conditions, low, G, residual, iterations, found)
+  !> that), or where each bond has a weight of its own to 1e-10; otherwise no weights above the
+  !> bound do, or none were found.
+  subroutine least_change(conditions, low, G, residual, iterations, found, hopeless)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: low
       !! smallest allowed weight, or `unbounded`; of Gb alone where it is found with Gd [-]
@@ -44,14 +43,16 @@ contains
     real(wp), intent(out) :: residual            !! largest error of a condition [-]
     integer, intent(out) :: iterations           !! of the conjugate gradients
     logical, intent(out) :: found
-    real(wp), allocatable :: z(:, :), step(:, :), r(:, :), t(:), change(:), tried(:, :), lows(:)
+    logical, intent(out) :: hopeless
+      !! bonds share weights, and with any bound the iterations would not converge
+    real(wp), allocatable :: step(:, :), r(:, :), t(:), change(:), tried(:), lows(:), of_one(:, :)
     logical, allocatable :: free(:)
     type(level_type), allocatable :: levels(:)
-    real(wp) :: value, before, slope, length, history(most_newton), allowed, part
+    real(wp) :: value, before, slope, along, linear, length, history(most_newton), allowed, part
     integer :: newton, halving
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
-      allocate (z(rows, classes), r(rows, classes), step(rows, classes), source=0.0_wp)
+      allocate (r(rows, classes), step(rows, classes), of_one(rows, classes), source=0.0_wp)
       allocate (t(n), change(n), source=0.0_wp)
       allocate (G(n), free(n))
       allocate (lows(n), source=low)
@@ -59,14 +60,17 @@ contains
     end associate
     iterations = 0
     found = .false.
-    if (allocated(conditions%x)) then
+    hopeless = .false.
+    linear = 0.0_wp
+    if (conditions%alone) then
       call new_levels(conditions, levels)
       allowed = uneven
     else
       allowed = tolerance
       allocate (levels(0))
     end if
-    call weigh(conditions, lows, z, t, G, r, before)
+    call sums_of(conditions, spread(1.0_wp, 1, size(G)), of_one)
+    call weigh(conditions, lows, t, G, r, before)
     do newton = 1, most_newton
       residual = maxval(abs(r))
       found = residual <= allowed
@@ -75,27 +79,35 @@ contains
       history(newton) = residual
       if (newton > patience) then
         if (residual > 0.5_wp*history(newton - patience)) then
-          ! thousands of points that all differ leave more rounding
-          found = residual <= merge(rounding, uneven, size(levels) > 0)
+          found = residual <= uneven
           return
         end if
       end if
       if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) return
       free = t + 1 > lows
       part = part_of_step
-      if (conditions%stretches > 0 .and. low > unbounded) part = max(part, min(most_of_step, &
-        & residual))
+      if (low > unbounded) part = max(part, min(most_of_step, residual))
       call solve(conditions, levels, free, part, r, step, iterations)
+      if (.not. conditions%alone .and. newton == 1 .and. iterations == most_shared) then
+        hopeless = .true.
+        return
+      end if
+      ! multipliers of long waves are large, and what they give a bond is small: so the changes of
+      ! weights are summed, and each step can mend what rounding leaves of the one before
+      call spread_over(conditions, step, change)
       slope = sum(r*step)
+      along = sum((conditions%right - of_one)*step)
       length = 1.0_wp
       do halving = 1, 30
-        tried = z + length*step
-        call weigh(conditions, lows, tried, t, G, r, value)
+        tried = t + length*change
+        call weigh(conditions, lows, tried, G, r, value)
+        value = value - linear - length*along
         if (value <= before - 1.0e-4_wp*length*slope + 1.0e-13_wp*abs(before)) exit
         if (maxval(abs(r)) <= 0.5_wp*residual) exit
         length = length/2
       end do
-      z = tried
+      t = tried
+      linear = linear + length*along
       before = value
     end do
     residual = maxval(abs(r))
@@ -110,22 +122,18 @@ contains
     wider = max(1.0_wp, conditions%classes**(1/real(conditions%dim, wp))/across)
   end function wider
 
-  !> Weights of multipliers z, what the conditions miss, and the function that is minimised in z.
-  subroutine weigh(conditions, low, z, t, G, r, value)
+  !> Weights of the multipliers' sums t for each unknown, what the conditions miss, and the part of
+  !> the function that is minimised that is not linear in the multipliers.
+  subroutine weigh(conditions, low, t, G, r, value)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low(:), z(:, :)
-    real(wp), intent(inout) :: t(:), G(:), r(:, :)
+    real(wp), intent(in) :: low(:), t(:)
+    real(wp), intent(inout) :: G(:), r(:, :)
     real(wp), intent(out) :: value
-    real(wp), allocatable :: of_one(:, :)
 
-    call spread_over(conditions, z, t)
     G = max(low, 1 + t)
-    allocate (of_one, mold=r)
-    call sums_of(conditions, spread(1.0_wp, 1, size(G)), of_one)
     call sums_of(conditions, G, r)
     r = conditions%right - r
-    value = sum(merge(t**2/2, (low - 1)*t - (low - 1)**2/2, 1 + t > low)) &
-      & - sum((conditions%right - of_one)*z)
+    value = sum(merge(t**2/2, (low - 1)*t - (low - 1)**2/2, 1 + t > low))
   end subroutine weigh
 
   !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
@@ -153,9 +161,10 @@ contains
     ! of a bounded solve the free unknowns change from step to step
     target = 0.02_wp*tolerance
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
-    if (size(levels) > 0) target = max(0.3_wp*tolerance, part*maxval(abs(r)))
+    if (size(levels) > 0) target = max(0.3_wp*uneven, part*maxval(abs(r)))
     least = huge(1.0_wp)
-    most = merge(most_iterations, nint(most_bounded*wider(conditions)), all(free))
+    most = merge(merge(most_iterations, most_shared, conditions%alone), &
+      & nint(most_bounded*wider(conditions)), all(free))
     do i = 1, most
       call precondition(factor, rest, w)
       call add_levels(conditions, levels, rest, w)

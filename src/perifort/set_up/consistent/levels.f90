@@ -1,36 +1,48 @@
-!> A preconditioner for the conditions on Gd in bodies where each bond has a weight of its own,
-!> alone or together with those on Gb.
+!> A preconditioner for the conditions on weights, with smooth multipliers.
 !>
-!> Multipliers S (of theta) and w (of the force) give a bond (S_k + S_j):nn/2 - (w_j - w_k).n/|xi|,
-!> which nearly vanishes where S is the symmetric gradient of a smooth w: the product of the
-!> conditions with their transpose is like an operator of sixth order, and blocks of points alone
-!> would need iterations by the cube of the body's width over its spacing. So w is also taken from
-!> cubic B-splines on grids, each twice as wide as the one before (Bramble, Pasciak and Xu, Math.
-!> Comput. 55 (1990) 1), with S = a grad w: diagonals on all but the widest, a factor on that.
+!> Multipliers z of the stretch give a bond (z_j - z_k):nnn, which is small where z is smooth: the
+!> product of the conditions with their transpose is like an operator of second order. Multipliers S
+!> of theta and w of the force give (S_k + S_j):nn/2 - (w_j - w_k).n/|xi|, which nearly vanishes
+!> where S is the symmetric gradient of a smooth w: that is like one of sixth order. Blocks of
+!> points alone would need iterations by the width of the body over its spacing, or by its cube. So
+!> z, and w with S = a grad w, are also taken from cubic B-splines on grids, each twice as wide as
+!> the one before (Bramble, Pasciak and Xu, Math. Comput. 55 (1990) 1), with diagonals; w on the
+!> widest grid with a factor.
 module pd_set_up_consistent_levels
   use pd_base_kinds, only: wp, i4, i8
-  use pd_set_up_consistent_conditions, only: conditions_type
+  use pd_set_up_consistent_conditions, only: area_products, conditions_type, kind_of, &
+    & of_dilatation, of_stretches, triple_products
   implicit none (type, external)
   private
   public :: level_type, new_levels, add_levels
 
   real(wp), parameter :: finest = 2.0_wp       !! width of the finest cells [mean spacings]
-  integer, parameter :: most_of_widest = 340   !! unknowns of the widest grid
+  integer, parameter :: narrow = 20            !! points across that need no grids of z
+  integer, parameter :: most_of_widest = 340   !! unknowns of the widest grid of w
   integer, parameter :: packet = 256           !! bonds whose products are summed at once
   real(wp), parameter :: damping = 0.5_wp      !! of the diagonals, which overlap
   real(wp), parameter :: follows = 1.0e-10_wp  !! pivot of a row that follows from others [-]
 
-  !> A grid of B-splines. A point sees four of them along each axis.
+  !> A grid of B-splines, for z or for w. A point sees four of them along each axis. Cells without
+  !> points are left out, and splines that reach none. Two cells of a grid fit in one of the next
+  !> along each axis, so that a spline is a sum of five of the finer ones.
   type :: level_type
     integer :: dim = 0
-    integer :: cells(3) = 1                      !! along each axis
-    integer :: nodes(3) = 1                      !! splines along each axis: cells + 3
-    integer(i4), allocatable :: cell(:, :)       !! (3, points) from 0
-    real(wp), allocatable :: value(:, :, :)      !! (0:3, 3, points) of the splines [-]
-    real(wp), allocatable :: slope(:, :, :)      !! (0:3, 3, points) [1/m]
-    integer(i8), allocatable :: start(:)         !! (cells + 1) first in `order`
+    logical :: of_stretch = .false.              !! whether the splines are those of z
+    integer :: components = 0                    !! of z, or of w
+    integer(i4), allocatable :: child(:, :)
+      !! (5**dim, splines) of the next finer grid, of which a spline is a sum, x fastest; 0: none
+    ! of the finest grid only; others are sums of its splines:
+    integer(i4), allocatable :: cell(:)          !! (points) the cell with it
+    integer(i4), allocatable :: start(:)         !! (cells + 1) first in `order`
     integer(i4), allocatable :: order(:)         !! points cell by cell
-    real(wp), allocatable :: inverse(:, :)       !! (dim, splines) of the diagonal
+    integer(i4), allocatable :: spline(:, :)     !! (4**dim, cells) that reach it, x fastest
+    integer(i4), allocatable :: first(:)         !! (splines + 1) first in `under`
+    integer(i4), allocatable :: under(:, :)
+      !! (2, any) a cell that the spline reaches, and which of the cell's splines it is
+    real(wp), allocatable :: value(:, :, :)      !! (4, dim, points) of the splines [-]
+    real(wp), allocatable :: slope(:, :, :)      !! (4, dim, points) [1/m]
+    real(wp), allocatable :: inverse(:, :)       !! (components, splines) of the diagonal
     real(wp), allocatable :: factor(:, :)        !! of the widest grid: of its scaled matrix
     real(wp), allocatable :: scale(:)            !! that makes its diagonal 1
     integer, allocatable :: chosen(:)            !! unknowns of the factor, in its order
@@ -40,246 +52,400 @@ contains
 
   !> All grids of a body.
   subroutine new_levels(conditions, levels)
-    type(conditions_type), intent(in) :: conditions  !! on Gd; each bond an unknown of its own
-    type(level_type), allocatable, intent(out) :: levels(:)  !! the widest is the last
-    type(level_type), allocatable :: more(:)
-    real(wp) :: low(3), extent(3), width
-    integer :: i
+    type(conditions_type), intent(in) :: conditions          !! on Gb, Gd or both
+    type(level_type), allocatable, intent(out) :: levels(:)
+      !! from fine to wide: those of z, if the body is wide, then those of w
 
-    low = 0.0_wp
-    extent = 0.0_wp
-    low(:conditions%dim) = minval(conditions%x, dim=2)
-    extent(:conditions%dim) = maxval(conditions%x, dim=2) - low(:conditions%dim)
-    width = finest*conditions%spacing
     allocate (levels(0))
-    do
-      allocate (more(size(levels) + 1))
-      do i = 1, size(levels)
-        more(i) = levels(i)
-      end do
-      call move_alloc(more, levels)
-      associate (level => levels(size(levels)))
-        call new_level(conditions, low, extent, width, level)
-        if (conditions%dim*product(level%nodes) <= most_of_widest .or. all(level%cells == 1)) then
-          call factorize(conditions, level)
-          return
-        end if
-        call find_diagonal(conditions, level)
-      end associate
-      width = 2*width
-    end do
+    if (conditions%stretches > 0 .and. conditions%classes > narrow**conditions%dim) &
+      & call append_levels(conditions, .true., levels)
+    if (conditions%dilatations > 0) call append_levels(conditions, .false., levels)
   end subroutine new_levels
 
-  !> A grid with cells about `width` wide.
-  subroutine new_level(conditions, low, extent, width, level)
+  !> The grids of z or of w.
+  subroutine append_levels(conditions, of_stretch, levels)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low(3), extent(3), width
-    type(level_type), intent(inout) :: level
-    real(wp) :: edge, s
-    integer(i8), allocatable :: next(:)
-    integer :: d, k, c
+    logical, intent(in) :: of_stretch
+    type(level_type), allocatable, intent(inout) :: levels(:)
+    type(level_type), allocatable :: more(:)
+    integer(i4), allocatable :: numbers(:), finer(:)
+    real(wp) :: low(conditions%dim), edge(conditions%dim)
+    integer :: cells(conditions%dim), fine(conditions%dim)
+    logical :: widest
 
-    level%dim = conditions%dim
-    level%cells(:level%dim) = max(1, nint(extent(:level%dim)/width))
-    level%nodes(:level%dim) = level%cells(:level%dim) + 3
-    allocate (level%cell(3, conditions%classes), source=0_i4)
-    allocate (level%value(0:3, 3, conditions%classes), level%slope(0:3, 3, conditions%classes))
+    low = minval(conditions%x, dim=2)
+    edge = finest*conditions%spacing
+    cells = int((maxval(conditions%x, dim=2) - low)/edge) + 1
+    do
+      allocate (more(size(levels) + 1))
+      more(:size(levels)) = levels
+      call move_alloc(more, levels)
+      associate (level => levels(size(levels)))
+        level%dim = conditions%dim
+        level%of_stretch = of_stretch
+        level%components = merge(conditions%before, conditions%dim, of_stretch)
+        call place_points(conditions, low, edge, cells, level, numbers)
+        widest = all(cells == 1)
+        if (.not. of_stretch) widest = widest .or. &
+          & level%dim*(size(level%first) - 1) <= most_of_widest
+        if (widest .and. .not. of_stretch) then
+          call factorize(conditions, level)
+        else
+          call find_diagonal(conditions, level)
+        end if
+        if (allocated(finer)) then
+          call find_children(cells, fine, numbers, finer, level)
+          deallocate (level%cell, level%start, level%order, level%spline, level%first, &
+            & level%under, level%value, level%slope)
+        end if
+      end associate
+      if (widest) return
+      call move_alloc(numbers, finer)
+      fine = cells
+      cells = (cells + 1)/2
+      edge = 2*edge
+    end do
+  end subroutine append_levels
+
+  !> The splines of the next finer grid of which those of a grid are sums: along an axis those from
+  !> twice its place less three on.
+  pure subroutine find_children(cells, fine, numbers, finer, level)
+    integer, intent(in) :: cells(:), fine(:)           ! (dim) of the grid, and of the finer one
+    integer(i4), intent(in) :: numbers(:), finer(:)    ! of their splines by place; 0: none
+    type(level_type), intent(inout) :: level
+    integer :: place(size(cells)), at(size(cells)), i, m, d
+
+    allocate (level%child(5**level%dim, maxval(numbers)), source=0_i4)
+    do i = 1, size(numbers)
+      if (numbers(i) == 0) cycle
+      place = place_of(i - 1, cells + 3)
+      do m = 1, 5**level%dim
+        at = 2*place - 3 + [(mod((m - 1)/5**(d - 1), 5), d=1, size(at))]
+        if (any(at < 0) .or. any(at >= fine + 3)) cycle
+        level%child(m, numbers(i)) = finer(1 + dense(at, fine + 3))
+      end do
+    end do
+  end subroutine find_children
+
+  !> The points in the cells of a grid, and its splines.
+  subroutine place_points(conditions, low, edge, cells, level, spline_number)
+    type(conditions_type), intent(in) :: conditions
+    real(wp), intent(in) :: low(:)            ! (dim) corner of the grid [m]
+    real(wp), intent(in) :: edge(:)           ! (dim) of its cells [m]
+    integer, intent(in) :: cells(:)           ! (dim) along each axis
+    type(level_type), intent(inout) :: level
+    integer(i4), allocatable, intent(out) :: spline_number(:)  ! of splines by place; 0: none
+    integer :: place(size(low), conditions%classes)
+    integer(i4), allocatable :: number(:), next(:), corner(:, :)
+    real(wp) :: s
+    integer :: k, d, c, m, n, at, dim, n_cells, n_splines
+
+    dim = level%dim
+    n = 4**dim
+    allocate (level%value(4, dim, conditions%classes), level%slope(4, dim, conditions%classes))
     do k = 1, conditions%classes
-      do d = 1, level%dim
-        edge = max(extent(d), width)/level%cells(d)
-        s = (conditions%x(d, k) - low(d))/edge
-        level%cell(d, k) = int(max(0, min(level%cells(d) - 1, int(s))), i4)
-        s = s - level%cell(d, k)
+      do d = 1, dim
+        s = (conditions%x(d, k) - low(d))/edge(d)
+        place(d, k) = max(0, min(cells(d) - 1, int(s)))
+        s = s - place(d, k)
         level%value(:, d, k) = [(1 - s)**3, 3*s**3 - 6*s**2 + 4, -3*s**3 + 3*s**2 + 3*s + 1, &
           & s**3]/6
-        level%slope(:, d, k) = [-(1 - s)**2, 3*s**2 - 4*s, -3*s**2 + 2*s + 1, s**2]/(2*edge)
+        level%slope(:, d, k) = [-(1 - s)**2, 3*s**2 - 4*s, -3*s**2 + 2*s + 1, s**2]/(2*edge(d))
       end do
     end do
-    ! points cell by cell, those of one cell in their order
-    allocate (level%start(product(level%cells) + 1), source=0_i8)
-    allocate (level%order(conditions%classes))
+    ! cells with points are numbered as they are met
+    allocate (number(product(cells)), source=0_i4)
+    allocate (level%cell(conditions%classes), corner(dim, conditions%classes))
+    n_cells = 0
     do k = 1, conditions%classes
-      c = cell_number(level, int(level%cell(:, k)))
-      level%start(c + 1) = level%start(c + 1) + 1
+      c = 1 + dense(place(:, k), cells)
+      if (number(c) == 0) then
+        n_cells = n_cells + 1
+        number(c) = int(n_cells, i4)
+        corner(:, n_cells) = int(place(:, k), i4)
+      end if
+      level%cell(k) = number(c)
     end do
-    level%start(1) = 1_i8
-    do c = 1, product(level%cells)
-      level%start(c + 1) = level%start(c) + level%start(c + 1)
+    call sort_into(level%cell, n_cells, level%start, level%order)
+    ! and so are splines
+    allocate (level%spline(n, n_cells))
+    allocate (spline_number(product(cells + 3)), source=0_i4)
+    n_splines = 0
+    do c = 1, n_cells
+      do m = 1, n
+        at = 1 + dense(int(corner(:, c)) + offset_of(m, dim), cells + 3)
+        if (spline_number(at) == 0) then
+          n_splines = n_splines + 1
+          spline_number(at) = int(n_splines, i4)
+        end if
+        level%spline(m, c) = spline_number(at)
+      end do
     end do
-    next = level%start
-    do k = 1, conditions%classes
-      c = cell_number(level, int(level%cell(:, k)))
-      level%order(next(c)) = int(k, i4)
-      next(c) = next(c) + 1
+    call sort_into(reshape(level%spline, [n*n_cells]), n_splines, level%first, next)
+    allocate (level%under(2, size(next)))
+    level%under(1, :) = (next - 1)/n + 1
+    level%under(2, :) = mod(next - 1, n) + 1
+  end subroutine place_points
+
+  !> The number from 0 of a place from 0, the first index fastest.
+  pure integer function dense(place, extents) result(number)
+    integer, intent(in) :: place(:), extents(:)
+    integer :: d
+
+    number = 0
+    do d = size(place), 1, -1
+      number = number*extents(d) + place(d)
     end do
-  end subroutine new_level
+  end function dense
 
-  !> The number of a cell, from 1.
-  pure integer function cell_number(level, cell) result(number)
+  !> The place of a number from 0.
+  pure function place_of(number, extents) result(place)
+    integer, intent(in) :: number, extents(:)
+    integer :: place(size(extents))
+    integer :: rest, d
+
+    rest = number
+    do d = 1, size(extents)
+      place(d) = mod(rest, extents(d))
+      rest = rest/extents(d)
+    end do
+  end function place_of
+
+  !> Where spline `m` of a cell stands among its four along each axis, from 0.
+  pure function offset_of(m, dim) result(offset)
+    integer, intent(in) :: m, dim
+    integer :: offset(dim)
+    integer :: d
+
+    do d = 1, dim
+      offset(d) = mod((m - 1)/4**(d - 1), 4)
+    end do
+  end function offset_of
+
+  !> Entries box by box, those of one box in their order.
+  pure subroutine sort_into(box, n_boxes, start, order)
+    integer(i4), intent(in) :: box(:)                 ! of each entry
+    integer, intent(in) :: n_boxes
+    integer(i4), allocatable, intent(out) :: start(:) ! (boxes + 1) first of each in `order`
+    integer(i4), allocatable, intent(out) :: order(:)
+    integer(i4), allocatable :: next(:)
+    integer :: i
+
+    allocate (start(n_boxes + 1), source=0_i4)
+    allocate (order(size(box)))
+    do i = 1, size(box)
+      start(box(i) + 1) = start(box(i) + 1) + 1_i4
+    end do
+    start(1) = 1_i4
+    do i = 1, n_boxes
+      start(i + 1) = start(i) + start(i + 1)
+    end do
+    next = start
+    do i = 1, size(box)
+      order(next(box(i))) = int(i, i4)
+      next(box(i)) = next(box(i)) + 1_i4
+    end do
+  end subroutine sort_into
+
+  !> All splines that reach point k, x fastest, and their gradients.
+  pure subroutine splines_at(level, k, value, gradient)
     type(level_type), intent(in) :: level
-    integer, intent(in) :: cell(3)  !! from 0
-    number = 1 + cell(1) + level%cells(1)*(cell(2) + level%cells(2)*cell(3))
-  end function cell_number
+    integer, intent(in) :: k                  !! point
+    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
+    real(wp), intent(inout) :: gradient(:, :) !! (3, 4**dim) dim of them are set [1/m]
+    real(wp) :: v, s
+    integer :: m, n, i, j, d
 
-  !> The place of a spline, from 0, by its number from 1.
-  pure function node_at(level, number) result(node)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: number
-    integer :: node(3)
-    node(1) = mod(number - 1, level%nodes(1))
-    node(2) = mod((number - 1)/level%nodes(1), level%nodes(2))
-    node(3) = (number - 1)/(level%nodes(1)*level%nodes(2))
-  end function node_at
-
-  !> The points that a spline reaches, cell by cell.
-  pure subroutine points_under(level, node, points)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: node(3)                      !! from 0
-    integer(i4), allocatable, intent(out) :: points(:)
-    integer :: cell(3), number, i, j, l
-
-    allocate (points(0))
-    do l = 0, merge(3, 0, level%dim > 2)
-      do j = 0, merge(3, 0, level%dim > 1)
-        do i = 0, 3
-          cell = node - [i, j, l]
-          if (any(cell < 0) .or. any(cell >= level%cells)) cycle
-          number = cell_number(level, cell)
-          points = [points, level%order(level%start(number):level%start(number + 1) - 1)]
+    associate (of => level%value(:, :, k), slope => level%slope(:, :, k))
+      value(:4) = of(:, 1)
+      gradient(1, :4) = slope(:, 1)
+      n = 4
+      do d = 2, level%dim
+        ! the first last, since the others are made of what it replaces
+        do i = 4, 1, -1
+          v = of(i, d)
+          s = slope(i, d)
+          do m = 1, n
+            j = (i - 1)*n + m
+            gradient(d, j) = value(m)*s
+            gradient(:d - 1, j) = gradient(:d - 1, m)*v
+            value(j) = value(m)*v
+          end do
         end do
+        n = 4*n
       end do
-    end do
-  end subroutine points_under
+    end associate
+  end subroutine splines_at
 
-  !> A spline and its gradient at point k; 0 where it does not reach.
-  pure subroutine spline_at(level, node, k, value, gradient)
+  !> All splines that reach point k, x fastest.
+  pure subroutine values_at(level, k, value)
     type(level_type), intent(in) :: level
-    integer, intent(in) :: node(3)             !! from 0
-    integer, intent(in) :: k                   !! point
-    real(wp), intent(out) :: value             !! [-]
-    real(wp), intent(out) :: gradient(3)       !! [1/m]
-    real(wp) :: v(3)
-    integer :: d, l
+    integer, intent(in) :: k                  !! point
+    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
+    integer :: n, i, d
 
-    value = 0.0_wp
-    gradient = 0.0_wp
-    v = 1.0_wp
+    associate (of => level%value(:, :, k))
+      value(:4) = of(:, 1)
+      n = 4
+      do d = 2, level%dim
+        do i = 4, 1, -1
+          value((i - 1)*n + 1:i*n) = value(:n)*of(i, d)
+        end do
+        n = 4*n
+      end do
+    end associate
+  end subroutine values_at
+
+  !> Spline `m` of those that reach point k, and its gradient.
+  pure subroutine spline_at(level, m, k, value, gradient)
+    type(level_type), intent(in) :: level
+    integer, intent(in) :: m, k
+    real(wp), intent(out) :: value            !! [-]
+    real(wp), intent(out) :: gradient(:)      !! (dim) [1/m]
+    integer :: d, i, offset(level%dim)
+
+    offset = offset_of(m, level%dim)
+    value = 1.0_wp
+    gradient = 1.0_wp
     do d = 1, level%dim
-      l = node(d) - level%cell(d, k)
-      if (l < 0 .or. l > 3) return
-      v(d) = level%value(l, d, k)
-    end do
-    value = product(v)
-    do d = 1, level%dim
-      gradient(d) = level%slope(node(d) - level%cell(d, k), d, k) &
-        & *product(v, mask=[1, 2, 3] /= d)
+      associate (v => level%value(offset(d) + 1, d, k), s => level%slope(offset(d) + 1, d, k))
+        value = value*v
+        do i = 1, level%dim
+          gradient(i) = gradient(i)*merge(s, v, i == d)
+        end do
+      end associate
     end do
   end subroutine spline_at
 
-  !> What a spline of w along the bond's direction gives bond `u`, over the component of that
-  !> direction.
-  pure real(wp) function of_bond(conditions, level, node, u) result(q)
+  !> What a spline at point k, as any component, gives the unknown of bond `e` of k, over
+  !> `pattern_of` that unknown and component.
+  pure real(wp) function share_of(conditions, of_stretch, k, e, value, gradient) result(share)
     type(conditions_type), intent(in) :: conditions
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: node(3)
-    integer, intent(in) :: u             !! unknown, with two ends, or one of an area; 0 of a Gb
-    real(wp) :: value, gradient(3)
-    integer(i8) :: e, i
-    integer :: k
+    logical, intent(in) :: of_stretch
+    integer, intent(in) :: k
+    integer(i8), intent(in) :: e
+    real(wp), intent(in) :: value, gradient(:)
+    real(wp) :: along
+    integer :: kind
 
-    q = 0.0_wp
-    if (u <= conditions%stretches) return
-    do i = conditions%first(u), conditions%first(u + 1) - 1
-      e = conditions%bond(i)
-      k = int(conditions%class(e))
-      call spline_at(level, node, k, value, gradient)
-      if (u > conditions%stretches + conditions%dilatations) gradient = 0.0_wp
+    share = 0.0_wp
+    kind = kind_of(conditions, int(conditions%unknown(e)))
+    if (kind == merge(of_dilatation, of_stretches, of_stretch)) return
+    associate (n => conditions%n(:, conditions%bond(conditions%first(conditions%unknown(e)))), &
+      & f => conditions%factor(:, e))
       ! seen from the other end the direction is the opposite one
-      q = q + conditions%strain(k)*conditions%factor(1, e)*dot_product(gradient(:level%dim), &
-        & conditions%n(:, conditions%bond(conditions%first(u)))) &
-        & + merge(1, -1, i == conditions%first(u))*conditions%shift(k)*conditions%factor(2, e)*value
-    end do
-  end function of_bond
+      along = sign(1.0_wp, dot_product(n, conditions%n(:, e)))
+      if (of_stretch) then
+        share = along*conditions%stiffness(k)*f(1)*value
+      else
+        share = along*conditions%shift(k)*f(2)*value
+        if (kind == of_dilatation) share = share &
+          & + conditions%strain(k)*f(1)*dot_product(gradient, n)
+      end if
+    end associate
+  end function share_of
+
+  !> What the shares of an unknown are multiplied with for each component.
+  pure subroutine pattern_of(conditions, of_stretch, u, pattern)
+    type(conditions_type), intent(in) :: conditions
+    logical, intent(in) :: of_stretch
+    integer, intent(in) :: u
+    real(wp), intent(inout) :: pattern(:)  ! (components) set
+
+    associate (n => conditions%n(:, conditions%bond(conditions%first(u))))
+      if (.not. of_stretch) then
+        pattern = n
+      else if (kind_of(conditions, u) == of_stretches) then
+        call triple_products(n, pattern)
+      else
+        call area_products(n, pattern)
+      end if
+    end associate
+  end subroutine pattern_of
 
   !> The diagonal of a grid's matrix.
   subroutine find_diagonal(conditions, level)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(inout) :: level
-    real(wp) :: diagonal(level%dim), part
-    integer(i4), allocatable :: points(:)
+    real(wp), allocatable :: share(:), diagonal(:), pattern(:)
+    integer(i4), allocatable :: seen(:), met(:)
+    real(wp) :: value, gradient(level%dim), part
     integer(i8) :: e
-    integer :: number, node(3), i, k, j, u
+    integer :: s, i, p, k, u, n
 
-    allocate (level%inverse(level%dim, product(level%nodes)))
-    !$omp parallel do schedule(dynamic, 8) default(none) shared(conditions, level) &
-    !$omp private(diagonal, part, points, e, number, node, i, k, j, u)
-    do number = 1, product(level%nodes)
-      node = node_at(level, number)
-      diagonal = 0.0_wp
-      call points_under(level, node, points)
-      do i = 1, size(points)
-        k = int(points(i))
-        do e = conditions%start(k), conditions%start(k + 1) - 1
-          u = int(conditions%unknown(e))
-          if (u <= conditions%stretches) cycle
-          part = of_bond(conditions, level, node, u)**2
-          ! a bond with both ends here is met twice
-          j = other_end(conditions, u, k)
-          if (j > 0) then
-            if (reaches(level, node, j)) part = part/2
-          end if
-          diagonal = diagonal + part*conditions%n(:, e)**2
-        end do
+    allocate (level%inverse(level%components, size(level%first) - 1))
+    !$omp parallel default(none) shared(conditions, level) &
+    !$omp private(share, diagonal, pattern, seen, met, value, gradient, part, e, s, i, p, k, u, n)
+    allocate (share(conditions%unknowns), met(conditions%unknowns))
+    allocate (seen(conditions%unknowns), source=0_i4)
+    allocate (diagonal(level%components), pattern(level%components))
+    !$omp do schedule(dynamic, 8)
+    do s = 1, size(level%first) - 1
+      n = 0
+      do i = level%first(s), level%first(s + 1) - 1
+        associate (cell => level%under(1, i))
+          do p = level%start(cell), level%start(cell + 1) - 1
+            k = int(level%order(p))
+            call spline_at(level, int(level%under(2, i)), k, value, gradient)
+            do e = conditions%start(k), conditions%start(k + 1) - 1
+              u = int(conditions%unknown(e))
+              part = share_of(conditions, level%of_stretch, k, e, value, gradient)
+              if (seen(u) == s) then
+                share(u) = share(u) + part
+              else
+                seen(u) = int(s, i4)
+                share(u) = part
+                n = n + 1
+                met(n) = int(u, i4)
+              end if
+            end do
+          end do
+        end associate
       end do
-      level%inverse(:, number) = diagonal
+      diagonal = 0.0_wp
+      do i = 1, n
+        u = int(met(i))
+        if (.not. abs(share(u)) > 0.0_wp) cycle
+        call pattern_of(conditions, level%of_stretch, u, pattern)
+        diagonal = diagonal + (share(u)*pattern)**2
+      end do
+      level%inverse(:, s) = diagonal
     end do
+    !$omp end parallel
     part = follows*maxval(level%inverse)
     level%inverse = damping/max(level%inverse, part)
   end subroutine find_diagonal
 
-  !> The point at the other end of a bond; 0 for an area.
-  pure integer function other_end(conditions, u, k) result(j)
-    type(conditions_type), intent(in) :: conditions
-    integer, intent(in) :: u, k
-
-    j = 0
-    if (conditions%first(u + 1) - conditions%first(u) < 2) return
-    j = int(conditions%class(conditions%bond(conditions%first(u))))
-    if (j == k) j = int(conditions%class(conditions%bond(conditions%first(u) + 1)))
-  end function other_end
-
-  !> Whether a spline is not zero in the cell of point k.
-  pure logical function reaches(level, node, k)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: node(3), k
-    associate (d => node(:level%dim) - level%cell(:level%dim, k))
-      reaches = all(d >= 0) .and. all(d <= 3)
-    end associate
-  end function reaches
-
-  !> Cholesky's factor of the widest grid's matrix.
+  !> Cholesky's factor of the matrix of the widest grid of w.
   subroutine factorize(conditions, level)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(inout) :: level
     real(wp), allocatable :: of_bonds(:, :)
-    real(wp) :: q
-    integer :: n, nodes, first, last, u, number, column, dim
+    real(wp) :: value(64), gradient(3, 64), share
+    integer(i8) :: i, e
+    integer :: n, first, last, u, m, k, at, column, dim
 
     dim = level%dim
-    nodes = product(level%nodes)
-    n = dim*nodes
+    n = dim*(size(level%first) - 1)
     allocate (level%factor(n, n), source=0.0_wp)
     allocate (of_bonds(n, packet))
     do first = conditions%stretches + 1, conditions%unknowns, packet
       last = min(conditions%unknowns, first + packet - 1)
-      !$omp parallel default(none) private(q, u, number, column) &
-      !$omp shared(conditions, level, of_bonds, first, last, nodes, dim, n)
-      !$omp do schedule(static)
+      !$omp parallel default(none) private(value, gradient, share, i, e, u, m, k, at, column) &
+      !$omp shared(conditions, level, of_bonds, first, last, dim, n)
+      !$omp do schedule(dynamic, 16)
       do u = first, last
-        do number = 1, nodes
-          q = of_bond(conditions, level, node_at(level, number), u)
-          of_bonds(dim*(number - 1) + 1:dim*number, u - first + 1) = &
-            & q*conditions%n(:, conditions%bond(conditions%first(u)))
+        of_bonds(:, u - first + 1) = 0.0_wp
+        do i = conditions%first(u), conditions%first(u + 1) - 1
+          e = conditions%bond(i)
+          k = int(conditions%class(e))
+          call splines_at(level, k, value, gradient)
+          do m = 1, 4**dim
+            share = share_of(conditions, .false., k, e, value(m), gradient(:dim, m))
+            at = dim*(level%spline(m, level%cell(k)) - 1)
+            of_bonds(at + 1:at + dim, u - first + 1) = of_bonds(at + 1:at + dim, u - first + 1) &
+              & + share*conditions%n(:, conditions%bond(conditions%first(u)))
+          end do
         end do
       end do
       !$omp do schedule(static)
@@ -337,21 +503,83 @@ contains
     type(level_type), intent(in) :: levels(:)        !! of `new_levels`
     real(wp), intent(in) :: r(:, :)                  !! (rows, points) [-]
     real(wp), intent(inout) :: w(:, :)               !! (rows, points), added to [-]
-    real(wp), allocatable :: c(:, :)
-    integer :: i
+    integer :: i, first
 
+    first = 1
     do i = 1, size(levels)
-      allocate (c(levels(i)%dim, product(levels(i)%nodes)))
-      call gather(conditions, levels(i), r, c)
-      if (allocated(levels(i)%factor)) then
-        call solve(levels(i), c)
-      else
-        c = levels(i)%inverse*c
+      if (i < size(levels)) then
+        if (allocated(levels(i + 1)%child)) cycle
       end if
-      call spread_out(conditions, levels(i), c, w)
-      deallocate (c)
+      call add_grids(conditions, levels(first:i), r, w)
+      first = i + 1
     end do
   end subroutine add_levels
+
+  !> Add what the grids of z or of w give.
+  subroutine add_grids(conditions, levels, r, w)
+    type(conditions_type), intent(in) :: conditions
+    type(level_type), intent(in) :: levels(:)
+    real(wp), intent(in) :: r(:, :)
+    real(wp), intent(inout) :: w(:, :)
+    type :: values_type
+      real(wp), allocatable :: c(:, :)  ! (components, splines)
+    end type values_type
+    type(values_type) :: of(size(levels))
+    integer :: i, s, m
+
+    do i = 1, size(levels)
+      associate (level => levels(i))
+        if (i == 1) then
+          allocate (of(i)%c(level%components, size(level%first) - 1))
+          call gather(conditions, level, r, of(i)%c)
+        else
+          allocate (of(i)%c(level%components, size(level%child, 2)), source=0.0_wp)
+          associate (share => shares(level%dim))
+            do s = 1, size(level%child, 2)
+              do m = 1, size(level%child, 1)
+                if (level%child(m, s) == 0) cycle
+                of(i)%c(:, s) = of(i)%c(:, s) + share(m)*of(i - 1)%c(:, level%child(m, s))
+              end do
+            end do
+          end associate
+        end if
+      end associate
+    end do
+    do i = size(levels), 1, -1
+      associate (level => levels(i))
+        if (allocated(level%factor)) then
+          call solve(level, of(i)%c)
+        else
+          of(i)%c = level%inverse*of(i)%c
+        end if
+        if (i == size(levels)) cycle
+      end associate
+      associate (wider => levels(i + 1))
+        associate (share => shares(wider%dim))
+          do s = 1, size(wider%child, 2)
+            do m = 1, size(wider%child, 1)
+              if (wider%child(m, s) == 0) cycle
+              of(i)%c(:, wider%child(m, s)) = of(i)%c(:, wider%child(m, s)) &
+                & + share(m)*of(i + 1)%c(:, s)
+            end do
+          end do
+        end associate
+      end associate
+    end do
+    call spread_out(conditions, levels(1), of(1)%c, w)
+  end subroutine add_grids
+
+  !> What a spline has of each of its children.
+  pure function shares(dim) result(share)
+    integer, intent(in) :: dim
+    real(wp) :: share(5**dim)
+    real(wp), parameter :: along(5) = [1.0_wp, 4.0_wp, 6.0_wp, 4.0_wp, 1.0_wp]/8
+    integer :: m, d
+
+    do m = 1, size(share)
+      share(m) = product([(along(1 + mod((m - 1)/5**(d - 1), 5)), d=1, dim)])
+    end do
+  end function shares
 
   !> Solve by the factor of the widest grid.
   pure subroutine solve(level, c)
@@ -398,112 +626,92 @@ contains
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
     real(wp), intent(in) :: r(:, :)
-    real(wp), intent(inout) :: c(:, :)  !! (dim, splines) set
+    real(wp), intent(inout) :: c(:, :)  !! (components, splines) set
     real(wp), allocatable :: of_cell(:, :, :)
-    real(wp) :: shifts(3), strains(3, 3), value(64), gradient(3, 64)
-    integer :: rows(3, 3), number, node(3), cell(3), i, k, l, m, n, x, dim, before
+    real(wp) :: fields(level%components), strains(3, 3), value(64), gradient(3, 64)
+    integer :: rows(3, 3), cell, i, k, m, s, x, dim, before, splines
 
     dim = level%dim
-    n = 4**dim
+    splines = 4**dim
     before = conditions%before
     rows = rows_of(dim)
-    allocate (of_cell(dim, n, product(level%cells)))
-    !$omp parallel default(none) shared(conditions, level, r, c, of_cell, rows, dim, before, n) &
-    !$omp private(shifts, strains, value, gradient, number, node, cell, i, k, l, m, x)
+    strains = 0.0_wp
+    allocate (of_cell(level%components, splines, size(level%start) - 1))
+    !$omp parallel default(none) shared(conditions, level, r, c, of_cell, rows, dim, before) &
+    !$omp shared(splines) private(fields, strains, value, gradient, cell, i, k, m, s, x)
     !$omp do schedule(dynamic, 8)
-    do number = 1, product(level%cells)
-      of_cell(:, :, number) = 0.0_wp
-      do i = int(level%start(number)), int(level%start(number + 1)) - 1
+    do cell = 1, size(of_cell, 3)
+      of_cell(:, :, cell) = 0.0_wp
+      do i = int(level%start(cell)), int(level%start(cell + 1)) - 1
         k = int(level%order(i))
+        if (level%of_stretch) then
+          call values_at(level, k, value)
+          fields = conditions%stiffness(k)*r(:before, k)
+          do m = 1, splines
+            of_cell(:, m, cell) = of_cell(:, m, cell) + fields*value(m)
+          end do
+          cycle
+        end if
         call splines_at(level, k, value, gradient)
-        shifts(:dim) = conditions%shift(k)*r(before + dim*(dim + 1)/2 + 1:before &
-          & + dim*(dim + 1)/2 + dim, k)
+        fields = conditions%shift(k)*r(before + dim*(dim + 1)/2 + 1:, k)
         do x = 1, dim
           strains(:dim, x) = conditions%strain(k)*r(before + rows(:dim, x), k)
         end do
-        do m = 1, n
+        do m = 1, splines
           do x = 1, dim
-            of_cell(x, m, number) = of_cell(x, m, number) + shifts(x)*value(m) &
+            of_cell(x, m, cell) = of_cell(x, m, cell) + fields(x)*value(m) &
               & + sum(strains(:dim, x)*gradient(:dim, m))
           end do
         end do
       end do
     end do
     !$omp do schedule(dynamic, 64)
-    do number = 1, product(level%nodes)
-      node = node_at(level, number)
-      c(:, number) = 0.0_wp
-      do m = 1, n
-        l = m - 1
-        cell = node - [mod(l, 4), mod(l/4, 4), l/16]
-        if (any(cell < 0) .or. any(cell >= level%cells)) cycle
-        c(:, number) = c(:, number) + of_cell(:, m, cell_number(level, cell))
+    do s = 1, size(c, 2)
+      c(:, s) = 0.0_wp
+      do i = level%first(s), level%first(s + 1) - 1
+        c(:, s) = c(:, s) + of_cell(:, level%under(2, i), level%under(1, i))
       end do
     end do
     !$omp end parallel
   end subroutine gather
 
-  !> All splines that reach point k, x fastest, and their gradients.
-  pure subroutine splines_at(level, k, value, gradient)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: k                  !! point
-    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
-    real(wp), intent(inout) :: gradient(:, :) !! (3, 4**dim) dim of them are set [1/m]
-    real(wp) :: v, s
-    integer :: m, n, i, j, d
-
-    associate (of => level%value(:, :, k), slope => level%slope(:, :, k))
-      value(:4) = of(:, 1)
-      gradient(1, :4) = slope(:, 1)
-      n = 4
-      do d = 2, level%dim
-        ! the first last, since the others are made of what it replaces
-        do i = 4, 1, -1
-          v = of(i, d)
-          s = slope(i, d)
-          do m = 1, n
-            j = (i - 1)*n + m
-            gradient(d, j) = value(m)*s
-            gradient(:d - 1, j) = gradient(:d - 1, m)*v
-            value(j) = value(m)*v
-          end do
-        end do
-        n = 4*n
-      end do
-    end associate
-  end subroutine splines_at
-
   !> The multipliers of splines, added to those of the points.
   subroutine spread_out(conditions, level, c, w)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
-    real(wp), intent(in) :: c(:, :)     !! (dim, splines)
+    real(wp), intent(in) :: c(:, :)     !! (components, splines)
     real(wp), intent(inout) :: w(:, :)  !! (rows, points), added to
-    real(wp) :: shifts(3), strains(3, 3), value(64), gradient(3, 64)
-    integer :: rows(3, 3), k, x, y, m, number, node(3), dim, l, before
+    real(wp) :: fields(level%components), strains(3, 3), value(64), gradient(3, 64)
+    integer :: rows(3, 3), k, x, y, m, s, dim, before
 
     dim = level%dim
     before = conditions%before
     rows = rows_of(dim)
     !$omp parallel do schedule(static) default(none) &
     !$omp shared(conditions, level, c, w, dim, rows, before) &
-    !$omp private(shifts, strains, value, gradient, k, x, y, m, number, node, l)
+    !$omp private(fields, strains, value, gradient, k, x, y, m, s)
     do k = 1, conditions%classes
+      fields = 0.0_wp
+      if (level%of_stretch) then
+        call values_at(level, k, value)
+        do m = 1, 4**dim
+          fields = fields + value(m)*c(:, level%spline(m, level%cell(k)))
+        end do
+        w(:before, k) = w(:before, k) + conditions%stiffness(k)*fields
+        cycle
+      end if
       call splines_at(level, k, value, gradient)
-      shifts = 0.0_wp
       strains = 0.0_wp
       do m = 1, 4**dim
-        l = m - 1
-        node = level%cell(:, k) + [mod(l, 4), mod(l/4, 4), l/16]
-        number = 1 + node(1) + level%nodes(1)*(node(2) + level%nodes(2)*node(3))
+        s = int(level%spline(m, level%cell(k)))
+        fields = fields + value(m)*c(:, s)
         do x = 1, dim
-          shifts(x) = shifts(x) + value(m)*c(x, number)
-          strains(:dim, x) = strains(:dim, x) + gradient(:dim, m)*c(x, number)
+          strains(:dim, x) = strains(:dim, x) + gradient(:dim, m)*c(x, s)
         end do
       end do
       do x = 1, dim
         associate (row => before + dim*(dim + 1)/2 + x)
-          w(row, k) = w(row, k) + conditions%shift(k)*shifts(x)
+          w(row, k) = w(row, k) + conditions%shift(k)*fields(x)
         end associate
         do y = 1, dim
           associate (row => before + rows(x, y))

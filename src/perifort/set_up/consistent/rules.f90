@@ -12,13 +12,14 @@ module pd_set_up_consistent_rules
   use pd_family_free_faces, only: find_sides, grids_touch
   use pd_family_outline, only: cloud_side, uneven
   use pd_law_material, only: material_type, several_stiffnesses
+  use pd_motion_loads, only: load_type
   use pd_motion_system, only: system_type
   use pd_scene_content_rules, only: place_fault, scene_fault
   use pd_scene_content_types, only: has_cut_cells, is_set, scene_type
   use pd_set_up_consistent_weights, only: alone_text, consistent_weights, solution_type
   implicit none (type, external)
   private
-  public :: check_consistent, prepare_surface, weigh_bonds
+  public :: check_consistent, prepare_surface, loaded_sides, weigh_bonds
 
 contains
 
@@ -158,22 +159,37 @@ contains
     body%sides = sides
   end subroutine prepare_surface
 
+  !> The points (n_slots) on which loads on sides act: through their surface areas.
+  pure function loaded_sides(scene, body, loads) result(loaded)
+    type(scene_type), intent(in) :: scene     !! a checked scene
+    type(body_type), intent(in) :: body       !! arranged in its slots
+    type(load_type), intent(in) :: loads(:)   !! those of its `&load`, in their order
+    logical, allocatable :: loaded(:)
+    integer :: l
+
+    allocate (loaded(body%n_slots), source=.false.)
+    do l = 1, size(loads)
+      if (scene%loads(l)%side /= '') loaded(loads(l)%slots) = .true.
+    end do
+  end function loaded_sides
+
   !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
   !> can break have weights that are not positive.
-  subroutine weigh_bonds(scene, system, materials, error)
+  subroutine weigh_bonds(scene, system, materials, fixed, error)
     type(scene_type), intent(in) :: scene               !! with consistent weights
     type(system_type), intent(inout) :: system          !! with body, whole family and model
     type(material_type), intent(in) :: materials(:)     !! (any number) by the points' numbers
+    logical, intent(in) :: fixed(:)                     !! of `loaded_sides`
     type(error_type), allocatable, intent(out) :: error
     type(solution_type) :: stretch, dilatation
     type(bond_weights_type) :: weights
     real(wp) :: least
 
     if (allocated(system%model%horizon)) then
-      call consistent_weights(system%body, system%family, materials, weights, stretch, &
+      call consistent_weights(system%body, system%family, materials, fixed, weights, stretch, &
         & dilatation, error, system%model)
     else
-      call consistent_weights(system%body, system%family, materials, weights, stretch, &
+      call consistent_weights(system%body, system%family, materials, fixed, weights, stretch, &
         & dilatation, error)
     end if
     call place_fault(error, scene, 'horizon', 1, 'surface_correction')

@@ -11,7 +11,7 @@ module pd_set_up_consistent_weights
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
   use pd_force_model, only: model_type
-  use pd_law_material, only: material_type
+  use pd_law_material, only: material_type, several_stiffnesses
   use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
     & join_conditions, stretch_conditions
   use pd_set_up_consistent_groups, only: find_groups, groups_type, spread_weights
@@ -28,111 +28,133 @@ module pd_set_up_consistent_weights
     real(wp) :: residual = 0.0_wp     !! largest error of a condition [-]
     integer :: unknowns = 0           !! different weights
     integer :: iterations = 0         !! of conjugate gradients, in all
+    logical :: hopeless = .false.     !! whether shared weights were given up, whatever the bound
   end type solution_type
 
-  !> Bounds that are tried, one after another; the last is none. Bars and plates have weights Gb of
-  !> 0.05 at least, blocks none above 0. Of Gd there are none above 0 in the plane either, and those
-  !> that are not negative are far from 1.
-  real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, unbounded], &
-    & bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
-  !> Change of a cloud's surface area that counts as much as one of a weight by 1 [faces].
+  !> Bounds on Gb that are tried, one after another; the last is none. With the first two most
+  !> bodies are stable. Bars and plates have weights Gb of 0.05 at least, blocks none above 0.
+  real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, -0.3_wp, unbounded]
+  !> Of Gd there are none above 0 in the plane either, and those that are not negative are far from
+  !> 1.
+  real(wp), parameter :: bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
+  !> Change of a surface area that counts as much as one of a weight by 1 [faces].
   real(wp), parameter :: part_of_face = 0.03_wp
 
 contains
 
-  !> Weights of the bonds of lattices or of one mesh, whose surface has been balanced where grids
-  !> touch or facets share it. The surface areas of a cloud change. An error is set if a point of a
-  !> lattice has no second one behind it, or if no weights fulfil the conditions.
-  subroutine consistent_weights(body, family, materials, weights, stretch, dilatation, error, &
-    & model)
+  !> Weights of the bonds of lattices or of one mesh or cloud, whose surface has been prepared.
+  !> Where no positive weights go with the surface areas, and in clouds, the areas of points that no
+  !> load acts on change; the body gets them. An error is set if a point of a lattice has no second
+  !> one behind it, or if no weights fulfil the conditions.
+  subroutine consistent_weights(body, family, materials, fixed, weights, stretch, dilatation, &
+    & error, model)
     type(body_type), intent(inout) :: body
       !! all on lattices, or one mesh or cloud, in the family's slots
     class(family_type), intent(in) :: family         !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
+    logical, intent(in) :: fixed(:)                  !! (n_slots) areas that loads act through
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
-    real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :)
-    integer :: alone
+    real(wp), allocatable :: area(:, :), of_stretch(:, :), of_dilatation(:, :)
+    real(wp) :: a(size(materials)), mu(size(materials)), face(body%n_slots)
+    integer :: alone, least
+    logical :: uneven
 
+    least = merge(2, 1, body%dim == 3)
+    a = a_of(materials)
+    mu = mu_of(materials, body%dim)
+    alone = 0
+    uneven = allocated(body%sides) .or. size(body%parts) > 0
+    face = merge(body%volume/body%spacing, 0.0_wp, body%point > 0 .and. .not. fixed)
     if (allocated(body%sides)) then
+      area = total_areas(body%sides, body%n_slots, body%dim)
       if (all(body%sides%axis == 0)) then
-        call weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
+        face = 0.0_wp
+        face(body%sides%slot) = body%sides%face
+        call weights_and_areas(body, family, materials, face, bounds_of_stretch, area, weights, &
+          & stretch, dilatation, error, model)
+        if (.not. allocated(error)) body%surface_area = area
         return
       end if
-      ! all materials have one stiffness
-      of_stretch = total_areas(body%sides, body%n_slots, body%dim)
-      associate (a => a_of(materials), mu => mu_of(materials, body%dim))
-        of_dilatation = a(1)*of_stretch
-        of_stretch = mu(1)*of_stretch
-      end associate
-      ! Gb above 0 leaves most of these bodies stable; bounds of Gd would take ten times as long
-      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .true., &
-        & [.true., .false.], weights, stretch, dilatation, error, model)
-      return
-    end if
-    if (size(body%parts) > 0) then
-      ! all materials have one stiffness
-      call surface_areas(body, of_stretch, error)
+    else if (size(body%parts) > 0) then
+      call surface_areas(body, area, error)
       if (allocated(error)) return
-      associate (a => a_of(materials), mu => mu_of(materials, body%dim))
-        of_dilatation = a(1)*of_stretch
-        of_stretch = mu(1)*of_stretch
-      end associate
-      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .true., &
-        & [.false., .false.], weights, stretch, dilatation, error)
-      return
+    else if (several_stiffnesses(materials)) then
+      call area_vectors(body, family, mu, of_stretch, alone)
+      if (alone == 0) call area_vectors(body, family, a, of_dilatation, alone)
+    else
+      call area_vectors(body, family, 0*a + 1, area, alone)
     end if
-    call area_vectors(body, family, mu_of(materials, body%dim), of_stretch, alone)
     if (alone > 0) then
       call fail(error, alone_text(body, alone), group='horizon', number=1)
       return
     end if
-    call area_vectors(body, family, a_of(materials), of_dilatation, alone)
-    call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., &
-      & [.true., .true.], weights, stretch, dilatation, error)
+    if (.not. allocated(area)) then
+      call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., &
+        & bounds_of_stretch(least:), weights, stretch, dilatation, error)
+      return
+    end if
+    call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
+      & bounds_of_stretch(least:least), weights, stretch, dilatation, error, model)
+    if (.not. allocated(error)) return
+    where (all(.not. abs(area) > 0.0_wp, dim=2)) face = 0.0_wp
+    if (any(face > 0.0_wp)) then
+      of_stretch = area
+      call weights_and_areas(body, family, materials, face, bounds_of_stretch(:2), of_stretch, &
+        & weights, stretch, dilatation, error, model)
+      if (.not. allocated(error)) then
+        body%surface_area = of_stretch
+        return
+      end if
+    end if
+    call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
+      & bounds_of_stretch(2:), weights, stretch, dilatation, error, model)
   end subroutine consistent_weights
 
-  !> Weights of a cloud, and what its surface areas must be for them: an outline knows them roughly
-  !> only, and with its areas there may be no Gb above 0, and Gd that grow with the body. So Gb, Gd
-  !> and areas are unknowns of one set of conditions.
-  subroutine weights_of_cloud(body, family, materials, weights, stretch, dilatation, error, model)
-    type(body_type), intent(inout) :: body
+  !> Weights together with surface areas: Gb, Gd and areas are unknowns of one set of conditions. An
+  !> outline knows the areas of a cloud roughly only, and with its areas there may be no Gb above 0,
+  !> and Gd that grow with the body; neither need there be with those of triangles, tetrahedra or
+  !> round parts of lattices. An error is set if no weights fulfil the conditions.
+  subroutine weights_and_areas(body, family, materials, face, bounds, area, weights, stretch, &
+    & dilatation, error, model)
+    type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
-    type(material_type), intent(in) :: materials(:)
+    type(material_type), intent(in) :: materials(:)   ! all of one stiffness
+    real(wp), intent(in) :: face(:)                   ! (n_slots) of points whose areas may change;
+                                                      ! 0: fixed [m2]
+    real(wp), intent(in) :: bounds(:)                 ! on Gb
+    real(wp), intent(inout) :: area(:, :)             ! (n_slots, dim) outward ones; may change [m2]
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
     type(model_type), intent(in), optional :: model
     type(groups_type) :: groups
     type(conditions_type) :: of_stretch, of_dilatation, conditions
-    real(wp), allocatable :: G(:), unit(:), area(:, :)
+    real(wp), allocatable :: G(:)
     real(wp) :: a(size(materials)), mu(size(materials))
-    integer :: e, c, u
+    integer :: c, u
 
     a = a_of(materials)
     mu = mu_of(materials, body%dim)
-    associate (sides => body%sides, n => groups%n_groups)
-      area = total_areas(sides, body%n_slots, body%dim)
-      call find_groups(body, family, area, 0, groups, error)
-      if (allocated(error)) return
-      call stretch_conditions(body, family, materials, groups, mu(1)*area, of_stretch, model)
-      call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, &
-        & model)
-      allocate (unit(body%n_slots), source=0.0_wp)
-      unit(sides%slot) = part_of_face*sides%face
-      call join_conditions(of_stretch, of_dilatation, mu(1), a(1), unit(groups%first), conditions)
-      call solve(conditions, bounds_of_stretch, .true., 'stretch and the dilatation', G, stretch, &
-        & error)
-      if (allocated(error)) return
-      do e = 1, size(sides%slot)
-        c = int(groups%class(sides%slot(e)))
-        if (c == 0) cycle
+    call find_groups(body, family, area, 0, groups, error)
+    if (allocated(error)) return
+    call stretch_conditions(body, family, materials, groups, mu(1)*area, of_stretch, model)
+    call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, model)
+    call join_conditions(of_stretch, of_dilatation, mu(1), a(1), part_of_face*face(groups%first), &
+      & conditions)
+    call solve(conditions, bounds, 'stretch and the dilatation', G, stretch, error)
+    if (allocated(error)) return
+    do c = 1, groups%n_classes
+      associate (k => groups%first(c))
+        if (.not. face(k) > 0.0_wp) cycle
         u = int(conditions%unknown(conditions%start(c + 1) - body%dim))
-        sides%area(:, e) = sides%area(:, e) + (G(u:u + body%dim - 1) - 1)*unit(sides%slot(e))
-      end do
+        area(k, :) = area(k, :) + (G(u:u + body%dim - 1) - 1)*part_of_face*face(k)
+      end associate
+    end do
+    associate (n => groups%n_groups)
       dilatation%residual = stretch%residual
       stretch%unknowns = n
       dilatation%unknowns = n
@@ -140,9 +162,9 @@ contains
       stretch%greatest = maxval(G(:n))
       dilatation%least = minval(G(n + 1:2*n))
       dilatation%greatest = maxval(G(n + 1:2*n))
-      call spread_weights(body, family, groups, G(:n), G(n + 1:2*n), weights)
+      call spread_weights(body, groups, G(:n), G(n + 1:2*n), weights)
     end associate
-  end subroutine weights_of_cloud
+  end subroutine weights_and_areas
 
   !> Why a point without a second one behind its face is refused.
   function alone_text(body, slot) result(text)
@@ -157,7 +179,7 @@ contains
   !> Weights for given surface areas. An error is set if no weights fulfil the conditions. Bonds in
   !> like surroundings have one weight; where that leaves no solution, surroundings are looked at
   !> farther, and in the end each bond has a weight of its own.
-  subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, alone, bounded, &
+  subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, uneven, bounds, &
     & weights, stretch, dilatation, error, model)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
     class(family_type), intent(in) :: family         !! whole: no bond cut
@@ -166,9 +188,9 @@ contains
       !! (n_slots, dim) mu x outward area, summed over regions; in 1D E/3 x cross section [N]
     real(wp), intent(in) :: of_dilatation(:, :)
       !! (n_slots, dim) a over the largest a x area, summed over regions [m2]
-    logical, intent(in) :: alone    !! each bond has a weight of its own, however alike they are
-    logical, intent(in) :: bounded(2)
-      !! whether Gb and Gd shall be positive, if that is possible
+    logical, intent(in) :: uneven
+      !! no points are alike; and of Gd no bound is asked for, which would take ten times as long
+    real(wp), intent(in) :: bounds(:)                !! on Gb, tried one after another [-]
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
@@ -179,25 +201,26 @@ contains
 
     ! in space a second horizon would give ten times the unknowns for weights hardly nearer to 1
     reach = merge(1, 2, body%dim == 3)
-    if (alone) reach = 0
+    if (uneven) reach = 0
     do
-      call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
-        & weights, stretch, dilatation, error, model)
+      call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounds, &
+        & uneven, weights, stretch, dilatation, error, model)
       if (reach == 0 .or. .not. allocated(error)) return
-      reach = merge(0, reach + 1, reach == farthest)
+      reach = merge(0, reach + 1, reach == farthest .or. stretch%hopeless .or. dilatation%hopeless)
     end do
   end subroutine weights_of_areas
 
   !> Weights where bonds have one weight if all looks alike within `reach` horizons. An error is set
   !> if none fulfil the conditions.
-  subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounded, &
-    & weights, stretch, dilatation, error, model)
+  subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounds, &
+    & uneven, weights, stretch, dilatation, error, model)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)
     real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
     integer, intent(in) :: reach
-    logical, intent(in) :: bounded(2)
+    real(wp), intent(in) :: bounds(:)
+    logical, intent(in) :: uneven
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
@@ -212,23 +235,21 @@ contains
     call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
       & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
     if (allocated(error)) return
-    call stretch_conditions(body, family, materials, groups, of_stretch, conditions, &
-      & model)
-    call solve(conditions, bounds_of_stretch(merge(2, 1, body%dim == 3):), bounded(1), 'stretch', &
-      & Gb, stretch, error)
+    call stretch_conditions(body, family, materials, groups, of_stretch, conditions, model)
+    call solve(conditions, bounds, 'stretch', Gb, stretch, error)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions, model)
-    call solve(conditions, bounds_of_dilatation, bounded(2), 'dilatation', Gd, dilatation, error)
+    call solve(conditions, bounds_of_dilatation(merge(size(bounds_of_dilatation), 1, uneven):), &
+      & 'dilatation', Gd, dilatation, error)
     if (allocated(error)) return
-    call spread_weights(body, family, groups, Gb, Gd, weights)
+    call spread_weights(body, groups, Gb, Gd, weights)
   end subroutine weights_at_reach
 
-  !> The least change within the first bounds that allow one.
-  subroutine solve(conditions, bounds, bounded, what, G, solution, error)
+  !> The least change within the first of some bounds that allow one.
+  subroutine solve(conditions, bounds, what, G, solution, error)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: bounds(:)
-    logical, intent(in) :: bounded
     character(*), intent(in) :: what
     real(wp), allocatable, intent(out) :: G(:)
     type(solution_type), intent(out) :: solution
@@ -239,11 +260,12 @@ contains
 
     found = .false.
     solution%unknowns = conditions%unknowns
-    do b = merge(1, size(bounds), bounded), size(bounds)
+    do b = 1, size(bounds)
       solution%bound = bounds(b)
-      call least_change(conditions, bounds(b), G, solution%residual, iterations, found)
+      call least_change(conditions, bounds(b), G, solution%residual, iterations, found, &
+        & solution%hopeless)
       solution%iterations = solution%iterations + iterations
-      if (found) exit
+      if (found .or. solution%hopeless) exit
     end do
     solution%least = minval(G)
     solution%greatest = maxval(G)
