@@ -19,10 +19,10 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: uneven = 1.0e-10_wp
     !! of those of points that all differ, and of others that more steps do not lower [-]
   real(wp), parameter :: much = 1.0e3_wp            !! growth of an error that is rounding
+  real(wp), parameter :: far = 1.0e-6_wp            !! error of a first step that more do not mend
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
   integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
-  integer, parameter :: most_shared = 1500          !! of such a step where bonds share weights
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
   integer, parameter :: across = 40                 !! points across that these are enough for
@@ -88,10 +88,6 @@ contains
       part = part_of_step
       if (low > unbounded) part = max(part, min(most_of_step, residual))
       call solve(conditions, levels, free, part, r, step, iterations)
-      if (.not. conditions%alone .and. newton == 1 .and. iterations == most_shared) then
-        hopeless = .true.
-        return
-      end if
       ! multipliers of long waves are large, and what they give a bond is small: so the changes of
       ! weights are summed, and each step can mend what rounding leaves of the one before
       call spread_over(conditions, step, change)
@@ -106,6 +102,10 @@ contains
         if (maxval(abs(r)) <= 0.5_wp*residual) exit
         length = length/2
       end do
+      if (.not. conditions%alone .and. newton == 1) then
+        hopeless = iterations == most_iterations .and. maxval(abs(r)) > far
+        if (hopeless) return
+      end if
       t = tried
       linear = linear + length*along
       before = value
@@ -163,8 +163,7 @@ contains
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
     if (size(levels) > 0) target = max(0.3_wp*uneven, part*maxval(abs(r)))
     least = huge(1.0_wp)
-    most = merge(merge(most_iterations, most_shared, conditions%alone), &
-      & nint(most_bounded*wider(conditions)), all(free))
+    most = merge(most_iterations, nint(most_bounded*wider(conditions)), all(free))
     do i = 1, most
       call precondition(factor, rest, w)
       call add_levels(conditions, levels, rest, w)

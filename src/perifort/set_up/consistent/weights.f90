@@ -98,7 +98,7 @@ contains
       return
     end if
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds_of_stretch(least:least), weights, stretch, dilatation, error, model)
+      & bounds_of_stretch(least:2), weights, stretch, dilatation, error, model)
     if (.not. allocated(error)) return
     where (all(.not. abs(area) > 0.0_wp, dim=2)) face = 0.0_wp
     if (any(face > 0.0_wp)) then
@@ -111,7 +111,7 @@ contains
       end if
     end if
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds_of_stretch(2:), weights, stretch, dilatation, error, model)
+      & bounds_of_stretch(3:), weights, stretch, dilatation, error, model)
   end subroutine consistent_weights
 
   !> Weights together with surface areas: Gb, Gd and areas are unknowns of one set of conditions. An
