@@ -92,6 +92,8 @@ SPECIMENS = {
     "cantilever": Specimen("double cantilever", "double_cantilever.nml", lambda a: f"{a:.6g}, 0.0",
                            0.040, 0.058, cantilever, 2, 4, 0.505,
                            "the stress along its crack, at a horizon of a tenth of an arm: README.md"),
+    "cantilever_90": Specimen("double cantilever", "double_cantilever.nml", lambda a: f"{a:.6g}, 0.0",
+                              0.040, 0.0586, cantilever, 2, 3, 0.60, "see cantilever"),
 }
 
 
@@ -175,7 +177,8 @@ def judge(case, kind, fine=False, **settings):
     if "nu" in settings:
         where += f", nu {settings['nu']:.2g}, plane {settings['plane']}"
     if fine:
-        where += {2: ", half the spacing", 4: ", a quarter of the spacing"}[kind.finer]
+        where += {2: ", half the spacing", 3: ", a third of the spacing",
+                  4: ", a quarter of the spacing"}[kind.finer]
     for what, value in ((f"{where}: mean P/P_c(a), growth of 3 to 10 horizons", found["mean"]),
                         ("   energy per area over Gc in the same growth", found["energy"])):
         if kind.missed and not fine:
@@ -210,13 +213,13 @@ def specimen(name):
     return part
 
 
-def materials(name):
+def materials(name, fine=False):
     """A part of the suite: a specimen of six materials, on the fine lattice if it takes that."""
     def part(case):
         kind = SPECIMENS[name]
         for nu in (0.2, 1 / 3, 0.4):
             for plane in ("stress", "strain"):
-                judge(case, kind, fine=bool(kind.missed), nu=nu, plane=plane,
-                      label=f"{kind.scene[:-4]}_{nu:.2f}_{plane}".replace("0.", ""))
+                judge(case, kind, fine=fine or bool(kind.missed), nu=nu, plane=plane,
+                      label=f"{name}{'_fine' * fine}_{nu:.2f}_{plane}".replace("0.", ""))
         return []
     return part

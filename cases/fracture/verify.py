@@ -1,5 +1,5 @@
 """Fracture beside closed forms and experiments: loads, energies, speeds, angles, and the waves that
-carry them. --full: all materials, finer grids, orders of convergence; --quick: coarse grids.
+carry them. --full: six materials, finer grids, orders of convergence; --quick: coarse grids.
 --only NAME[,NAME..]: some of the parts (see PARTS)."""
 import sys
 from pathlib import Path
@@ -30,11 +30,16 @@ PARTS = {
     "ring": dynamics.ring,
     "compact_materials": specimens.materials("compact"),
     "bent_materials": specimens.materials("bent"),
+    "compact_materials_fine": specimens.materials("compact", fine=True),
+    "bent_materials_fine": specimens.materials("bent", fine=True),
     "cantilever_materials": specimens.materials("cantilever"),
+    "cantilever_materials_90": specimens.materials("cantilever_90"),
     "sweep": sweep.sweep,
 }
-# Parts that only --full and --only run
-LONG = ("compact_materials", "bent_materials", "cantilever_materials", "sweep")
+# Parts that --full runs beside those before, and parts of an hour and more that only --only runs
+LONG = ("compact_materials", "bent_materials")
+APART = ("compact_materials_fine", "bent_materials_fine", "cantilever_materials",
+         "cantilever_materials_90", "sweep")
 
 
 def pictures(case, shown):
@@ -69,13 +74,13 @@ def pictures(case, shown):
 
 def main():
     case = Case(__file__, __doc__, options=(
-        ("--full", dict(action="store_true", help="all materials, finer grids, orders (an hour)")),
+        ("--full", dict(action="store_true", help="materials, finer grids, orders (an hour)")),
         ("--only", dict(metavar="NAME", default="", help="some parts: " + ", ".join(PARTS))),
         ("--threads", dict(type=int, default=0, help="threads of the larger runs"))))
     case.threads = case.options.threads
     # Load over growth of the specimens, for a picture
     case.curves = {}
-    names = [name for name in PARTS if case.options.full or name not in LONG]
+    names = [name for name in PARTS if name not in APART and (case.options.full or name not in LONG)]
     if case.options.only:
         names = case.options.only.split(",")
     unknown = [name for name in names if name not in PARTS]

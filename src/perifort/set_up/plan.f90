@@ -114,11 +114,12 @@ contains
     character(:), allocatable :: text
 
     if (size(system%body%parts) > 0) then
-      text = 'use more elements across its thinnest part'
+      text = 'use more elements across its thinnest part, or move layers instead of loads on facets'
     else if (several_stiffnesses(system%model%materials)) then
       text = 'use materials that differ less'
     else
-      text = 'use more points at round and thin parts, small holes and corners'
+      text = 'use more points at round and thin parts, small holes and corners, or move layers '// &
+        & 'instead of loads on sides there'
     end if
   end function remedy_of
 

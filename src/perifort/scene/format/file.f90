@@ -6,7 +6,7 @@ module pd_scene_format_file
   use pd_base_text, only: with_unit
   implicit none (type, external)
   private
-  public :: read_text_file, find_text_file, resolve_path, line_type, split_lines, byte_order_mark
+  public :: read_text_file, open_text_file, resolve_path, line_type, split_lines, byte_order_mark
 
   !> What some programs write before a text in UTF-8.
   character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
@@ -31,20 +31,16 @@ contains
     character(512) :: reason
 
     text = ''
-    call find_text_file(path, length, error)
-    if (.not. allocated(error) .and. length > available_memory()/copies) then
+    call open_text_file(path, unit, length, error)
+    if (allocated(error)) return
+    if (length > available_memory()/copies) then
       call fail(error, "the file '"//path//"' is too large: its "//with_unit(real(length, wp), &
         & 'B', 3)//' are more than can be read with '// &
         & with_unit(real(available_memory(), wp), 'B', 3)//' of memory')
-    end if
-    if (allocated(error)) return
-    reason = ''
-    open (newunit=unit, file=path, status='old', action='read', access='stream', &
-      & form='unformatted', iostat=status, iomsg=reason)
-    if (status /= 0) then
-      call fail(error, "cannot open the file '"//path//"': "//trim(reason))
+      close (unit)
       return
     end if
+    reason = ''
     deallocate (text)
     allocate (character(length) :: text, stat=status, errmsg=reason)
     if (status == 0) read (unit, iostat=status, iomsg=reason) text
@@ -55,20 +51,31 @@ contains
     end if
   end subroutine read_text_file
 
-  !> How long a file is. An error if it is not there, or if it is empty, as a pipe is.
-  subroutine find_text_file(path, length, error)
+  !> Open a file to read its bytes. An error, and no unit, if it is not there or cannot be opened, or
+  !> if it is empty, as a pipe is.
+  subroutine open_text_file(path, unit, length, error)
     character(*), intent(in) :: path       !! of the file
+    integer, intent(out) :: unit           !! for reading by `pos` or on, from the first byte
     integer(i8), intent(out) :: length     !! [bytes]
     type(error_type), allocatable, intent(out) :: error
+    integer :: status
+    character(512) :: reason
     logical :: exists
 
+    unit = 0
     inquire (file=path, exist=exists, size=length)
     if (.not. exists) then
       call fail(error, "cannot find the file '"//path//"'")
+      return
     else if (length <= 0_i8) then
       call fail(error, "the file '"//path//"' is empty, or no plain file")
+      return
     end if
-  end subroutine find_text_file
+    reason = ''
+    open (newunit=unit, file=path, status='old', action='read', access='stream', &
+      & form='unformatted', iostat=status, iomsg=reason)
+    if (status /= 0) call fail(error, "cannot open the file '"//path//"': "//trim(reason))
+  end subroutine open_text_file
 
   !> Where a file named in a scene is: absolute names as they are; others are looked for in the
   !> folder of `scene_file`, then in the working directory. If it is in neither, the name in the

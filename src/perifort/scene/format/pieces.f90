@@ -2,7 +2,7 @@
 module pd_scene_format_pieces
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: i8
-  use pd_scene_format_file, only: byte_order_mark, find_text_file
+  use pd_scene_format_file, only: byte_order_mark, open_text_file
   use pd_scene_format_table, only: content_begins, read_table_text, table_type
   implicit none (type, external)
   private
@@ -35,15 +35,9 @@ contains
     character(512) :: reason
     character :: byte
 
-    call find_text_file(path, bytes, error)
+    call open_text_file(path, unit, bytes, error)
     if (allocated(error)) return
     reason = ''
-    open (newunit=unit, file=path, status='old', action='read', access='stream', &
-      & form='unformatted', iostat=status, iomsg=reason)
-    if (status /= 0) then
-      call fail(error, "cannot open the file '"//path//"': "//trim(reason))
-      return
-    end if
     allocate (pieces(0))
     allocate (character(length) :: block)
     lines = 0_i8
@@ -121,17 +115,16 @@ contains
     character(*), intent(in), optional :: allowed(:)  !! as in `read_table`: the piece begins with
                                                       !! a header
     character(:), allocatable :: text
+    integer(i8) :: bytes
     integer :: unit, status
     character(512) :: reason
 
+    call open_text_file(path, unit, bytes, error)
+    if (allocated(error)) return
     reason = ''
     allocate (character(piece%bytes) :: text)
-    open (newunit=unit, file=path, status='old', action='read', access='stream', &
-      & form='unformatted', iostat=status, iomsg=reason)
-    if (status == 0) then
-      read (unit, pos=piece%at, iostat=status, iomsg=reason) text
-      close (unit)
-    end if
+    read (unit, pos=piece%at, iostat=status, iomsg=reason) text
+    close (unit)
     if (status /= 0) then
       call fail(error, "cannot read the file '"//path//"': "//trim(reason))
       return
