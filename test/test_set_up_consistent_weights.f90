@@ -1376,9 +1376,10 @@ contains
     call expect_close(error, total, total(1), 0.02_wp*total(1), 'energy')
   end subroutine test_explicit
 
-  !> Plates, whole, with a hole and round, that random velocities break in many places: what has been
-  !> dissipated never falls, and with the energy of motion and strain it is that of the start, to twice
-  !> the (omega dt/2)^2 = 0.01 by which that of the fastest mode swings at a tenth of the stable step.
+  !> Plates, whole, with a hole and round, that random velocities break in many places: what has
+  !> been dissipated never falls, and with the energy of motion and strain it is that of the start,
+  !> to the (omega dt/2)^2 = 0.01 by which that of the fastest mode swings at a tenth of the stable
+  !> step.
   subroutine test_fracture(error)
     type(error_type), allocatable, intent(out) :: error
     character(5), parameter :: names(*) = [character(5) :: 'plate', 'hole', 'disc']
@@ -1423,11 +1424,10 @@ contains
       end if
       n = size(diary%dissipated)
       total = diary%kinetic + diary%strain + diary%dissipated
-      print *, names(i), n, diary%dissipated(n)/total(1), maxval(abs(total - total(1)))/total(1)
       call expect_true(error, all(diary%dissipated(2:) >= diary%dissipated(:n - 1)), &
         & 'dissipation falls: '//names(i))
       call expect_true(error, diary%dissipated(n) > 0.1_wp*total(1), 'little breaks: '//names(i))
-      call expect_close(error, total, total(1), 0.02_wp*total(1), 'energy: '//names(i))
+      call expect_close(error, total, total(1), 0.01_wp*total(1), 'energy: '//names(i))
       if (allocated(error)) return
     end do
   end subroutine test_fracture

@@ -51,8 +51,8 @@ contains
     end if
   end subroutine read_text_file
 
-  !> Open a file to read its bytes. An error, and no unit, if it is not there or cannot be opened, or
-  !> if it is empty, as a pipe is.
+  !> Open a file to read its bytes. An error, and no unit, if it is not there or cannot be opened,
+  !> or if it is empty, as a pipe is.
   subroutine open_text_file(path, unit, length, error)
     character(*), intent(in) :: path       !! of the file
     integer, intent(out) :: unit           !! for reading by `pos` or on, from the first byte
