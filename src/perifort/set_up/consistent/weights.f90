@@ -58,7 +58,7 @@ contains
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
-    real(wp), allocatable :: area(:, :), of_stretch(:, :), of_dilatation(:, :)
+    real(wp), allocatable :: area(:, :), changed(:, :), of_stretch(:, :), of_dilatation(:, :)
     real(wp) :: a(size(materials)), mu(size(materials)), face(body%n_slots)
     integer :: alone, least
     logical :: uneven
@@ -68,11 +68,10 @@ contains
     mu = mu_of(materials, body%dim)
     alone = 0
     uneven = allocated(body%sides) .or. size(body%parts) > 0
-    face = merge(body%volume/body%spacing, 0.0_wp, body%point > 0 .and. .not. fixed)
+    face = 0.0_wp
     if (allocated(body%sides)) then
       area = total_areas(body%sides, body%n_slots, body%dim)
       if (all(body%sides%axis == 0)) then
-        face = 0.0_wp
         face(body%sides%slot) = body%sides%face
         call weights_and_areas(body, family, materials, face, bounds_of_stretch, area, weights, &
           & stretch, dilatation, error, model)
@@ -100,13 +99,13 @@ contains
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
       & bounds_of_stretch(least:2), weights, stretch, dilatation, error, model)
     if (.not. allocated(error)) return
-    where (all(.not. abs(area) > 0.0_wp, dim=2)) face = 0.0_wp
+    where (any(abs(area) > 0.0_wp, dim=2) .and. .not. fixed) face = body%volume/body%spacing
     if (any(face > 0.0_wp)) then
-      of_stretch = area
-      call weights_and_areas(body, family, materials, face, bounds_of_stretch(:2), of_stretch, &
+      changed = area
+      call weights_and_areas(body, family, materials, face, bounds_of_stretch(:2), changed, &
         & weights, stretch, dilatation, error, model)
       if (.not. allocated(error)) then
-        body%surface_area = of_stretch
+        body%surface_area = changed
         return
       end if
     end if
