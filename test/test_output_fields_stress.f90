@@ -20,6 +20,7 @@ module test_output_fields_stress
   use pd_output_results_hdf5, only: close_file, hdf5_file, open_file
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: scene_type
+  use pd_scene_format_file, only: line_type
   use pd_set_up_prepare, only: set_up_type
   use pd_study_trade_study, only: begin_study, run_all, session_type
   use pd_study_trade_table, only: put_file
@@ -677,7 +678,8 @@ contains
       & "&study vary = 'time%step' values = 1.0e-12, 0.5e-12 measure = 'p_stress_xx' "// &
       & "against = 'finest' norm = 'rms' /"//line, fault)
     options%output_directory = here//'/study'
-    if (.not. allocated(fault)) call begin_study(here//'/study.nml', options, session, fault)
+    if (.not. allocated(fault)) call begin_study(here//'/study.nml', options, session, fault, &
+      & [line_type ::])
     if (.not. allocated(fault)) call run_all(session, fault)
     call omp_set_num_threads(threads)
     call accept(error, fault)

@@ -17,7 +17,7 @@ module test_output_fields_table
   use pd_output_results_hdf5, only: close_file, hdf5_file, open_file
   use pd_scene_content_read, only: read_scene_text
   use pd_scene_content_types, only: name_length, scene_type
-  use pd_scene_format_file, only: read_text_file
+  use pd_scene_format_file, only: line_type, read_text_file
   use pd_study_trade_measure, only: quantity_unit
   use pd_study_trade_study, only: begin_study, run_all, session_type
   use pd_study_trade_table, only: put_file
@@ -323,7 +323,8 @@ contains
         & "&probe name = 'p' point = 0, 0 fields = 'motion_energy' /"//line// &
         & "&study vary = 'time%step' values = 1.0e-6, 0.5e-6 measure = '"// &
         & trim(measures(i))//"' against = '"//trim(against(i))//"' norm = 'rms' /"//line, fault)
-      if (.not. allocated(fault)) call begin_study(here//'/study.nml', options, session, fault)
+      if (.not. allocated(fault)) call begin_study(here//'/study.nml', options, session, fault, &
+        & [line_type ::])
       if (.not. allocated(fault)) call run_all(session, fault)
       call accept(error, fault)
       if (allocated(error)) exit

@@ -45,7 +45,7 @@ contains
     type(error_type), allocatable, intent(inout) :: error
     type(scene_error), allocatable :: found
     if (allocated(error)) return
-    call plan_from_text(head//text, 'a.nml', plan, found)
+    call plan_from_text(head//text, 'a.nml', plan, found, [line_type ::])
     if (allocated(found)) call test_failed(error, found%message)
   end subroutine planned
 
@@ -141,7 +141,8 @@ contains
     if (allocated(error)) return
     call expect_true(error, all(plan%trials(1)%scene%bodies(1)%points(:2) == [20, 10]) .and. &
       & all(plan%trials(1)%scene%bodies(2)%points(:2) == [20, 20]), 'one body')
-    call plan_from_text(head//"&study vary = 'points' values = 40, 25"//rest, 'a.nml', plan, found)
+    call plan_from_text(head//"&study vary = 'points' values = 40, 25"//rest, 'a.nml', plan, found, &
+      & [line_type ::])
     call expect_parts(error, found, "bad value '25'|a.nml:6|expected a multiple of 2")
   end subroutine test_points
 
@@ -195,7 +196,7 @@ contains
     call expect(error, plan%trials(2)%scene%probes(1)%point(1), 0.3_wp, 0.0_wp, 'x')
     call expect(error, plan%trials(2)%scene%probes(1)%point(2), 0.4_wp, 0.0_wp, 'y')
     call plan_from_text(head//probe//"&study vary = 'probe%point' values = 0.1, 0.2, 0.3"//rest, &
-      & 'a.nml', plan, found)
+      & 'a.nml', plan, found, [line_type ::])
     call expect_parts(error, found, '3 values are not a whole number of vectors|expected 2')
   end subroutine test_vectors
 
@@ -244,7 +245,7 @@ contains
       type(plan_type) :: plan
       type(scene_error), allocatable :: found
       if (allocated(error)) return
-      call plan_from_text(head//text, 'a.nml', plan, found)
+      call plan_from_text(head//text, 'a.nml', plan, found, [line_type ::])
       call expect_parts(error, found, parts)
     end subroutine refused
   end subroutine test_refused

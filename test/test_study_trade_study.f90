@@ -82,7 +82,8 @@ contains
     if (present(threads)) options%threads = threads
     call make_directory(here, fault)
     if (.not. allocated(fault)) call put_file(here, name//'.nml', text, fault)
-    if (.not. allocated(fault)) call begin_study(here//'/'//name//'.nml', options, session, fault)
+    if (.not. allocated(fault)) call begin_study(here//'/'//name//'.nml', options, session, fault, &
+      & [line_type ::])
     if (.not. allocated(fault)) call run_all(session, fault)
     call omp_set_num_threads(before)
   end subroutine studied
@@ -197,7 +198,7 @@ contains
     call expect_true(error, file_exists(here//'/table/study.txt'), 'a text')
     call options_for('table', options)
     options%overwrite = .false.
-    call run_study(here//'/table.nml', options, fault)
+    call run_study(here//'/table.nml', options, fault, [line_type ::])
     call expect_true(error, allocated(fault), 'a study that is there is not overwritten unasked')
   end subroutine test_table
 
@@ -583,7 +584,8 @@ contains
     call make_directory(here, fault)
     if (.not. allocated(fault)) call put_file(here, 'choice.nml', bar//points//'/'//line// &
       & "&study vary = 'ratio' values = 1.015, 3.015 /", fault)
-    if (.not. allocated(fault)) call run_choose(here//'/choice.nml', options, target, 0.0_wp, fault)
+    if (.not. allocated(fault)) call run_choose(here//'/choice.nml', options, target, 0.0_wp, fault, &
+      & [line_type ::])
     if (.not. allocated(fault)) call read_table(here//'/choice/study.csv', table, fault, &
       & allowed=['*'])
     call accept(error, fault)
@@ -610,13 +612,13 @@ contains
       & "values = 1.015, 3.015 measure = 'centre' against = 'analytic' /", fault)
     call accept(error, fault)
     if (allocated(error)) return
-    call run_choose(here//'/missed.nml', options, 1.0e-6_wp, 0.0_wp, fault)
+    call run_choose(here//'/missed.nml', options, 1.0e-6_wp, 0.0_wp, fault, [line_type ::])
     call expect_true(error, allocated(fault), 'missed')
     if (.not. allocated(fault)) return
     call expect_true(error, fault%status == 1 .and. index(fault%message, 'cannot be met') > 0, &
       & fault%message)
     ! within a time that no run can keep
-    call run_choose(here//'/missed.nml', options, 1.0_wp, 1.0e-9_wp, fault)
+    call run_choose(here//'/missed.nml', options, 1.0_wp, 1.0e-9_wp, fault, [line_type ::])
     call expect_true(error, allocated(fault), 'no run is that fast')
   end subroutine test_missed
 

@@ -32,7 +32,8 @@ contains
     integer :: k, i, c
     logical :: weighted, influenced
 
-    influenced = has_factors(laws)
+    influenced = .false.
+    if (present(laws)) influenced = has_factors(laws)
     weighted = influenced .or. family%rule%ratio > 0.0_wp
     allocate (D(body%n_slots, body%dim), S(body%n_slots, body%dim), source=1.0_wp)
     !$omp parallel default(none) shared(body, family, materials, D, S, laws, weighted, axes) &
@@ -59,8 +60,10 @@ contains
               gb = 1.0_wp
               gd = 1.0_wp
               delta = horizon_of_bond(family%rule, body%spacing(k), body%spacing(bonds%j(i)))
-              if (influenced) call law_factors(laws, int(body%material(k)), bonds%length(i)/delta, &
-                & gb, gd)
+              if (present(laws)) then
+                if (influenced) call law_factors(laws, int(body%material(k)), &
+                  & bonds%length(i)/delta, gb, gd)
+              end if
               if (family%rule%ratio > 0.0_wp) then
                 gb = gb*(family%rule%delta/delta)**(body%dim + 1)
                 gd = gd*(family%rule%delta/delta)**body%dim
@@ -98,11 +101,10 @@ contains
 
   !> Whether some law has factors that differ from 1. Without, sums have the bits of the plain loop.
   pure logical function has_factors(laws)
-    type(law_item_type), intent(in), optional :: laws(:)
+    type(law_item_type), intent(in) :: laws(:)
     integer :: i
 
     has_factors = .false.
-    if (.not. present(laws)) return
     do i = 1, size(laws)
       select type (law => laws(i)%law)
       class is (weighted_law_type)
@@ -113,17 +115,16 @@ contains
     end do
   end function has_factors
 
-  !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1 without laws
-  !> and for laws with a force of their own. `ratio`: |xi|/delta.
+  !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1
+  !> for laws with a force of their own. `ratio`: |xi|/delta.
   pure subroutine law_factors(laws, material, ratio, gb, gd)
-    type(law_item_type), intent(in), optional :: laws(:)
+    type(law_item_type), intent(in) :: laws(:)
     integer, intent(in) :: material
     real(wp), intent(in) :: ratio
     real(wp), intent(out) :: gb, gd
 
     gb = 1.0_wp
     gd = 1.0_wp
-    if (.not. present(laws)) return
     select type (law => laws(material)%law)
     class is (weighted_law_type)
       if (law%has_factors()) call law%bond_factors(ratio, gb, gd)

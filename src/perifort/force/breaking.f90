@@ -59,7 +59,7 @@ contains
     real(wp), intent(inout) :: damage(:)  !! brought up to date (n_slots) [-]
     integer(i8), intent(out) :: broken    !! how many bonds broke, each counted once
     real(wp), intent(out) :: dissipated   !! energy lost at fixed u [J]
-    real(wp), intent(in), optional :: others(:, :, :)
+    real(wp), allocatable, intent(in), optional :: others(:, :, :)
       !! (n_slots, dim, sets) other displacements, read at `slots` and at the ends of their bonds
       !! alone [m]
     real(wp), intent(out), optional :: products(:)     !! energy lost with each set of them [J]
@@ -69,9 +69,9 @@ contains
       !! of its limit, beyond which a bond breaks; 1 by default [-]
     integer, intent(in), optional :: level
       !! of substeps: bonds of this level alone break; all by default
-    real(wp), intent(in), optional :: expansions(:, :)
-      !! (n_slots, sets) thermal strains with each set of `others`, by default those of the model
-      !! [-]
+    real(wp), allocatable, intent(in), optional :: expansions(:, :)
+      !! (n_slots, sets) thermal strains with each set of `others`; absent or not allocated: those
+      !! of the model [-]
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:), after(:)
     logical, allocatable :: gone(:)

@@ -110,14 +110,25 @@ contains
     do m = 1, size(motions)
       associate (motion => motions(m))
         if (allocated(motion%pose)) then
-          if (.not. present(but_pins)) call impose_pose(motion, t, u, v)
+          if (present(but_pins)) cycle
+          if (present(v)) then
+            call impose_pose(motion, t, u, v)
+          else
+            call impose_pose(motion, t, u)
+          end if
           cycle
         end if
         if (all(motion%kind == free_component)) cycle
         factor = motion%curve%value(t)
         rate = motion%curve%slope(t)
         path = motion%curve%integral(t)
-        if (any(motion%by_time)) call impose_by_time(motion, t, u, v)
+        if (any(motion%by_time)) then
+          if (present(v)) then
+            call impose_by_time(motion, t, u, v)
+          else
+            call impose_by_time(motion, t, u)
+          end if
+        end if
         do c = 1, size(u, 2)
           if (motion%by_time(c)) cycle
           select case (motion%kind(c))

@@ -108,7 +108,8 @@ contains
     self%path = path
     self%current = path//'.part'
     if (present(cells)) self%layout%cells = cells
-    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, lines)
+    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    if (present(lines)) self%layout%lines = lines
     call start_hdf5(error)
     if (allocated(error)) return
     call remove_file(path//'.grow')  ! a killed run may have left it
@@ -127,8 +128,7 @@ contains
   end subroutine create
 
   !> What the file is to hold, and room for how much of it.
-  subroutine plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, &
-    & lines)
+  subroutine plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
     type(vtkhdf_file), intent(inout) :: self
     integer(i8), intent(in) :: points
     type(field_type), intent(in) :: fields(:)
@@ -136,10 +136,8 @@ contains
     type(column_type), intent(in) :: columns(:)
     integer, intent(in) :: planned_rows
     logical, intent(in) :: single
-    type(line_type), intent(in), optional :: lines(:)
 
     allocate (self%layout%lines(0))
-    if (present(lines)) self%layout%lines = lines
     allocate (self%layout%fields, source=fields)
     allocate (self%layout%columns, source=columns)
     self%layout%points = points
@@ -173,7 +171,8 @@ contains
     self%path = path
     self%current = path
     if (present(cells)) self%layout%cells = cells
-    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single, lines)
+    call plan_layout(self, points, fields, planned_outputs, columns, planned_rows, single)
+    if (present(lines)) self%layout%lines = lines
     call start_hdf5(error)
     if (allocated(error)) return
     call remove_file(path//'.grow')

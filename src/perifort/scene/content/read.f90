@@ -29,7 +29,11 @@ contains
 
     call read_text_file(path, text, error)
     if (allocated(error)) return
-    call read_scene_text(text, path, scene, error, changes, table, laws)
+    if (present(changes)) then
+      call read_scene_text(text, path, scene, error, changes, table, laws)
+    else
+      call read_scene_text(text, path, scene, error, table=table, laws=laws)
+    end if
   end subroutine read_scene
 
   !> Read a scene from its text; `name` stands for the file in messages and for relative paths. An

@@ -24,6 +24,7 @@ contains
     character(*), intent(in), optional :: fields(:)   !! names of the fields of the output
     type(group_table), intent(in), optional :: table  !! of the groups; without, the program's own
     type(group_table) :: known
+    type(keys_type) :: keys
     character(:), allocatable :: name, nearest, note
     integer :: g
 
@@ -32,16 +33,17 @@ contains
     else
       call list_groups(known)
     end if
+    if (present(fields)) call keys%describe_fields(fields)
     name = lower_case(trim(adjustl(group)))
     if (index(name, '&') == 1) name = name(2:)
     if (len(name) == 0) then
       call write_heading(unit)
       do g = 1, known%count
         write (unit, '(a)') ''
-        call write_group(unit, known, g, fields)
+        call write_group(unit, known, g, keys)
       end do
     else if (known%place_of(name) > 0) then
-      call write_group(unit, known, known%place_of(name), fields)
+      call write_group(unit, known, known%place_of(name), keys)
     else
       nearest = nearest_name(name, known%names())
       note = ''
@@ -67,15 +69,13 @@ contains
   end subroutine write_heading
 
   !> One group: purpose and a table of its keys.
-  subroutine write_group(unit, table, place, fields)
+  subroutine write_group(unit, table, place, keys)
     integer, intent(in) :: unit
     type(group_table), intent(in) :: table
     integer, intent(in) :: place            !! of the group in the table
-    character(*), intent(in), optional :: fields(:)
-    type(keys_type) :: keys
+    type(keys_type), intent(inout) :: keys  !! gets the group's; knows the fields of the output
     integer :: widths(columns), c, k
 
-    call keys%describe_fields(fields)
     call table%describe(trim(table%entries(place)%name), keys)
     write (unit, '(a)') '## &'//trim(table%entries(place)%name), '', table%entries(place)%purpose
     if (table%entries(place)%repeatable) then

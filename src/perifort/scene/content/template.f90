@@ -27,7 +27,11 @@ contains
     character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
 
-    call template_text(name, text, error, fields)
+    if (present(fields)) then
+      call template_text(name, text, error, fields)
+    else
+      call template_text(name, text, error)
+    end if
     if (allocated(error)) return
     write (unit, '(a)', advance='no') text
   end subroutine write_template
@@ -39,7 +43,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     type(scene_type) :: scene
-    character(:), allocatable :: nearest, note
+    character(:), allocatable :: nearest, note, groups
 
     text = ''
     select case (name)
@@ -63,10 +67,15 @@ contains
     end select
     ! with this key a scene keeps its defaults in all later versions
     scene%header%defaults = own_defaults
+    if (present(fields)) then
+      groups = commented_text(scene, fields)
+    else
+      groups = commented_text(scene)
+    end if
     text = '! '//trim(scene%header%title)//newline// &
       & "! Values are in SI units. Keys behind a '!' are at the default that is shown, or not "// &
       & 'needed.'//newline// &
-      & '! Templates: '//join(template_names, ', ')//newline//newline//commented_text(scene, fields)
+      & '! Templates: '//join(template_names, ', ')//newline//newline//groups
   end subroutine template_text
 
   !> 1D: a stretched bar, fixed at one end, let go.

@@ -19,7 +19,8 @@ contains
   function scene_text(scene) result(text)
     type(scene_type), intent(in) :: scene  !! lists that are not allocated count as empty
     character(:), allocatable :: text
-    text = all_groups(scene, commented=.false.)
+    type(keys_type) :: keys
+    text = all_groups(scene, commented=.false., keys=keys)
   end function scene_text
 
   !> The same with comments: meaning, unit and choice of every key; keys at their defaults stand
@@ -29,25 +30,26 @@ contains
       !! the template; lists that are not allocated count as empty
     character(*), intent(in), optional :: fields(:)  !! names of the fields of the output
     character(:), allocatable :: text
-    text = all_groups(scene, commented=.true., fields=fields)
+    type(keys_type) :: keys
+
+    if (present(fields)) call keys%describe_fields(fields)
+    text = all_groups(scene, commented=.true., keys=keys)
   end function commented_text
 
   !> Every group in the order of the reference.
-  function all_groups(scene, commented, fields) result(text)
+  function all_groups(scene, commented, keys) result(text)
     type(scene_type), intent(in) :: scene
     logical, intent(in) :: commented
-    character(*), intent(in), optional :: fields(:)
+    type(keys_type), intent(inout) :: keys  !! knows the fields of the output
     character(:), allocatable :: text
     type(scene_type) :: copy
     type(group_table) :: table
-    type(keys_type) :: keys
     integer :: g, i
 
     ! The visitor may change what it visits, so it gets a copy.
     copy = scene
     call table_of(scene, table)
     text = ''
-    call keys%describe_fields(fields)
     do g = 1, table%count
       do i = 1, table%number_in(copy, g)
         call keys%start(mode_write)

@@ -83,10 +83,9 @@ contains
   !> Let descriptions list the fields of the output, which the scene does not know by itself.
   pure subroutine describe_fields(keys, names)
     class(keys_type), intent(inout) :: keys  !! the visitor, with these names on return
-    character(*), intent(in), optional :: names(:)
-      !! (any number) of the fields of the output; without, descriptions list none
+    character(*), intent(in) :: names(:)
+      !! (any number) of the fields of the output; unless told, descriptions list none
 
-    if (.not. present(names)) return
     allocate (keys%fields(size(names)))
     keys%fields(:) = names
   end subroutine describe_fields
@@ -180,7 +179,13 @@ contains
     call keys%find(name, [integer ::], slots)
     call keys%note_missing(name, size(slots) == 0, required)
     if (size(slots) == 0 .or. allocated(keys%fault)) return
-    call to_string(keys%source%tokens(slots(1)), name, value, message, note, allowed, word)
+    associate (token => keys%source%tokens(slots(1)))
+      if (present(allowed)) then
+        call to_string(token, name, value, message, note, allowed, word)
+      else
+        call to_string(token, name, value, message, note, word=word)
+      end if
+    end associate
     call keys%complain(slots(1), message, note)
   end subroutine text_key
 

@@ -45,7 +45,7 @@ contains
     real(wp), intent(in) :: target  !! error to be met, in the norm of the study
     real(wp), intent(in) :: limit  !! longest time that a run may take, 0 for any [s]
     type(error_type), allocatable, intent(out) :: error
-    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
+    type(line_type), intent(in) :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session
     type(choice_type) :: choice
     logical :: met

@@ -72,7 +72,7 @@ contains
     character(*), intent(in) :: path                     !! of the scene file
     type(plan_type), intent(out) :: plan                 !! its runs, with their scenes
     type(error_type), allocatable, intent(out) :: error
-    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
+    type(line_type), intent(in) :: changes(:)  !! `group%key=value`: see `--set`
     character(:), allocatable :: text
 
     call read_text_file(path, text, error)
@@ -87,12 +87,11 @@ contains
     character(*), intent(in) :: name                     !! path of the file; there need be none
     type(plan_type), intent(out) :: plan                 !! its runs, with their scenes
     type(error_type), allocatable, intent(out) :: error
-    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
+    type(line_type), intent(in) :: changes(:)  !! `group%key=value`: see `--set`
 
     call scan_source(text, name, plan%source, error)
     if (allocated(error)) return
-    allocate (plan%changes(0))
-    if (present(changes)) plan%changes = changes
+    plan%changes = changes
     call apply_changes(plan%source, plan%changes, error)
     if (allocated(error)) return
     call read_scene_source(plan%source, plan%scene, error)

@@ -53,7 +53,7 @@ contains
     character(*), intent(in) :: path                     !! of the scene file
     type(run_options_type), intent(in) :: options        !! of the command line
     type(error_type), allocatable, intent(out) :: error
-    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
+    type(line_type), intent(in) :: changes(:)  !! `group%key=value`: see `--set`
     type(session_type) :: session
 
     call begin_study(path, options, session, error, changes)
@@ -88,7 +88,7 @@ contains
     type(session_type), intent(out) :: session
       !! planned, with what the runs are compared with, and its folder made
     type(error_type), allocatable, intent(out) :: error
-    type(line_type), intent(in), optional :: changes(:)  !! `group%key=value`: see `--set`
+    type(line_type), intent(in) :: changes(:)  !! `group%key=value`: see `--set`
     integer :: t
 
     session%quiet = options%quiet
