@@ -1,20 +1,23 @@
 !> Consistent weights of bonds: surface areas, the weights of an independent program, the classical
 !> answer to uniform strains, loads and held layers, and the order of the error in bending.
 module test_set_up_consistent_weights
-  use pd_base_kinds, only: wp, i1
+  use pd_base_kinds, only: wp, i1, i8
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: allocate_points, body_type
   use pd_body_meshes, only: surface_areas
   use pd_body_side_areas, only: total_areas
   use pd_family_areas, only: area_vectors
+  use pd_family_cracks, only: cut_bonds
+  use pd_family_family, only: allocate_bonds, bonds_type
   use pd_family_list, only: list_family_type, new_list_family
   use pd_family_volume, only: volume_linear, volume_rule_type
+  use pd_force_breaking, only: cut_followers
   use pd_force_forces, only: energy_pass, internal_force
   use pd_force_model, only: model_type, new_model, options_of
   use pd_force_reference, only: reference_dilatation, reference_energy, reference_force
   use pd_law_material, only: material_type, new_material
   use pd_motion_explicit_spectrum, only: lowest_eigenvalue
-  use pd_motion_system, only: system_type
+  use pd_motion_system, only: evaluate, system_type
   use pd_motion_static_relaxation, only: run_relaxation
   use pd_scene_content_read, only: read_scene_text
   use pd_motion_loads, only: load_type
@@ -71,6 +74,7 @@ contains
       & new_unittest('an explicit run keeps its energy; the step beside that by energy', &
       & test_explicit), &
       & new_unittest('random fracture dissipates', test_fracture), &
+      & new_unittest('bonds with negative weights go with others', test_negative), &
       & new_unittest('what consistent weights do not serve is refused', test_refused)]
   end subroutine collect_set_up_consistent_weights
 
@@ -1376,24 +1380,32 @@ contains
     call expect_close(error, total, total(1), 0.02_wp*total(1), 'energy')
   end subroutine test_explicit
 
-  !> Plates, whole, with a hole and round, that random velocities break in many places: what has
-  !> been dissipated never falls, and with the energy of motion and strain it is that of the start,
-  !> to the (omega dt/2)^2 = 0.01 by which that of the fastest mode swings at a tenth of the stable
-  !> step.
+  !> Plates, whole, with a hole and round, and blocks, that random velocities break in many places:
+  !> what has been dissipated never falls, the strain energy is never below 0, and the sum with that
+  !> of motion is that of the start, to the (omega dt/2)^2 = 0.01 by which that of the fastest mode
+  !> swings at a tenth of the stable step. Velocities are such that no points pass through others.
+  !> A theta^2 may grow when a bond breaks that is stretched while its point is compressed: in the
+  !> last block, of nu = 0.4, and with the correction by energy, too. There 3e-3 of the energy may
+  !> be given back in one step.
   subroutine test_fracture(error)
     type(error_type), allocatable, intent(out) :: error
-    character(5), parameter :: names(*) = [character(5) :: 'plate', 'hole', 'disc']
+    character(5), parameter :: names(*) = [character(5) :: 'plate', 'hole', 'disc', 'plate', &
+      & 'hole', 'plate', 'block', 'block']
+    real(wp), parameter :: ratios(*) = [1.0_wp/3.0_wp, 1.0_wp/3.0_wp, 1.0_wp/3.0_wp, 0.4_wp, &
+      & 0.4_wp, 0.2_wp, 0.25_wp, 0.4_wp]
+    real(wp), parameter :: speeds(*) = [60, 60, 60, 40, 40, 40, 60, 40]  ! largest one [m/s]
     type(scene_type) :: scene
     type(set_up_type) :: set_up
     type(diary_type) :: diary
     type(fault_type), allocatable :: fault
     real(wp), allocatable :: total(:)
+    real(wp) :: fall
     integer :: i, k, c, n, seed
 
     seed = 3
     do i = 1, size(names)
       if (names(i) == 'disc') then
-        call box_scene([16, 16], spacing, 1.0_wp/3.0_wp, scene)
+        call box_scene([16, 16], spacing, ratios(i), scene)
         scene%horizon%surface_correction = 'consistent'
         deallocate (scene%kept)
         allocate (scene%kept(1))
@@ -1401,7 +1413,7 @@ contains
         scene%kept(1)%centre(:2) = 8*spacing
         scene%kept(1)%radius = 8*spacing
       else
-        call scene_of(trim(names(i)), 1.0_wp/3.0_wp, scene)
+        call scene_of(trim(names(i)), ratios(i), scene)
       end if
       scene%time%steps = 1500
       scene%time%safety = 0.1_wp
@@ -1412,7 +1424,7 @@ contains
         do k = 1, body%n_slots
           if (body%point(k) == 0) cycle
           do c = 1, body%dim
-            v(k, c) = 60*noise(seed)
+            v(k, c) = speeds(i)*noise(seed)
           end do
         end do
       end associate
@@ -1424,13 +1436,129 @@ contains
       end if
       n = size(diary%dissipated)
       total = diary%kinetic + diary%strain + diary%dissipated
-      call expect_true(error, all(diary%dissipated(2:) >= diary%dissipated(:n - 1)), &
+      fall = merge(3.0e-3_wp, 0.0_wp, i == size(names))*total(1)
+      call expect_true(error, all(diary%dissipated(2:) >= diary%dissipated(:n - 1) - fall), &
         & 'dissipation falls: '//names(i))
-      call expect_true(error, diary%dissipated(n) > 0.1_wp*total(1), 'little breaks: '//names(i))
+      call expect_true(error, all(diary%strain >= 0.0_wp), 'negative strain energy: '//names(i))
+      call expect_true(error, diary%dissipated(n) > 0.05_wp*total(1), 'little breaks: '//names(i))
       call expect_close(error, total, total(1), 0.01_wp*total(1), 'energy: '//names(i))
+      call expect_followers(set_up, names(i), error)
       if (allocated(error)) return
     end do
   end subroutine test_fracture
+
+  !> Bonds with a negative Gb are broken where, and only where, one of their ends has lost another.
+  subroutine expect_followers(set_up, name, error)
+    type(set_up_type), intent(in) :: set_up
+    character(*), intent(in) :: name
+    type(error_type), allocatable, intent(inout) :: error
+    type(bonds_type) :: bonds
+    logical, allocatable :: lost(:), positive(:)
+    integer :: k, i, pass, followers
+    integer(i8) :: at
+
+    if (allocated(error)) return
+    followers = 0
+    associate (family => set_up%system%family, model => set_up%system%model, &
+      & point => set_up%system%body%point)
+      allocate (lost(family%n_slots), source=.false.)
+      call allocate_bonds(family, bonds)
+      do pass = 1, 2
+        do k = 1, family%n_slots
+          if (point(k) == 0) cycle
+          call family%bonds_of(k, bonds)
+          at = model%weights%before(k)
+          positive = model%weights%Gb(at + 1:at + bonds%n) >= 0.0_wp
+          if (pass == 1) then
+            lost(k) = any(positive .and. .not. bonds%intact(:bonds%n))
+            cycle
+          end if
+          do i = 1, bonds%n
+            if (positive(i)) cycle
+            followers = followers + merge(0, 1, bonds%intact(i))
+            call expect_true(error, bonds%intact(i) .neqv. (lost(k) .or. lost(bonds%j(i))), &
+              & 'a bond with a negative weight does not follow: '//name)
+          end do
+        end do
+      end do
+      if (model%followers) call expect_true(error, followers > 0, &
+        & 'no bond with a negative weight has followed: '//name)
+    end associate
+  end subroutine expect_followers
+
+  !> Bonds with a negative Gb go with others, when these break and when a crack cuts them: here one
+  !> bond in nine has one. A material whose dilatation has a negative energy is refused where bonds
+  !> could not balance it.
+  subroutine test_negative(error)
+    type(error_type), allocatable, intent(out) :: error
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up
+    integer(i8) :: cut, followed
+    integer :: k, c, seed
+
+    seed = 5
+    call scene_of('plate', 1.0_wp/3.0_wp, scene)
+    scene%materials(1)%critical_stretch = 0.01_wp
+    call ready(scene, set_up, error)
+    if (allocated(error)) return
+    call make_negative(set_up%system)
+    associate (body => set_up%system%body, u => set_up%system%state%u)
+      do k = 1, body%n_slots
+        do c = 1, body%dim
+          u(k, c) = 0.008_wp*spacing*noise(seed)
+        end do
+      end do
+    end associate
+    call evaluate(set_up%system, 0.0_wp, breaking=.true.)
+    call expect_followers(set_up, 'breaking', error)
+    if (allocated(error)) return
+
+    call ready(scene, set_up, error)
+    if (allocated(error)) return
+    call make_negative(set_up%system)
+    deallocate (scene%cracks)
+    allocate (scene%cracks(1))
+    scene%cracks(1)%from(:2) = [10.0_wp, 0.0_wp]*spacing
+    scene%cracks(1)%to(:2) = [10.0_wp, 6.0_wp]*spacing
+    associate (system => set_up%system)
+      call cut_bonds(scene%cracks, system%body, system%family, cut)
+      call cut_followers(system%body, system%family, system%model, followed)
+    end associate
+    call expect_followers(set_up, 'crack', error)
+    call expect_true(error, followed > 0, 'a crack cuts no bond with a negative weight')
+
+    call scene_of('block', 0.1_wp, scene)
+    scene%materials(1)%critical_stretch = 0.01_wp
+    call refused(scene, 'does not serve fracture', error)
+  end subroutine test_negative
+
+  !> Give one bond in nine, between points whose numbers add up to multiples of 9, a negative Gb.
+  subroutine make_negative(system)
+    type(system_type), intent(inout) :: system
+    type(bonds_type) :: bonds
+    integer(i8) :: n
+    integer :: k, i
+
+    system%model%followers = .true.
+    associate (weights => system%model%weights, point => system%body%point)
+      n = 0
+      call allocate_bonds(system%family, bonds)
+      deallocate (weights%start, weights%Gb, weights%Gd)
+      allocate (weights%start(system%family%n_slots))
+      allocate (weights%Gb(system%family%n_bonds), source=1.0_wp)
+      do k = 1, system%family%n_slots
+        weights%row(k) = k
+        weights%start(k) = n
+        if (point(k) == 0) cycle
+        call system%family%bonds_of(k, bonds)
+        do i = 1, bonds%n
+          if (modulo(point(k) + point(bonds%j(i)), 9) == 0) weights%Gb(n + i) = -0.2_wp
+        end do
+        n = n + bonds%n
+      end do
+      weights%Gd = weights%Gb
+    end associate
+  end subroutine make_negative
 
   !> Each refusal names its reason.
   subroutine test_refused(error)
@@ -1455,9 +1583,6 @@ contains
     scene%boundaries(1)%side = 'x_min'
     scene%boundaries(1)%absorbing = .true.
     call refused(scene, 'absorbing', error)
-    call scene_of('plate', 0.4_wp, scene)
-    scene%materials(1)%critical_stretch = 0.01_wp
-    call refused(scene, 'fracture', error)
     call two_materials('board', 0.01_wp, [0.3_wp, 0.4_wp], scene)
     call refused(scene, 'use materials that differ less', error)
     call box_scene([10, 1], spacing, 0.3_wp, scene)

@@ -13,12 +13,13 @@ module pd_force_breaking
   use pd_force_generic_bonds, only: refresh_slot
   use pd_force_generic_points, only: generic_energy_product, generic_point_damage, &
     & generic_energy_of_work
-  use pd_force_model, only: model_type, bond_limit
+  use pd_force_model, only: model_type, bond_limit, follows
   use pd_force_reference, only: energies_of_loss, point_damage, stretch_of_bond
   use pd_force_workspace, only: generic_workspace_type
   implicit none (type, external)
   private
-  public :: strained_slots, break_bonds, damage_of, find_weakest, stretch_ratios
+  public :: strained_slots, break_bonds, add_followed, cut_followers, damage_of, find_weakest, &
+    & stretch_ratios
 
 contains
 
@@ -74,7 +75,7 @@ contains
       !! of the model [-]
     type(bonds_type) :: bonds
     real(wp), allocatable :: lost(:, :), before(:), after(:)
-    logical, allocatable :: gone(:)
+    logical, allocatable :: gone(:), loses(:)
     real(wp) :: of_limit
     integer, allocatable :: number(:), first(:), order(:)
     type(running_type) :: running
@@ -91,10 +92,11 @@ contains
     allocate (lost(size(slots), 0:sets), before(0:sets), after(0:sets), source=0.0_wp)
     allocate (number(size(slots)), source=0)
     call group_slots(slots, first)
+    if (model%followers) call find_losers(family, model, u, slots, of_limit, loses)
     together = family%bytes_are_shared()
     !$omp parallel default(none) &
     !$omp shared(body, family, model, u, others, slots, damage, lost, number, first, laws) &
-    !$omp shared(of_limit, only, expansions) &
+    !$omp shared(of_limit, only, expansions, loses) &
     !$omp firstprivate(before, after) private(bonds, gone, g, m, k, i, breaks) if(.not. together)
     call allocate_bonds(family, bonds)
     allocate (gone(family%most_bonds))
@@ -105,6 +107,7 @@ contains
         call family%bonds_of(k, bonds)
         do i = 1, bonds%n
           call decide(model, u, k, bonds, i, of_limit, breaks)
+          if (model%followers) breaks = breaks .or. goes_along(model, k, bonds, i, loses)
           if (breaks .and. only >= 0) &
             & breaks = family%level_of_bond(k, int(bonds%j(i))) == only
           gone(i) = breaks
@@ -141,6 +144,119 @@ contains
     if (present(products)) products = totals(2:sets + 1)
     slots = pack(slots, number > 0)
   end subroutine break_bonds
+
+  !> Which slots lose a bond at displacements `u` by themselves.
+  subroutine find_losers(family, model, u, slots, part, loses)
+    class(family_type), intent(in) :: family
+    type(model_type), intent(in) :: model
+    real(wp), intent(in), contiguous :: u(:, :)
+    integer(i4), intent(in) :: slots(:)           ! the slots that may
+    real(wp), intent(in) :: part                  ! of its limit, beyond which a bond breaks
+    logical, allocatable, intent(out) :: loses(:)
+    type(bonds_type) :: bonds
+    logical :: breaks
+    integer :: m, i
+
+    allocate (loses(family%n_slots), source=.false.)
+    !$omp parallel default(none) shared(family, model, u, slots, part, loses) &
+    !$omp private(bonds, breaks, m, i)
+    call allocate_bonds(family, bonds)
+    !$omp do schedule(dynamic, 16)
+    do m = 1, size(slots)
+      call family%bonds_of(int(slots(m)), bonds)
+      do i = 1, bonds%n
+        call decide(model, u, int(slots(m)), bonds, i, part, breaks)
+        if (.not. breaks) cycle
+        loses(slots(m)) = .true.
+        exit
+      end do
+    end do
+    !$omp end parallel
+  end subroutine find_losers
+
+  !> Whether the `i`-th bond of slot `k` breaks because one of its ends loses another; in a no-fail
+  !> zone none does.
+  pure logical function goes_along(model, k, bonds, i, loses)
+    type(model_type), intent(in) :: model
+    integer, intent(in) :: k
+    type(bonds_type), intent(in) :: bonds
+    integer, intent(in) :: i
+    logical, intent(in) :: loses(:)
+    real(wp) :: lower, upper
+
+    goes_along = .false.
+    if (.not. bonds%intact(i)) return
+    if (.not. (loses(k) .or. loses(bonds%j(i)))) return
+    if (.not. follows(model, k, i)) return
+    goes_along = .true.
+    if (.not. model%breaking) return
+    call bond_limit(model, k, int(bonds%j(i)), lower, upper)
+    goes_along = upper < never
+  end function goes_along
+
+  !> Add the other ends of the bonds that break along with those of `slots` at displacements `u`:
+  !> `break_bonds` must look at them, too.
+  subroutine add_followed(family, model, u, slots, part)
+    class(family_type), intent(in) :: family     !! with its intact bonds
+    type(model_type), intent(in) :: model        !! limits of the bonds, and their weights
+    real(wp), intent(in), contiguous :: u(:, :)  !! displacements (n_slots, dim) [m]
+    integer(i4), allocatable, intent(inout) :: slots(:)
+      !! all with a bond beyond its limit, ascending; more of them on return
+    real(wp), intent(in), optional :: part
+      !! of its limit, beyond which a bond breaks; 1 by default [-]
+    type(bonds_type) :: bonds
+    logical, allocatable :: loses(:), there(:)
+    real(wp) :: of_limit
+    integer :: m, i, k
+
+    if (.not. model%followers) return
+    of_limit = 1.0_wp
+    if (present(part)) of_limit = part
+    call find_losers(family, model, u, slots, of_limit, loses)
+    allocate (there(family%n_slots), source=.false.)
+    there(slots) = .true.
+    call allocate_bonds(family, bonds)
+    do m = 1, size(slots)
+      if (.not. loses(slots(m))) cycle
+      call family%bonds_of(int(slots(m)), bonds)
+      do i = 1, bonds%n
+        if (goes_along(model, int(slots(m)), bonds, i, loses)) there(bonds%j(i)) = .true.
+      end do
+    end do
+    slots = pack([(int(k, i4), k=1, size(there))], there)
+  end subroutine add_followed
+
+  !> Cut the bonds that break with others only, where cracks have cut another bond of either end.
+  subroutine cut_followers(body, family, model, cut)
+    type(body_type), intent(in) :: body          !! arranged in the slots of the family
+    class(family_type), intent(inout) :: family  !! after all cuts; less bonds on return
+    type(model_type), intent(in) :: model        !! weights of the bonds
+    integer(i8), intent(out) :: cut              !! bonds that this has cut, each counted once
+    type(bonds_type) :: bonds
+    logical, allocatable :: loses(:)
+    integer :: k, i
+
+    cut = 0_i8
+    if (.not. model%followers) return
+    allocate (loses(family%n_slots), source=.false.)
+    call allocate_bonds(family, bonds)
+    do k = 1, family%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        loses(k) = loses(k) .or. .not. (bonds%intact(i) .or. follows(model, k, i))
+      end do
+    end do
+    do k = 1, family%n_slots
+      if (body%point(k) == 0) cycle
+      call family%bonds_of(k, bonds)
+      do i = 1, bonds%n
+        if (.not. goes_along(model, k, bonds, i, loses)) cycle
+        call family%break_bond(k, i)
+        if (bonds%j(i) > k) cut = cut + 1
+      end do
+    end do
+  end subroutine cut_followers
 
   !> Energy density of slot `k` by the generic pass [J/m3], with what has been dissipated since the
   !> last commit: as it is, and with the products of each set of `others`.
@@ -206,6 +322,7 @@ contains
     do k = 1, family%n_slots
       call family%bonds_of(k, bonds)
       do i = 1, bonds%n
+        if (follows(model, k, i)) cycle
         call bond_limit(model, k, int(bonds%j(i)), lower, upper)
         model%weakest(k) = min(model%weakest(k), upper)
       end do
@@ -227,6 +344,7 @@ contains
 
     breaks = .false.
     if (.not. bonds%intact(i)) return
+    if (follows(model, k, i)) return
     call bond_limit(model, k, int(bonds%j(i)), lower, upper)
     stretch = stretch_of_bond(model, u, k, bonds, i)
     ! parts of limits that are never reached may be beyond all numbers
@@ -255,6 +373,7 @@ contains
       call family%bonds_of(k, bonds)
       do i = 1, bonds%n
         if (.not. bonds%intact(i)) cycle
+        if (follows(model, k, i)) cycle
         call bond_limit(model, k, int(bonds%j(i)), lower, upper)
         if (.not. upper < never) cycle
         stretch = stretch_of_bond(model, u, k, bonds, i)

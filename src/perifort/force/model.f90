@@ -14,7 +14,7 @@ module pd_force_model
   implicit none (type, external)
   private
   public :: model_type, new_model, force_options_type, options_of, no_fail, bond_limit, early
-  public :: bond_factors_of, q_of, t_of, p_of, has_scales, give_horizons
+  public :: follows, bond_factors_of, q_of, t_of, p_of, has_scales, give_horizons
   public :: dilatation_of, no_dilatation, projected, unprojected
 
   real(wp), parameter :: no_fail = -1.0_wp  !! critical stretch of a slot in a no-fail zone
@@ -58,6 +58,7 @@ module pd_force_model
     real(wp), allocatable :: axes(:, :)      !! axes of D and S in columns, none: x, y, z
     real(wp), allocatable :: S(:, :)         !! surface factor of the stretches (n_slots, dim)
     type(bond_weights_type) :: weights       !! of the bonds, if consistent
+    logical :: followers = .false.           !! some Gb are negative, and bonds break
     real(wp), allocatable :: expansion(:)    !! alpha dT of each slot [-], allocated if thermal
     real(wp), allocatable :: critical(:)     !! s_c of each slot, `never` or `no_fail`
     real(wp) :: least_critical = never       !! smallest s_c of all
@@ -274,6 +275,18 @@ contains
       if (model%compressed(k) == 1_i1 .and. model%compressed(j) == 1_i1) lower = -upper
     end if
   end subroutine bond_limit
+
+  !> Whether the `i`-th bond of slot `k` breaks with others only: one with a negative Gb does with
+  !> the first other one that either of its ends loses (doc/theory.md, 4). By itself it would give
+  !> energy to the body.
+  pure logical function follows(model, k, i)
+    type(model_type), intent(in) :: model  !! with consistent weights, or without
+    integer, intent(in) :: k               !! slot
+    integer, intent(in) :: i               !! its bond
+
+    follows = .false.
+    if (model%followers) follows = model%weights%Gb(model%weights%before(k) + i) < 0.0_wp
+  end function follows
 
   !> Critical stretch of slot `k`'s material for the horizon of the bond k-j: that of Gc goes with
   !> one over the root of the horizon (doc/theory.md, 8).

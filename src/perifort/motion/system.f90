@@ -8,7 +8,7 @@ module pd_motion_system
   use pd_base_order, only: side_exchange
   use pd_body_body, only: body_type, finish_halo, not_finite_text, share_halo, start_halo
   use pd_family_family, only: family_type, bonds_type, allocate_bonds
-  use pd_force_breaking, only: strained_slots, break_bonds, stretch_ratios
+  use pd_force_breaking, only: add_followed, strained_slots, break_bonds, stretch_ratios
   use pd_force_generic_pass, only: renew_pulls
   use pd_force_bonds, only: new_bond_term
   use pd_force_forces, only: whole, up_to_marks, after_marks
@@ -384,6 +384,7 @@ contains
     allocate (ratios(system%body%n_slots))
     call stretch_ratios(system%family, system%model, system%state%u, ratios)
     slots = pack([(int(k, i4), k=1, size(ratios))], ratios > part)
+    call add_followed(system%family, system%model, system%state%u, slots, part)
     call break_bonds(system%body, system%family, system%model, system%state%u, slots, &
       & system%state%damage, number, dissipated, laws=system%workspace%generic, part=part)
     system%broken = system%broken + number
@@ -406,6 +407,7 @@ contains
     call strained_slots(system%strained, slots)
     if (present(level)) slots = pack(slots, [(system%family%has_level(int(slots(m)), level), &
       & m=1, size(slots))])
+    call add_followed(system%family, system%model, system%state%u, slots)
     if (size(slots) == 0 .and. .not. associated(system%body%order%ranks)) return
     if (any(abs([pairing%offset, pairing%held, pairing%heat]) > 0.0_wp)) then
       call displacements_at(system, t, pairing, slots, others)

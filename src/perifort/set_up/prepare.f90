@@ -23,7 +23,7 @@ module pd_set_up_prepare
   use pd_family_neighbours, only: check_overlap
   use pd_family_surface, only: surface_factors
   use pd_family_volume, only: volume_rule_type
-  use pd_force_breaking, only: damage_of, find_weakest
+  use pd_force_breaking, only: cut_followers, damage_of, find_weakest
   use pd_force_generic_bonds, only: begin_laws, refresh_bonds
   use pd_force_model, only: give_horizons, new_model
   use pd_force_terms, only: term_list_type
@@ -253,6 +253,8 @@ contains
           & to_text(i)//' leaves out '//to_text(cut)//' bonds between bodies that touch', &
           & tell=.false.)
       end do
+      call cut_followers(system%body, system%family, system%model, cut)
+      set_up%cut = set_up%cut + cut
       if (set_up%cut + set_up%parted > 0_i8) then
         call refresh_bonds(system%family, system%workspace%generic)
         allocate (system%state%damage(system%body%n_slots), source=0.0_wp)

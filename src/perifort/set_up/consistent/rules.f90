@@ -1,16 +1,17 @@
 !> What a scene with consistent weights can have, and the weights of its bonds.
 module pd_set_up_consistent_rules
   use pd_base_error, only: error_type, fail
-  use pd_base_kinds, only: wp
+  use pd_base_kinds, only: wp, i8
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_mesh_part, only: count_pieces, count_twins
   use pd_body_meshes, only: balance_surface
   use pd_body_side_areas, only: balance_sides, side_areas_type
   use pd_family_bond_weights, only: bond_weights_type
-  use pd_family_family, only: family_type
+  use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_family_free_faces, only: find_sides, grids_touch
   use pd_family_outline, only: cloud_side, uneven
+  use pd_force_model, only: bond_factors_of, follows, model_type
   use pd_law_material, only: material_type, several_stiffnesses
   use pd_motion_loads, only: load_type
   use pd_motion_system, only: system_type
@@ -173,8 +174,8 @@ contains
     end do
   end function loaded_sides
 
-  !> Give the model the weights of its bonds. An error is set if there are none, or if bonds that
-  !> can break have weights that are not positive.
+  !> Give the model the weights of its bonds. An error is set if there are none, or if a body that
+  !> breaks could gain energy.
   subroutine weigh_bonds(scene, system, materials, fixed, error)
     type(scene_type), intent(in) :: scene               !! with consistent weights
     type(system_type), intent(inout) :: system          !! with body, whole family and model
@@ -183,27 +184,72 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(solution_type) :: stretch, dilatation
     type(bond_weights_type) :: weights
-    real(wp) :: least
+    integer :: slot
+    logical :: cut, breaking
 
+    cut = system%model%breaking .or. size(scene%cracks) > 0
+    breaking = cut .and. system%model%dilatation
+    ! contact between bodies that touch cuts the bonds between them
+    cut = cut .or. size(scene%contacts) > 0
     if (allocated(system%model%horizon)) then
-      call consistent_weights(system%body, system%family, materials, fixed, weights, stretch, &
-        & dilatation, error, system%model)
+      call consistent_weights(system%body, system%family, materials, fixed, breaking, weights, &
+        & stretch, dilatation, error, system%model)
     else
-      call consistent_weights(system%body, system%family, materials, fixed, weights, stretch, &
-        & dilatation, error)
+      call consistent_weights(system%body, system%family, materials, fixed, breaking, weights, &
+        & stretch, dilatation, error)
     end if
     call place_fault(error, scene, 'horizon', 1, 'surface_correction')
     if (allocated(error)) return
     system%model%weights = weights
     system%model%consistent = .true.
-    if (.not. (system%model%breaking .or. size(scene%cracks) > 0)) return
-    least = stretch%least
-    if (system%model%dilatation) least = min(least, dilatation%least)
-    if (.not. least > 0.0_wp) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
-      & "surface_correction = 'consistent' does not serve fracture here: the smallest weight "// &
-      & 'of a bond is '//to_text(least, 3)//', and must be positive, since a body would gain '// &
-      & 'energy when a bond with a negative one breaks', &
-      & "give surface_correction = 'energy' or 'none'")
+    system%model%followers = cut .and. stretch%least < 0.0_wp
+    if (.not. breaking) return
+    slot = outweighed(system%body, system%family, system%model, materials)
+    if (slot > 0) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
+      & "surface_correction = 'consistent' does not serve fracture here: with this Poisson's "// &
+      & 'ratio the dilatation has a negative energy, and when some bonds of point '// &
+      & to_text(int(system%body%point(slot)))//' are broken, it outweighs that of the others', &
+      & "give surface_correction = 'energy' or 'none', or a Poisson's ratio nearer to that "// &
+      & 'without dilatation: 1/4 in 3D and in plane strain, 1/3 in plane stress')
   end subroutine weigh_bonds
+
+  !> A slot where a negative energy of the dilatation may outweigh that of the bonds, if some of
+  !> them are broken; 0: none. By the inequality of Cauchy and Schwarz |a| theta^2 is at most
+  !> 2 |a| t^2 sum(Gd^2 vc V/(q Gb |xi|)) times the energy of the bonds, whichever are broken.
+  integer function outweighed(body, family, model, materials) result(slot)
+    type(body_type), intent(in) :: body              !! arranged in the slots of the family
+    class(family_type), intent(in) :: family         !! whole
+    type(model_type), intent(in) :: model            !! with consistent weights
+    type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
+    type(bonds_type) :: bonds
+    real(wp) :: total, gb, gd
+    integer(i8) :: at
+    integer :: k, i
+
+    call allocate_bonds(family, bonds)
+    do k = 1, body%n_slots
+      if (body%point(k) == 0) cycle
+      slot = k
+      associate (m => materials(body%material(k)))
+        if (m%a >= 0.0_wp) cycle
+        call family%bonds_of(k, bonds)
+        at = model%weights%before(k)
+        total = 0.0_wp
+        do i = 1, bonds%n
+          if (follows(model, k, i)) cycle
+          if (.not. model%weights%Gb(at + i) > 0.0_wp) return
+          gb = 1.0_wp
+          gd = 1.0_wp
+          if (allocated(model%horizon)) &
+            & call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), gb, gd)
+          gb = gb*model%weights%Gb(at + i)
+          gd = gd*model%weights%Gd(at + i)
+          total = total + gd**2*bonds%weight(i)/(gb*m%q*bonds%length(i))
+        end do
+        if (-2*m%a*m%t**2*total > 1.0_wp) return
+      end associate
+    end do
+    slot = 0
+  end function outweighed
 
 end module pd_set_up_consistent_rules

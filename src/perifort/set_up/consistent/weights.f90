@@ -34,6 +34,9 @@ module pd_set_up_consistent_weights
   !> Bounds on Gb that are tried, one after another; the last is none. With the first two most
   !> bodies are stable. Bars and plates have weights Gb of 0.05 at least, blocks none above 0.
   real(wp), parameter :: bounds_of_stretch(*) = [0.05_wp, 0.0_wp, -0.3_wp, unbounded]
+  !> Before them where bonds break and the force has a dilatation: the larger Gb, the less a broken
+  !> bond changes the dilatation for the energy that it had.
+  real(wp), parameter :: bounds_of_breaking(*) = [0.6_wp, 0.3_wp]
   !> Of Gd there are none above 0 in the plane either, and those that are not negative are far from
   !> 1.
   real(wp), parameter :: bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
@@ -46,24 +49,29 @@ contains
   !> Where no positive weights go with the surface areas, and in clouds, the areas of points that no
   !> load acts on change; the body gets them. An error is set if a point of a lattice has no second
   !> one behind it, or if no weights fulfil the conditions.
-  subroutine consistent_weights(body, family, materials, fixed, weights, stretch, dilatation, &
-    & error, model)
+  subroutine consistent_weights(body, family, materials, fixed, breaking, weights, stretch, &
+    & dilatation, error, model)
     type(body_type), intent(inout) :: body
       !! all on lattices, or one mesh or cloud, in the family's slots
     class(family_type), intent(in) :: family         !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
     logical, intent(in) :: fixed(:)                  !! (n_slots) areas that loads act through
+    logical, intent(in) :: breaking  !! whether bonds break and the force has a dilatation
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     real(wp), allocatable :: area(:, :), changed(:, :), of_stretch(:, :), of_dilatation(:, :)
+    real(wp), allocatable :: bounds(:)
     real(wp) :: a(size(materials)), mu(size(materials)), face(body%n_slots)
-    integer :: alone, least
+    integer :: alone, least, positive
     logical :: uneven
 
     least = merge(2, 1, body%dim == 3)
+    bounds = bounds_of_stretch
+    if (breaking .and. body%dim == 2) bounds = [bounds_of_breaking, bounds_of_stretch]
+    positive = count(bounds >= 0.0_wp)
     a = a_of(materials)
     mu = mu_of(materials, body%dim)
     alone = 0
@@ -73,8 +81,8 @@ contains
       area = total_areas(body%sides, body%n_slots, body%dim)
       if (all(body%sides%axis == 0)) then
         face(body%sides%slot) = body%sides%face
-        call weights_and_areas(body, family, materials, face, bounds_of_stretch, area, weights, &
-          & stretch, dilatation, error, model)
+        call weights_and_areas(body, family, materials, face, bounds, area, weights, stretch, &
+          & dilatation, error, model)
         if (.not. allocated(error)) body%surface_area = area
         return
       end if
@@ -93,16 +101,16 @@ contains
     end if
     if (.not. allocated(area)) then
       call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., &
-        & bounds_of_stretch(least:), weights, stretch, dilatation, error)
+        & bounds(least:), weights, stretch, dilatation, error)
       return
     end if
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds_of_stretch(least:2), weights, stretch, dilatation, error, model)
+      & bounds(least:positive), weights, stretch, dilatation, error, model)
     if (.not. allocated(error)) return
     where (any(abs(area) > 0.0_wp, dim=2) .and. .not. fixed) face = body%volume/body%spacing
     if (any(face > 0.0_wp)) then
       changed = area
-      call weights_and_areas(body, family, materials, face, bounds_of_stretch(:2), changed, &
+      call weights_and_areas(body, family, materials, face, bounds(:positive), changed, &
         & weights, stretch, dilatation, error, model)
       if (.not. allocated(error)) then
         body%surface_area = changed
@@ -110,7 +118,7 @@ contains
       end if
     end if
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds_of_stretch(3:), weights, stretch, dilatation, error, model)
+      & bounds(positive + 1:), weights, stretch, dilatation, error, model)
   end subroutine consistent_weights
 
   !> Weights together with surface areas: Gb, Gd and areas are unknowns of one set of conditions. An
