@@ -127,18 +127,21 @@ contains
     call omp_set_num_threads(before)
   end subroutine run
 
-  !> Run a scene in pieces of one step; `pieces` counts them.
+  !> Run a scene in pieces; `pieces` counts them. The first ones are of one step or iteration each,
+  !> later ones of some milliseconds, so that they end anywhere: long runs would take long.
   subroutine run_in_pieces(scene, folder, threads, pieces, error)
     type(scene_type), intent(in) :: scene
     character(*), intent(in) :: folder
     integer, intent(in) :: threads
     integer, intent(out) :: pieces
     type(error_type), allocatable, intent(inout) :: error
-    integer, parameter :: most = 2000
+    integer, parameter :: most = 2000, short = 120
+    real(wp), parameter :: none = 1.0e-12_wp, some = 1.0e-3_wp  ! [min]
     type(fault_type), allocatable :: fault
 
     do pieces = 1, most
-      call run(scene, folder, fault, restart=pieces > 1, minutes=1.0e-12_wp, threads=threads)
+      call run(scene, folder, fault, restart=pieces > 1, minutes=merge(none, some, &
+        & pieces <= short), threads=threads)
       if (.not. allocated(fault)) return
       if (fault%status == status_interrupted) cycle
       call test_failed(error, fault%message)

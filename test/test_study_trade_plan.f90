@@ -141,8 +141,8 @@ contains
     if (allocated(error)) return
     call expect_true(error, all(plan%trials(1)%scene%bodies(1)%points(:2) == [20, 10]) .and. &
       & all(plan%trials(1)%scene%bodies(2)%points(:2) == [20, 20]), 'one body')
-    call plan_from_text(head//"&study vary = 'points' values = 40, 25"//rest, 'a.nml', plan, found, &
-      & [line_type ::])
+    call plan_from_text(head//"&study vary = 'points' values = 40, 25"//rest, 'a.nml', plan, &
+      & found, [line_type ::])
     call expect_parts(error, found, "bad value '25'|a.nml:6|expected a multiple of 2")
   end subroutine test_points
 
