@@ -584,8 +584,8 @@ contains
     call make_directory(here, fault)
     if (.not. allocated(fault)) call put_file(here, 'choice.nml', bar//points//'/'//line// &
       & "&study vary = 'ratio' values = 1.015, 3.015 /", fault)
-    if (.not. allocated(fault)) call run_choose(here//'/choice.nml', options, target, 0.0_wp, fault, &
-      & [line_type ::])
+    if (.not. allocated(fault)) call run_choose(here//'/choice.nml', options, target, 0.0_wp, &
+      & fault, [line_type ::])
     if (.not. allocated(fault)) call read_table(here//'/choice/study.csv', table, fault, &
       & allowed=['*'])
     call accept(error, fault)

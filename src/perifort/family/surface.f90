@@ -115,8 +115,8 @@ contains
     end do
   end function has_factors
 
-  !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1
-  !> for laws with a force of their own. `ratio`: |xi|/delta.
+  !> Factors of the stretch and of the dilatation of a bond by the law of a material; 1 for
+  !> laws with a force of their own. `ratio`: |xi|/delta.
   pure subroutine law_factors(laws, material, ratio, gb, gd)
     type(law_item_type), intent(in) :: laws(:)
     integer, intent(in) :: material

@@ -73,8 +73,8 @@ contains
     type(conditions_type), intent(out) :: conditions
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     type(bonds_type) :: bonds
-    real(wp) :: total, q, gb, gd
-    integer :: c, k, i, row, x, y, z
+    real(wp) :: values(most_rows), total, q, gb, gd
+    integer :: c, k, i
 
     call begin(body, .true., groups, conditions)
     allocate (conditions%stiffness(conditions%classes))
@@ -99,17 +99,8 @@ contains
       end associate
       conditions%of_area(c) = 1/(body%volume(k)*total)
       conditions%stiffness(c) = body%volume(k)*total
-      row = 0
-      do x = 1, body%dim
-        do y = x, body%dim
-          do z = y, body%dim
-            row = row + 1
-            conditions%right(row, c) = -(merge(area(k, x), 0.0_wp, y == z) &
-              & + merge(area(k, y), 0.0_wp, x == z) + merge(area(k, z), 0.0_wp, x == y)) &
-              & /(body%volume(k)*total)
-          end do
-        end do
-      end do
+      call area_products(area(k, :), values)
+      conditions%right(:, c) = -values(:conditions%rows)/(body%volume(k)*total)
     end do
     ! their size is of no account
     conditions%stiffness = conditions%stiffness/maxval(conditions%stiffness)
