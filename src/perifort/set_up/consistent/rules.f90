@@ -22,6 +22,11 @@ module pd_set_up_consistent_rules
   private
   public :: check_consistent, prepare_surface, loaded_sides, weigh_bonds
 
+  !> What a negative energy of the dilatation may take from the bonds of a point, over what these
+  !> have [-]. Near 1 a point with broken bonds has hardly any stiffness against some displacement,
+  !> and static equilibrium is not found.
+  real(wp), parameter :: most_taken = 0.75_wp
+
 contains
 
   !> An error is set if a scene with consistent weights has what they do not serve.
@@ -204,19 +209,20 @@ contains
     system%model%consistent = .true.
     system%model%followers = cut .and. stretch%least < 0.0_wp
     if (.not. breaking) return
-    slot = outweighed(system%body, system%family, system%model, materials)
+    slot = taking_most(system%body, system%family, system%model, materials)
     if (slot > 0) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
       & "surface_correction = 'consistent' does not serve fracture here: with this Poisson's "// &
       & 'ratio the dilatation has a negative energy, and when some bonds of point '// &
-      & to_text(int(system%body%point(slot)))//' are broken, it outweighs that of the others', &
+      & to_text(int(system%body%point(slot)))//' are broken, that may be more than '// &
+      & to_text(most_taken)//' of the energy of the others', &
       & "give surface_correction = 'energy' or 'none', or a Poisson's ratio nearer to that "// &
       & 'without dilatation: 1/4 in 3D and in plane strain, 1/3 in plane stress')
   end subroutine weigh_bonds
 
-  !> A slot where a negative energy of the dilatation may outweigh that of the bonds, if some of
-  !> them are broken; 0: none. By the inequality of Cauchy and Schwarz |a| theta^2 is at most
+  !> A slot where a negative energy of the dilatation may take too much of that of the bonds, if
+  !> some of them are broken; 0: none. By the inequality of Cauchy and Schwarz |a| theta^2 is at most
   !> 2 |a| t^2 sum(Gd^2 vc V/(q Gb |xi|)) times the energy of the bonds, whichever are broken.
-  integer function outweighed(body, family, model, materials) result(slot)
+  integer function taking_most(body, family, model, materials) result(slot)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
     class(family_type), intent(in) :: family         !! whole
     type(model_type), intent(in) :: model            !! with consistent weights
@@ -246,10 +252,10 @@ contains
           gd = gd*model%weights%Gd(at + i)
           total = total + gd**2*bonds%weight(i)/(gb*m%q*bonds%length(i))
         end do
-        if (-2*m%a*m%t**2*total > 1.0_wp) return
+        if (-2*m%a*m%t**2*total > most_taken) return
       end associate
     end do
     slot = 0
-  end function outweighed
+  end function taking_most
 
 end module pd_set_up_consistent_rules
