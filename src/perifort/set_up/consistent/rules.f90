@@ -209,7 +209,7 @@ contains
     system%model%consistent = .true.
     system%model%followers = cut .and. stretch%least < 0.0_wp
     if (.not. breaking) return
-    slot = taking_most(system%body, system%family, system%model, materials)
+    slot = outweighed(system%body, system%family, system%model, materials)
     if (slot > 0) call scene_fault(error, scene, 'horizon', 1, 'surface_correction', &
       & "surface_correction = 'consistent' does not serve fracture here: with this Poisson's "// &
       & 'ratio the dilatation has a negative energy, and when some bonds of point '// &
@@ -220,9 +220,9 @@ contains
   end subroutine weigh_bonds
 
   !> A slot where a negative energy of the dilatation may take too much of that of the bonds, if
-  !> some of them are broken; 0: none. By the inequality of Cauchy and Schwarz |a| theta^2 is at most
-  !> 2 |a| t^2 sum(Gd^2 vc V/(q Gb |xi|)) times the energy of the bonds, whichever are broken.
-  integer function taking_most(body, family, model, materials) result(slot)
+  !> some of them are broken; 0: none. By the inequality of Cauchy and Schwarz |a| theta^2 is at
+  !> most 2 |a| t^2 sum(Gd^2 vc V/(q Gb |xi|)) times the energy of the bonds, whichever are broken.
+  integer function outweighed(body, family, model, materials) result(slot)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
     class(family_type), intent(in) :: family         !! whole
     type(model_type), intent(in) :: model            !! with consistent weights
@@ -256,6 +256,6 @@ contains
       end associate
     end do
     slot = 0
-  end function taking_most
+  end function outweighed
 
 end module pd_set_up_consistent_rules
