@@ -72,16 +72,14 @@ contains
     integer(i4), allocatable :: order(:), point(:), member(:)
     integer(i2), allocatable :: label(:)
     real(wp) :: spacing
-    integer :: k, n, edges
+    integer :: k, n
 
     n = body%n_points
-    ! eight points of a lattice fill a square of three or a cube of two spacings
-    edges = nint(real(lanes, wp)**(1.0_wp/body%dim))
     spacing = maxval(body%spacing)
     ! cells for the finest points: in cells for the coarsest ones, eight fine points in a row along
     ! x would not lie close together
     if (rule%ratio > 0.0_wp) spacing = minval(body%spacing)
-    call order_in_rows(body%x, edges*spacing, rows, order)
+    call order_in_rows(body%x, rows_high(body)*spacing, rows, order)
     allocate (point(lanes*((n + lanes - 1)/lanes)), source=0_i4)
     point(:n) = body%point(order)
     call arrange(body, point)
@@ -126,6 +124,25 @@ contains
       allocate (family%fraction(lanes, 0))
     end if
   end subroutine new_list_family
+
+  !> How many points lie above each other in a row of cells, so that clusters, eight that follow each
+  !> other in a row, are compact: eight in 1D, two by two by two in 3D. In 2D three by three, where
+  !> packs have most bonds; but four by two on a lattice, where all clusters of a row then have one
+  !> shape, whose tables stay in the first-level cache.
+  pure integer function rows_high(body)
+    type(body_type), intent(in) :: body  !! with the grids of its points
+
+    select case (body%dim)
+    case (1)
+      rows_high = lanes
+    case (2)
+      rows_high = 3
+      ! bonds in a fixed order have no tables in common
+      if (all(body%grid(:body%n_points) > 0_i2) .and. .not. body%order%reproducible) rows_high = 2
+    case default
+      rows_high = 2
+    end select
+  end function rows_high
 
   !> Note which points are copies of other ranks' points, and sort the clusters by whether they need
   !> something of these: one of their own points is a copy, or a member is.
