@@ -15,6 +15,7 @@ program main
   use test_base_checksum, only: collect_base_checksum
   use test_base_expression, only: collect_base_expression
   use test_base_interrupt, only: collect_base_interrupt
+  use test_base_long_work, only: collect_base_long_work
   use test_base_lookup, only: collect_base_lookup
   use test_base_text, only: collect_base_text
   use test_base_threads, only: collect_base_threads
@@ -158,6 +159,7 @@ program main
   call register('base_checksum', collect_base_checksum)
   call register('base_expression', collect_base_expression)
   call register('base_interrupt', collect_base_interrupt)
+  call register('base_long_work', collect_base_long_work)
   call register('base_lookup', collect_base_lookup)
   call register('base_text', collect_base_text)
   call register('base_threads', collect_base_threads)

@@ -2,6 +2,7 @@
 !> answer to uniform strains, loads and held layers, and the order of the error in bending.
 module test_set_up_consistent_weights
   use pd_base_kinds, only: wp, i1, i8
+  use pd_base_long_work, only: long_work_type
   use pd_base_error, only: fault_type => error_type
   use pd_body_body, only: allocate_points, body_type
   use pd_body_meshes, only: surface_areas
@@ -180,6 +181,7 @@ contains
       type(system_type), intent(inout) :: system
       real(wp), intent(in) :: expected(:)
       type(solution_type) :: b, d
+      type(long_work_type) :: work
       type(fault_type), allocatable :: fault
       real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :)
       integer :: alone
@@ -188,7 +190,7 @@ contains
         call area_vectors(system%body, system%family, m%shear_modulus, of_stretch, alone)
         call area_vectors(system%body, system%family, [sign(1.0_wp, m(1)%a)], of_dilatation, alone)
         call weights_of_areas(system%body, system%family, m, of_stretch, of_dilatation, .true., &
-          & [unbounded], weights, b, d, fault)
+          & [unbounded], weights, b, d, fault, work)
         if (allocated(fault)) then
           call test_failed(error, fault%message)
           return
@@ -879,6 +881,7 @@ contains
     type(model_type) :: model
     type(material_type) :: material
     type(solution_type) :: b, d
+    type(long_work_type) :: work
     type(fault_type), allocatable :: fault
     type(volume_rule_type) :: rule
     real(wp) :: R(3, 3), x(nx*ny, 2), area(nx*ny, 2), strain(2, 2)
@@ -912,7 +915,7 @@ contains
     allocate (theta(body%n_slots))
     a(body%slot, :) = matmul(area, transpose(R(:2, :2)))
     call weights_of_areas(body, family, [material], material%shear_modulus*a, &
-      & sign(1.0_wp, material%a)*a, .false., [0.05_wp], model%weights, b, d, fault)
+      & sign(1.0_wp, material%a)*a, .false., [0.05_wp], model%weights, b, d, fault, work)
     if (allocated(fault)) then
       call test_failed(error, fault%message)
       return

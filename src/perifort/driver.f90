@@ -73,7 +73,7 @@ contains
 
     ! points and families (7.1, 7.11), volumes (7.2) and surfaces (7.7), conditions (7.8), cracks
     ! and no-fail zones (7.9), and the time step (7.4) or the mass of relaxation (7.5)
-    call prepare(scene, set_up, error, own%threads, terms, world)
+    call prepare(scene, set_up, error, own%threads, terms, world, own%quiet)
     if (.not. allocated(error)) call output%foresee(scene, own, set_up, error)
     if (allocated(error)) return
 

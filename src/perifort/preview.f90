@@ -2,6 +2,7 @@
 !> which `perifort check` prints.
 module pd_preview
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_base_clock, only: output_is_terminal
   use pd_base_error, only: error_type
   use pd_base_kinds, only: i8
   use pd_base_text, only: labelled_line, newline
@@ -82,7 +83,8 @@ contains
     text = ''
     call check_names(scene, fields_of(options), error)
     if (.not. allocated(error) .and. options%ranks > 1) call check_ranks(scene, error)
-    if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads)
+    if (.not. allocated(error)) call prepare(scene, set_up, error, options%threads, &
+      & quiet=.not. output_is_terminal())
     if (allocated(error)) return
     call foresee_output(scene, fields_of(options), set_up, measures, error)
     if (allocated(error)) return

@@ -125,10 +125,10 @@ contains
     end if
   end subroutine new_list_family
 
-  !> How many points lie above each other in a row of cells, so that clusters, eight that follow each
-  !> other in a row, are compact: eight in 1D, two by two by two in 3D. In 2D three by three, where
-  !> packs have most bonds; but four by two on a lattice, where all clusters of a row then have one
-  !> shape, whose tables stay in the first-level cache.
+  !> How many points lie above each other in a row of cells, so that clusters, eight points that
+  !> follow each other in a row, are compact: eight in 1D, two by two by two in 3D. In 2D three by
+  !> three, where packs have most bonds; but four by two on a lattice, where all clusters of a row
+  !> then have one shape, whose tables stay in the first-level cache.
   pure integer function rows_high(body)
     type(body_type), intent(in) :: body  !! with the grids of its points
 

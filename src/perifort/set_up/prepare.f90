@@ -3,6 +3,7 @@ module pd_set_up_prepare
   use pd_base_kinds, only: wp, i2, i8
   use pd_base_clock, only: phase_timer_type
   use pd_base_error, only: error_type, fail, status_input
+  use pd_base_long_work, only: long_work_type
   use pd_base_text, only: to_text
   use pd_base_threads, only: team_type
   use pd_base_warnings, only: warnings_type
@@ -75,7 +76,7 @@ contains
   !> without, threads are the caller's. `terms` of the force act in addition to those of the scene.
   !> An error is set if the scene does not fit into the memory, or if its points, families,
   !> conditions or plan are impossible.
-  subroutine prepare(scene, set_up, error, threads, terms, world)
+  subroutine prepare(scene, set_up, error, threads, terms, world, quiet)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(set_up_type), intent(out) :: set_up             !! ready for the first step
     type(error_type), allocatable, intent(out) :: error
@@ -84,6 +85,8 @@ contains
     type(term_list_type), intent(in), optional :: terms  !! copied; none if absent
     type(world_type), intent(inout), target, optional :: world
       !! the ranks of the run; must stay where it is in memory as long as the system; absent: one
+    logical, intent(in), optional :: quiet
+      !! whether nothing says what takes long; absent: nothing does
     type(load_type), allocatable :: loads(:)
     type(material_type), allocatable :: materials(:)
     type(law_item_type), allocatable :: laws(:)
@@ -97,10 +100,12 @@ contains
     integer, allocatable :: owner(:)
     type(family_choice_type) :: choice
     type(survey_type) :: survey
+    type(long_work_type) :: work
     logical :: divided, reproducible
     logical, allocatable :: loaded(:)
     integer :: i, ranks, blocks
 
+    if (present(quiet)) call work%begin(quiet)
     ranks = 1
     if (present(world)) ranks = world%ranks
     divided = ranks > 1
@@ -133,7 +138,8 @@ contains
       if (allocated(error)) return
       call timer%stop('points')
       call timer%start('lattice toughness')
-      call set_critical_by_lattice(scene, system%body, delta, materials, laws, set_up%notes)
+      call set_critical_by_lattice(scene, system%body, delta, materials, laws, set_up%notes, work)
+      call work%finish()
       call timer%stop('lattice toughness')
 
       call timer%start('families')
@@ -218,7 +224,8 @@ contains
       if (system%model%surface) call leave_uncorrected(scene, system%motions, system%model%D, &
         & system%model%S)
       if (scene%horizon%surface_correction == 'consistent') then
-        call weigh_bonds(scene, system, materials, loaded, error)
+        call weigh_bonds(scene, system, materials, loaded, work, error)
+        call work%finish()
         if (allocated(error)) return
       end if
       call find_weakest(system%body, system%family, system%model)

@@ -1,9 +1,9 @@
-!> The linear conditions on the weights of bonds, and sums of them (doc/theory.md, 4): for each
-!> class of points a few rows, for each group of bonds an unknown. Where surface areas are unknowns,
-!> too, Gb, Gd and areas have one set of conditions. The coefficients of a bond are powers of its
-!> direction: where they would take too much memory they are computed whenever they are needed.
+!> The linear conditions on the weights of bonds (doc/theory.md, 4): for each class of points a few
+!> rows, for each group of bonds an unknown. Where surface areas are unknowns, too, Gb, Gd and areas
+!> have one set of conditions. The coefficients of a bond are powers of its direction, and are
+!> computed whenever they are needed: reading them would take longer.
 module pd_set_up_consistent_conditions
-  use pd_base_kinds, only: wp, i1, i4, i8
+  use pd_base_kinds, only: wp, i4, i8
   use pd_body_body, only: body_type
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_force_model, only: bond_factors_of, model_type
@@ -11,9 +11,8 @@ module pd_set_up_consistent_conditions
   use pd_set_up_consistent_groups, only: groups_type
   implicit none (type, external)
   private
-  public :: conditions_type, stretch_conditions, dilatation_conditions, join_conditions, sums_of, &
-    & spread_over, block_of, kind_of, of_stretches, of_dilatation, triple_products, &
-    & area_products
+  public :: conditions_type, stretch_conditions, dilatation_conditions, join_conditions, kind_of, &
+    & of_stretches, of_dilatation, coefficients, most_rows, triple_products, area_products
 
   !> What an unknown is.
   integer, parameter :: of_stretches = 1   !! a weight Gb
@@ -21,7 +20,6 @@ module pd_set_up_consistent_conditions
   integer, parameter :: of_area = 3        !! a component of an area
 
   integer, parameter :: most_rows = 19  !! of a class
-  integer(i8), parameter :: most_stored = 25000000_i8  !! coefficients (200 MB)
 
   !> sum over bonds of weight x coefficients = `right`. The unknowns are weights Gb, then weights
   !> Gd, then components of areas. The rows of the stretch, n n n of the bonds, come before those
@@ -36,18 +34,15 @@ module pd_set_up_consistent_conditions
     integer :: unknowns = 0
     integer(i8), allocatable :: start(:)    !! (classes + 1) first bond of each class
     integer(i4), allocatable :: unknown(:)  !! of each bond
-    real(wp), allocatable :: n(:, :)        !! (dim, bonds) unit vectors
+    real(wp), allocatable :: n(:, :)        !! (bonds, dim) unit vectors
     real(wp), allocatable :: factor(:, :)
-      !! (2, bonds) of the powers; the second of n alone; of areas: for either kind of rows
+      !! (bonds, 2) of the powers; the second of n alone; of areas: for either kind of rows
     real(wp), allocatable :: right(:, :)    !! (rows, classes)
     real(wp), allocatable :: of_area(:)
       !! (classes) what rows of one kind have for a unit of `area`, as it was given
     integer(i8), allocatable :: first(:)    !! (unknowns + 1) first entry of each unknown
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
-    real(wp), allocatable :: stored(:)      !! coefficients bond by bond, if there are not too many
-    integer(i8), allocatable :: place(:)    !! (bonds + 1) of a bond's first one
-    integer(i1), allocatable :: low(:)      !! (bonds) its row
     logical :: alone = .false.              !! whether each unknown is of one bond, or an area's
     ! what multipliers of smooth fields depend on:
     real(wp) :: spacing = 0.0_wp            !! mean of the classes' first points [m]
@@ -90,12 +85,12 @@ contains
             call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), gb, gd)
             q = q*gb
           end if
-          conditions%n(:, first + i) = bonds%xi(i, :)/bonds%length(i)
-          conditions%factor(:, first + i) = [q*bonds%weight(i), 0.0_wp]
+          conditions%n(first + i, :) = bonds%xi(i, :)/bonds%length(i)
+          conditions%factor(first + i, :) = [q*bonds%weight(i), 0.0_wp]
           total = total + q*bonds%weight(i)
         end do
-        conditions%factor(:, first + 1:first + bonds%n) &
-          & = conditions%factor(:, first + 1:first + bonds%n)/total
+        conditions%factor(first + 1:first + bonds%n, :) &
+          & = conditions%factor(first + 1:first + bonds%n, :)/total
       end associate
       conditions%of_area(c) = 1/(body%volume(k)*total)
       conditions%stiffness(c) = body%volume(k)*total
@@ -131,12 +126,12 @@ contains
       call family%bonds_of(k, bonds)
       associate (first => conditions%start(c) - 1, t => materials(body%material(k))%t)
         do i = 1, bonds%n
-          conditions%n(:, first + i) = bonds%xi(i, :)/bonds%length(i)
-          conditions%factor(:, first + i) = t*bonds%weight(i)*[1.0_wp, (a(body%material(k)) &
+          conditions%n(first + i, :) = bonds%xi(i, :)/bonds%length(i)
+          conditions%factor(first + i, :) = t*bonds%weight(i)*[1.0_wp, (a(body%material(k)) &
             & + a(body%material(bonds%j(i))))*body%spacing(k)/bonds%length(i)]
           if (.not. present(model)) cycle
           call bond_factors_of(model, k, int(bonds%j(i)), bonds%length(i), gb, gd)
-          conditions%factor(:, first + i) = gd*conditions%factor(:, first + i)
+          conditions%factor(first + i, :) = gd*conditions%factor(first + i, :)
         end do
       end associate
       row = 0
@@ -204,7 +199,7 @@ contains
     n = size(stretch%unknown, kind=i8) + size(dilatation%unknown, kind=i8) &
       & + conditions%dim*count(unit > 0.0_wp)
     allocate (conditions%start(conditions%classes + 1), source=1_i8)
-    allocate (conditions%unknown(n), conditions%n(conditions%dim, n), conditions%factor(2, n))
+    allocate (conditions%unknown(n), conditions%n(n, conditions%dim), conditions%factor(n, 2))
     allocate (conditions%right(conditions%rows, conditions%classes))
     conditions%right(:stretch%rows, :) = stretch%right
     conditions%right(stretch%rows + 1:, :) = dilatation%right
@@ -217,9 +212,9 @@ contains
         at = at + 1
         conditions%unknowns = conditions%unknowns + 1
         conditions%unknown(at) = int(conditions%unknowns, i4)
-        conditions%n(:, at) = 0.0_wp
-        conditions%n(x, at) = 1.0_wp
-        conditions%factor(:, at) = unit(c)*[mu*stretch%of_area(c), a*dilatation%of_area(c)]
+        conditions%n(at, :) = 0.0_wp
+        conditions%n(at, x) = 1.0_wp
+        conditions%factor(at, :) = unit(c)*[mu*stretch%of_area(c), a*dilatation%of_area(c)]
         ! a value of 1 is no change
         call coefficients(conditions, at, values, low, high)
         conditions%right(low:high, c) = conditions%right(low:high, c) + values(low:high)
@@ -237,8 +232,8 @@ contains
       do e = part%start(c), part%start(c + 1) - 1
         at = at + 1
         conditions%unknown(at) = int(unknowns, i4) + part%unknown(e)
-        conditions%n(:, at) = part%n(:, e)
-        conditions%factor(:, at) = part%factor(:, e)
+        conditions%n(at, :) = part%n(e, :)
+        conditions%factor(at, :) = part%factor(e, :)
       end do
     end subroutine append
 
@@ -268,7 +263,7 @@ contains
     conditions%start = groups%start
     conditions%unknown = groups%group
     n = size(conditions%unknown, kind=i8)
-    allocate (conditions%n(dim, n), conditions%factor(2, n))
+    allocate (conditions%n(n, dim), conditions%factor(n, 2))
     allocate (conditions%right(conditions%rows, groups%n_classes))
     allocate (conditions%of_area(groups%n_classes))
     allocate (conditions%x(dim, groups%n_classes))
@@ -321,43 +316,18 @@ contains
     associate (bonds => conditions%stretches + conditions%dilatations, first => conditions%first)
       conditions%alone = all(first(2:bonds + 1) - first(:bonds) == 2_i8)
     end associate
-    call store(conditions)
   end subroutine turn
-
-  !> Keep the coefficients, if there is room.
-  subroutine store(conditions)
-    type(conditions_type), intent(inout) :: conditions
-    real(wp) :: values(most_rows)
-    integer(i8) :: e, n
-    integer :: low, high, pass
-
-    allocate (conditions%place(size(conditions%unknown, kind=i8) + 1))
-    do pass = 1, 2
-      n = 1_i8
-      do e = 1, size(conditions%unknown, kind=i8)
-        conditions%place(e) = n
-        call coefficients(conditions, e, values, low, high)
-        if (pass == 2) then
-          conditions%stored(n:n + high - low) = values(low:high)
-          conditions%low(e) = int(low, i1)
-        end if
-        n = n + high - low + 1
-      end do
-      conditions%place(e) = n
-      if (n > most_stored) exit
-      if (pass == 1) allocate (conditions%stored(n - 1), conditions%low(e - 1))
-    end do
-  end subroutine store
 
   !> The coefficients of bond `e`: those from row `low` to row `high` are set, others are 0.
   pure subroutine coefficients(conditions, e, values, low, high)
     type(conditions_type), intent(in) :: conditions
-    integer(i8), intent(in) :: e
-    real(wp), intent(inout) :: values(:)
-    integer, intent(out) :: low, high
+    integer(i8), intent(in) :: e          !! bond, or a component of an area
+    real(wp), intent(inout) :: values(:)  !! (`most_rows`) some are set [-]
+    integer, intent(out) :: low           !! first row that is set
+    integer, intent(out) :: high          !! last one
     integer :: row, x, y
 
-    associate (n => conditions%n(:, e), f => conditions%factor(:, e), dim => conditions%dim, &
+    associate (n => conditions%n(e, :), f => conditions%factor(e, :), dim => conditions%dim, &
       & before => conditions%before)
       select case (kind_of(conditions, int(conditions%unknown(e))))
       case (of_stretches)
@@ -421,102 +391,5 @@ contains
       end do
     end do
   end subroutine area_products
-
-  !> The sums of the conditions (rows, classes) for values of the unknowns.
-  subroutine sums_of(conditions, y, sums)
-    type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: y(:)           !! (unknowns) [-]
-    real(wp), intent(inout) :: sums(:, :)  !! (rows, classes) set [-]
-    real(wp) :: values(most_rows), sum(most_rows)
-    integer(i8) :: e, p
-    integer :: c, low, high, row
-    logical :: kept
-
-    kept = allocated(conditions%stored)
-    !$omp parallel do schedule(dynamic, 64) default(none) shared(conditions, y, sums, kept) &
-    !$omp private(values, sum, e, p, c, low, high, row)
-    do c = 1, conditions%classes
-      sum = 0.0_wp
-      do e = conditions%start(c), conditions%start(c + 1) - 1
-        if (kept) then
-          row = conditions%low(e)
-          do p = conditions%place(e), conditions%place(e + 1) - 1
-            sum(row) = sum(row) + y(conditions%unknown(e))*conditions%stored(p)
-            row = row + 1
-          end do
-        else
-          call coefficients(conditions, e, values, low, high)
-          sum(low:high) = sum(low:high) + y(conditions%unknown(e))*values(low:high)
-        end if
-      end do
-      sums(:, c) = sum(:conditions%rows)
-    end do
-  end subroutine sums_of
-
-  !> The transposed product: what multipliers of the conditions give each unknown.
-  subroutine spread_over(conditions, multipliers, y)
-    type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: multipliers(:, :)  !! (rows, classes) [-]
-    real(wp), intent(inout) :: y(:)            !! (unknowns) set [-]
-    real(wp) :: values(most_rows), sum
-    integer(i8) :: i, p
-    integer :: u, low, high, row
-    logical :: kept
-
-    kept = allocated(conditions%stored)
-    !$omp parallel do schedule(dynamic, 512) default(none) &
-    !$omp shared(conditions, multipliers, y, kept) private(values, sum, i, p, u, low, high, row)
-    do u = 1, conditions%unknowns
-      sum = 0.0_wp
-      do i = conditions%first(u), conditions%first(u + 1) - 1
-        associate (e => conditions%bond(i))
-          if (kept) then
-            row = conditions%low(e)
-            do p = conditions%place(e), conditions%place(e + 1) - 1
-              sum = sum + conditions%stored(p)*multipliers(row, conditions%class(e))
-              row = row + 1
-            end do
-          else
-            call coefficients(conditions, e, values, low, high)
-            sum = sum + dot_product(values(low:high), multipliers(low:high, conditions%class(e)))
-          end if
-        end associate
-      end do
-      y(u) = sum
-    end do
-  end subroutine spread_over
-
-  !> The block (rows, rows) of class `c` in the product of the conditions with their transpose, of
-  !> the unknowns that are `free`.
-  pure subroutine block_of(conditions, c, free, block)
-    type(conditions_type), intent(in) :: conditions
-    integer, intent(in) :: c              !! class
-    logical, intent(in) :: free(:)        !! (unknowns)
-    real(wp), intent(out) :: block(:, :)  !! (rows, rows) [-]
-    real(wp) :: values(most_rows), of_unknown(most_rows)
-    integer(i8) :: e, i
-    integer :: row, low, high
-
-    block = 0.0_wp
-    do e = conditions%start(c), conditions%start(c + 1) - 1
-      associate (u => conditions%unknown(e))
-        if (.not. free(u)) cycle
-        ! all bonds of the class with this unknown, at the first of them
-        of_unknown = 0.0_wp
-        low = 1
-        high = 0
-        do i = conditions%first(u), conditions%first(u + 1) - 1
-          if (conditions%class(conditions%bond(i)) /= c) cycle
-          if (conditions%bond(i) < e) exit
-          call coefficients(conditions, conditions%bond(i), values, low, high)
-          of_unknown(low:high) = of_unknown(low:high) + values(low:high)
-        end do
-        if (i < conditions%first(u + 1)) cycle
-      end associate
-      do row = low, high
-        block(low:high, row) = block(low:high, row) + of_unknown(row)*of_unknown(low:high)
-      end do
-    end do
-  end subroutine block_of
 
 end module pd_set_up_consistent_conditions

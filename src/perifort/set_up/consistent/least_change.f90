@@ -8,8 +8,11 @@
 !> is enough, or some against the rounding of many iterations.
 module pd_set_up_consistent_least_change
   use pd_base_kinds, only: wp, i8
-  use pd_set_up_consistent_conditions, only: block_of, conditions_type, spread_over, sums_of
+  use pd_base_long_work, only: long_work_type
+  use pd_base_text, only: to_text
+  use pd_set_up_consistent_conditions, only: conditions_type
   use pd_set_up_consistent_levels, only: add_levels, level_type, new_levels
+  use pd_set_up_consistent_products, only: block_of, spread_over, sums_of
   implicit none (type, external)
   private
   public :: least_change, unbounded
@@ -18,6 +21,10 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
   real(wp), parameter :: uneven = 1.0e-10_wp
     !! of those of points that all differ, and of others that more steps do not lower [-]
+  real(wp), parameter :: enough = 1.0e-9_wp
+    !! of those of points that all differ that more steps do not lower, or not soon [-]
+  real(wp), parameter :: part_of_changes = 1.0e-2_wp
+    !! bonds that come to the bound or leave it in a step, over all at it
   real(wp), parameter :: much = 1.0e3_wp            !! growth of an error that is rounding
   real(wp), parameter :: far = 1.0e-6_wp            !! error of a first step that more do not mend
   integer, parameter :: most_newton = 60
@@ -35,7 +42,7 @@ contains
   !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12 (1e-10 if rounding leaves
   !> that), or where each bond has a weight of its own to 1e-10; otherwise no weights above the
   !> bound do, or none were found.
-  subroutine least_change(conditions, low, G, residual, iterations, found, hopeless)
+  subroutine least_change(conditions, low, G, residual, iterations, found, hopeless, work)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: low
       !! smallest allowed weight, or `unbounded`; of Gb alone where it is found with Gd [-]
@@ -45,8 +52,10 @@ contains
     logical, intent(out) :: found
     logical, intent(out) :: hopeless
       !! bonds share weights, and with any bound the iterations would not converge
+    type(long_work_type), intent(inout) :: work  !! says how far the iterations are
     real(wp), allocatable :: step(:, :), r(:, :), t(:), change(:), tried(:), lows(:), of_one(:, :)
     logical, allocatable :: free(:)
+    logical :: settled
     type(level_type), allocatable :: levels(:)
     real(wp) :: value, before, slope, along, linear, length, history(most_newton), allowed, part
     integer :: newton, halving
@@ -54,7 +63,8 @@ contains
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
       allocate (r(rows, classes), step(rows, classes), of_one(rows, classes), source=0.0_wp)
       allocate (t(n), change(n), source=0.0_wp)
-      allocate (G(n), free(n))
+      allocate (G(n))
+      allocate (free(n), source=.true.)
       allocate (lows(n), source=low)
       if (conditions%stretches > 0) lows(conditions%stretches + 1:) = unbounded
     end associate
@@ -78,19 +88,16 @@ contains
       ! without a solution the multipliers grow and the error stays
       history(newton) = residual
       if (newton > patience) then
-        if (residual > 0.5_wp*history(newton - patience)) then
-          found = residual <= uneven
-          return
-        end if
+        if (residual > 0.5_wp*history(newton - patience)) exit
       end if
-      if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) return
-      free = t + 1 > lows
+      if (low > unbounded .and. iterations > most_of_bound*wider(conditions)) exit
+      call set_free(t + 1 > lows, free, settled)
       part = part_of_step
       if (low > unbounded) part = max(part, min(most_of_step, residual))
-      call solve(conditions, levels, free, part, r, step, iterations)
+      call solve(conditions, levels, free, settled, part, r, step, iterations, work)
       ! multipliers of long waves are large, and what they give a bond is small: so the changes of
       ! weights are summed, and each step can mend what rounding leaves of the one before
-      call spread_over(conditions, step, change)
+      call spread_over(conditions, spread(.true., 1, size(free)), step, change)
       slope = sum(r*step)
       along = sum((conditions%right - of_one)*step)
       length = 1.0_wp
@@ -110,9 +117,21 @@ contains
       linear = linear + length*along
       before = value
     end do
+    ! more steps do not lower what is left, or take too long
     residual = maxval(abs(r))
-    found = residual <= allowed
+    found = residual <= merge(enough, uneven, conditions%alone)
   end subroutine least_change
+
+  !> Note which weights are not at the bound. `settled`: they are nearly those of the step before,
+  !> so that it pays to solve for them to the end.
+  pure subroutine set_free(now, free, settled)
+    logical, intent(in) :: now(:)
+    logical, intent(inout) :: free(:)  ! of the step before; set
+    logical, intent(out) :: settled
+
+    settled = count(now .neqv. free) <= part_of_changes*count(.not. now)
+    free = now
+  end subroutine set_free
 
   !> The width of a body of points that all differ, over that for which the numbers of iterations
   !> are; 1 for less and for classes that points share.
@@ -138,18 +157,20 @@ contains
 
   !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
   !> and r in its range but for what the bound cuts off.
-  subroutine solve(conditions, levels, free, part, r, step, iterations)
+  subroutine solve(conditions, levels, free, settled, part, r, step, iterations, work)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: levels(:)
     logical, intent(in) :: free(:)
+    logical, intent(in) :: settled  ! `free` hardly changes any more
     real(wp), intent(in) :: part  ! of the error that may be left where there are grids
     real(wp), intent(in) :: r(:, :)
     real(wp), intent(inout) :: step(:, :)
     integer, intent(inout) :: iterations
+    type(long_work_type), intent(inout) :: work
     real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
     real(wp), allocatable :: best(:, :)
-    real(wp) :: rho, rho_before, curvature, target, least
-    integer :: i, most
+    real(wp) :: rho, rho_before, alpha, beta, curvature, target, error, least
+    integer :: c, i, most
 
     call factorize(conditions, free, factor)
     allocate (rest, source=r)
@@ -163,34 +184,60 @@ contains
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
     if (size(levels) > 0) target = max(0.3_wp*uneven, part*maxval(abs(r)))
     least = huge(1.0_wp)
-    most = merge(most_iterations, nint(most_bounded*wider(conditions)), all(free))
+    most = most_iterations
+    if (.not. settled) most = nint(most_bounded*wider(conditions))
     do i = 1, most
       call precondition(factor, rest, w)
       call add_levels(conditions, levels, rest, w)
-      rho = sum(rest*w)
+      rho = product_of(rest, w)
       if (.not. rho > 0.0_wp) exit
-      p = w + merge(rho/rho_before, 0.0_wp, i > 1)*p
-      call spread_over(conditions, p, y)
-      where (.not. free) y = 0.0_wp
+      beta = merge(rho/rho_before, 0.0_wp, i > 1)
+      !$omp parallel do schedule(static) default(none) shared(p, w, beta) private(c)
+      do c = 1, size(p, 2)
+        p(:, c) = w(:, c) + beta*p(:, c)
+      end do
+      call spread_over(conditions, free, p, y)
       call sums_of(conditions, y, product)
-      curvature = sum(p*product)
+      curvature = product_of(p, product)
       if (.not. curvature > 0.0_wp) exit
-      step = step + rho/curvature*p
-      rest = rest - rho/curvature*product
+      alpha = rho/curvature
+      error = 0.0_wp
+      !$omp parallel do schedule(static) default(none) shared(step, rest, p, product, alpha) &
+      !$omp private(c) reduction(max: error)
+      do c = 1, size(p, 2)
+        step(:, c) = step(:, c) + alpha*p(:, c)
+        rest(:, c) = rest(:, c) - alpha*product(:, c)
+        error = max(error, maxval(abs(rest(:, c))))
+      end do
       rho_before = rho
       iterations = iterations + 1
-      if (maxval(abs(rest)) <= target) exit
+      if (work%is_due()) call work%tell('iteration '//to_text(iterations)//'  error '// &
+        & to_text(error, 2))
+      if (error <= target) exit
       if (size(levels) == 0) cycle
       ! what rounding leaves outside of the matrix's range would grow without end
-      if (maxval(abs(rest))/much > least) then
+      if (error/much > least) then
         step = best
         exit
       end if
-      if (maxval(abs(rest)) >= least) cycle
-      least = maxval(abs(rest))
+      if (error >= least) cycle
+      least = error
       best = step
     end do
   end subroutine solve
+
+  !> The sum of the products of all elements, with the same bits on any number of threads.
+  real(wp) function product_of(one, other) result(total)
+    real(wp), intent(in) :: one(:, :), other(:, :)
+    real(wp) :: of_class(size(one, 2))
+    integer :: c
+
+    !$omp parallel do schedule(static) default(none) shared(one, other, of_class) private(c)
+    do c = 1, size(one, 2)
+      of_class(c) = dot_product(one(:, c), other(:, c))
+    end do
+    total = sum(of_class)
+  end function product_of
 
   !> Cholesky factors of the classes' blocks. Rows that follow from others of the class, as those
   !> of a family with a centre of symmetry, are left out by a large pivot.

@@ -12,6 +12,8 @@ module pd_set_up_consistent_levels
   use pd_base_kinds, only: wp, i4, i8
   use pd_set_up_consistent_conditions, only: area_products, conditions_type, kind_of, &
     & of_dilatation, of_stretches, triple_products
+  use pd_set_up_consistent_splines, only: find_children, forget_points, grid_type, place_points, &
+    & shares, spline_at, splines_at, values_at
   implicit none (type, external)
   private
   public :: level_type, new_levels, add_levels
@@ -23,25 +25,10 @@ module pd_set_up_consistent_levels
   real(wp), parameter :: damping = 0.5_wp      !! of the diagonals, which overlap
   real(wp), parameter :: follows = 1.0e-10_wp  !! pivot of a row that follows from others [-]
 
-  !> A grid of B-splines, for z or for w. A point sees four of them along each axis. Cells without
-  !> points are left out, and splines that reach none. Two cells of a grid fit in one of the next
-  !> along each axis, so that a spline is a sum of five of the finer ones.
-  type :: level_type
-    integer :: dim = 0
+  !> A grid of B-splines, for z or for w, and the inverse of its matrix.
+  type, extends(grid_type) :: level_type
     logical :: of_stretch = .false.              !! whether the splines are those of z
     integer :: components = 0                    !! of z, or of w
-    integer(i4), allocatable :: child(:, :)
-      !! (5**dim, splines) of the next finer grid, of which a spline is a sum, x fastest; 0: none
-    ! of the finest grid only; others are sums of its splines:
-    integer(i4), allocatable :: cell(:)          !! (points) the cell with it
-    integer(i4), allocatable :: start(:)         !! (cells + 1) first in `order`
-    integer(i4), allocatable :: order(:)         !! points cell by cell
-    integer(i4), allocatable :: spline(:, :)     !! (4**dim, cells) that reach it, x fastest
-    integer(i4), allocatable :: first(:)         !! (splines + 1) first in `under`
-    integer(i4), allocatable :: under(:, :)
-      !! (2, any) a cell that the spline reaches, and which of the cell's splines it is
-    real(wp), allocatable :: value(:, :, :)      !! (4, dim, points) of the splines [-]
-    real(wp), allocatable :: slope(:, :, :)      !! (4, dim, points) [1/m]
     real(wp), allocatable :: inverse(:, :)       !! (components, splines) of the diagonal
     real(wp), allocatable :: factor(:, :)        !! of the widest grid: of its scaled matrix
     real(wp), allocatable :: scale(:)            !! that makes its diagonal 1
@@ -81,10 +68,9 @@ contains
       more(:size(levels)) = levels
       call move_alloc(more, levels)
       associate (level => levels(size(levels)))
-        level%dim = conditions%dim
         level%of_stretch = of_stretch
         level%components = merge(conditions%before, conditions%dim, of_stretch)
-        call place_points(conditions, low, edge, cells, level, numbers)
+        call place_points(conditions%x, low, edge, cells, level%grid_type, numbers)
         widest = all(cells == 1)
         if (.not. of_stretch) widest = widest .or. &
           & level%dim*(size(level%first) - 1) <= most_of_widest
@@ -94,9 +80,8 @@ contains
           call find_diagonal(conditions, level)
         end if
         if (allocated(finer)) then
-          call find_children(cells, fine, numbers, finer, level)
-          deallocate (level%cell, level%start, level%order, level%spline, level%first, &
-            & level%under, level%value, level%slope)
+          call find_children(cells, fine, numbers, finer, level%grid_type)
+          call forget_points(level%grid_type)
         end if
       end associate
       if (widest) return
@@ -106,216 +91,6 @@ contains
       edge = 2*edge
     end do
   end subroutine append_levels
-
-  !> The splines of the next finer grid of which those of a grid are sums: along an axis those from
-  !> twice its place less three on.
-  pure subroutine find_children(cells, fine, numbers, finer, level)
-    integer, intent(in) :: cells(:), fine(:)           ! (dim) of the grid, and of the finer one
-    integer(i4), intent(in) :: numbers(:), finer(:)    ! of their splines by place; 0: none
-    type(level_type), intent(inout) :: level
-    integer :: place(size(cells)), at(size(cells)), i, m, d
-
-    allocate (level%child(5**level%dim, maxval(numbers)), source=0_i4)
-    do i = 1, size(numbers)
-      if (numbers(i) == 0) cycle
-      place = place_of(i - 1, cells + 3)
-      do m = 1, 5**level%dim
-        at = 2*place - 3 + [(mod((m - 1)/5**(d - 1), 5), d=1, size(at))]
-        if (any(at < 0) .or. any(at >= fine + 3)) cycle
-        level%child(m, numbers(i)) = finer(1 + dense(at, fine + 3))
-      end do
-    end do
-  end subroutine find_children
-
-  !> The points in the cells of a grid, and its splines.
-  subroutine place_points(conditions, low, edge, cells, level, spline_number)
-    type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: low(:)            ! (dim) corner of the grid [m]
-    real(wp), intent(in) :: edge(:)           ! (dim) of its cells [m]
-    integer, intent(in) :: cells(:)           ! (dim) along each axis
-    type(level_type), intent(inout) :: level
-    integer(i4), allocatable, intent(out) :: spline_number(:)  ! of splines by place; 0: none
-    integer :: place(size(low), conditions%classes)
-    integer(i4), allocatable :: number(:), next(:), corner(:, :)
-    real(wp) :: s
-    integer :: k, d, c, m, n, at, dim, n_cells, n_splines
-
-    dim = level%dim
-    n = 4**dim
-    allocate (level%value(4, dim, conditions%classes), level%slope(4, dim, conditions%classes))
-    do k = 1, conditions%classes
-      do d = 1, dim
-        s = (conditions%x(d, k) - low(d))/edge(d)
-        place(d, k) = max(0, min(cells(d) - 1, int(s)))
-        s = s - place(d, k)
-        level%value(:, d, k) = [(1 - s)**3, 3*s**3 - 6*s**2 + 4, -3*s**3 + 3*s**2 + 3*s + 1, &
-          & s**3]/6
-        level%slope(:, d, k) = [-(1 - s)**2, 3*s**2 - 4*s, -3*s**2 + 2*s + 1, s**2]/(2*edge(d))
-      end do
-    end do
-    ! cells with points are numbered as they are met
-    allocate (number(product(cells)), source=0_i4)
-    allocate (level%cell(conditions%classes), corner(dim, conditions%classes))
-    n_cells = 0
-    do k = 1, conditions%classes
-      c = 1 + dense(place(:, k), cells)
-      if (number(c) == 0) then
-        n_cells = n_cells + 1
-        number(c) = int(n_cells, i4)
-        corner(:, n_cells) = int(place(:, k), i4)
-      end if
-      level%cell(k) = number(c)
-    end do
-    call sort_into(level%cell, n_cells, level%start, level%order)
-    ! and so are splines
-    allocate (level%spline(n, n_cells))
-    allocate (spline_number(product(cells + 3)), source=0_i4)
-    n_splines = 0
-    do c = 1, n_cells
-      do m = 1, n
-        at = 1 + dense(int(corner(:, c)) + offset_of(m, dim), cells + 3)
-        if (spline_number(at) == 0) then
-          n_splines = n_splines + 1
-          spline_number(at) = int(n_splines, i4)
-        end if
-        level%spline(m, c) = spline_number(at)
-      end do
-    end do
-    call sort_into(reshape(level%spline, [n*n_cells]), n_splines, level%first, next)
-    allocate (level%under(2, size(next)))
-    level%under(1, :) = (next - 1)/n + 1
-    level%under(2, :) = mod(next - 1, n) + 1
-  end subroutine place_points
-
-  !> The number from 0 of a place from 0, the first index fastest.
-  pure integer function dense(place, extents) result(number)
-    integer, intent(in) :: place(:), extents(:)
-    integer :: d
-
-    number = 0
-    do d = size(place), 1, -1
-      number = number*extents(d) + place(d)
-    end do
-  end function dense
-
-  !> The place of a number from 0.
-  pure function place_of(number, extents) result(place)
-    integer, intent(in) :: number, extents(:)
-    integer :: place(size(extents))
-    integer :: rest, d
-
-    rest = number
-    do d = 1, size(extents)
-      place(d) = mod(rest, extents(d))
-      rest = rest/extents(d)
-    end do
-  end function place_of
-
-  !> Where spline `m` of a cell stands among its four along each axis, from 0.
-  pure function offset_of(m, dim) result(offset)
-    integer, intent(in) :: m, dim
-    integer :: offset(dim)
-    integer :: d
-
-    do d = 1, dim
-      offset(d) = mod((m - 1)/4**(d - 1), 4)
-    end do
-  end function offset_of
-
-  !> Entries box by box, those of one box in their order.
-  pure subroutine sort_into(box, n_boxes, start, order)
-    integer(i4), intent(in) :: box(:)                 ! of each entry
-    integer, intent(in) :: n_boxes
-    integer(i4), allocatable, intent(out) :: start(:) ! (boxes + 1) first of each in `order`
-    integer(i4), allocatable, intent(out) :: order(:)
-    integer(i4), allocatable :: next(:)
-    integer :: i
-
-    allocate (start(n_boxes + 1), source=0_i4)
-    allocate (order(size(box)))
-    do i = 1, size(box)
-      start(box(i) + 1) = start(box(i) + 1) + 1_i4
-    end do
-    start(1) = 1_i4
-    do i = 1, n_boxes
-      start(i + 1) = start(i) + start(i + 1)
-    end do
-    next = start
-    do i = 1, size(box)
-      order(next(box(i))) = int(i, i4)
-      next(box(i)) = next(box(i)) + 1_i4
-    end do
-  end subroutine sort_into
-
-  !> All splines that reach point k, x fastest, and their gradients.
-  pure subroutine splines_at(level, k, value, gradient)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: k                  !! point
-    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
-    real(wp), intent(inout) :: gradient(:, :) !! (3, 4**dim) dim of them are set [1/m]
-    real(wp) :: v, s
-    integer :: m, n, i, j, d
-
-    associate (of => level%value(:, :, k), slope => level%slope(:, :, k))
-      value(:4) = of(:, 1)
-      gradient(1, :4) = slope(:, 1)
-      n = 4
-      do d = 2, level%dim
-        ! the first last, since the others are made of what it replaces
-        do i = 4, 1, -1
-          v = of(i, d)
-          s = slope(i, d)
-          do m = 1, n
-            j = (i - 1)*n + m
-            gradient(d, j) = value(m)*s
-            gradient(:d - 1, j) = gradient(:d - 1, m)*v
-            value(j) = value(m)*v
-          end do
-        end do
-        n = 4*n
-      end do
-    end associate
-  end subroutine splines_at
-
-  !> All splines that reach point k, x fastest.
-  pure subroutine values_at(level, k, value)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: k                  !! point
-    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
-    integer :: n, i, d
-
-    associate (of => level%value(:, :, k))
-      value(:4) = of(:, 1)
-      n = 4
-      do d = 2, level%dim
-        do i = 4, 1, -1
-          value((i - 1)*n + 1:i*n) = value(:n)*of(i, d)
-        end do
-        n = 4*n
-      end do
-    end associate
-  end subroutine values_at
-
-  !> Spline `m` of those that reach point k, and its gradient.
-  pure subroutine spline_at(level, m, k, value, gradient)
-    type(level_type), intent(in) :: level
-    integer, intent(in) :: m, k
-    real(wp), intent(out) :: value            !! [-]
-    real(wp), intent(out) :: gradient(:)      !! (dim) [1/m]
-    integer :: d, i, offset(level%dim)
-
-    offset = offset_of(m, level%dim)
-    value = 1.0_wp
-    gradient = 1.0_wp
-    do d = 1, level%dim
-      associate (v => level%value(offset(d) + 1, d, k), s => level%slope(offset(d) + 1, d, k))
-        value = value*v
-        do i = 1, level%dim
-          gradient(i) = gradient(i)*merge(s, v, i == d)
-        end do
-      end associate
-    end do
-  end subroutine spline_at
 
   !> What a spline at point k, as any component, gives the unknown of bond `e` of k, over
   !> `pattern_of` that unknown and component.
@@ -331,10 +106,10 @@ contains
     share = 0.0_wp
     kind = kind_of(conditions, int(conditions%unknown(e)))
     if (kind == merge(of_dilatation, of_stretches, of_stretch)) return
-    associate (n => conditions%n(:, conditions%bond(conditions%first(conditions%unknown(e)))), &
-      & f => conditions%factor(:, e))
+    associate (n => conditions%n(conditions%bond(conditions%first(conditions%unknown(e))), :), &
+      & f => conditions%factor(e, :))
       ! seen from the other end the direction is the opposite one
-      along = sign(1.0_wp, dot_product(n, conditions%n(:, e)))
+      along = sign(1.0_wp, dot_product(n, conditions%n(e, :)))
       if (of_stretch) then
         share = along*conditions%stiffness(k)*f(1)*value
       else
@@ -352,7 +127,7 @@ contains
     integer, intent(in) :: u
     real(wp), intent(inout) :: pattern(:)  ! (components) set
 
-    associate (n => conditions%n(:, conditions%bond(conditions%first(u))))
+    associate (n => conditions%n(conditions%bond(conditions%first(u)), :))
       if (.not. of_stretch) then
         pattern = n
       else if (kind_of(conditions, u) == of_stretches) then
@@ -386,7 +161,8 @@ contains
         associate (cell => level%under(1, i))
           do p = level%start(cell), level%start(cell + 1) - 1
             k = int(level%order(p))
-            call spline_at(level, int(level%under(2, i)), k, value, gradient)
+            call spline_at(level%grid_type, int(level%under(2, i)), k, value, &
+              & gradient)
             do e = conditions%start(k), conditions%start(k + 1) - 1
               u = int(conditions%unknown(e))
               part = share_of(conditions, level%of_stretch, k, e, value, gradient)
@@ -439,12 +215,12 @@ contains
         do i = conditions%first(u), conditions%first(u + 1) - 1
           e = conditions%bond(i)
           k = int(conditions%class(e))
-          call splines_at(level, k, value, gradient)
+          call splines_at(level%grid_type, k, value, gradient)
           do m = 1, 4**dim
             share = share_of(conditions, .false., k, e, value(m), gradient(:dim, m))
             at = dim*(level%spline(m, level%cell(k)) - 1)
             of_bonds(at + 1:at + dim, u - first + 1) = of_bonds(at + 1:at + dim, u - first + 1) &
-              & + share*conditions%n(:, conditions%bond(conditions%first(u)))
+              & + share*conditions%n(conditions%bond(conditions%first(u)), :)
           end do
         end do
       end do
@@ -525,25 +301,13 @@ contains
       real(wp), allocatable :: c(:, :)  ! (components, splines)
     end type values_type
     type(values_type) :: of(size(levels))
-    integer :: i, s, m
+    integer :: i
 
-    do i = 1, size(levels)
-      associate (level => levels(i))
-        if (i == 1) then
-          allocate (of(i)%c(level%components, size(level%first) - 1))
-          call gather(conditions, level, r, of(i)%c)
-        else
-          allocate (of(i)%c(level%components, size(level%child, 2)), source=0.0_wp)
-          associate (share => shares(level%dim))
-            do s = 1, size(level%child, 2)
-              do m = 1, size(level%child, 1)
-                if (level%child(m, s) == 0) cycle
-                of(i)%c(:, s) = of(i)%c(:, s) + share(m)*of(i - 1)%c(:, level%child(m, s))
-              end do
-            end do
-          end associate
-        end if
-      end associate
+    allocate (of(1)%c(levels(1)%components, size(levels(1)%first) - 1))
+    call gather(conditions, levels(1), r, of(1)%c)
+    do i = 2, size(levels)
+      allocate (of(i)%c(levels(i)%components, size(levels(i)%child, 2)))
+      call sum_children(levels(i), of(i - 1)%c, of(i)%c)
     end do
     do i = size(levels), 1, -1
       associate (level => levels(i))
@@ -552,34 +316,47 @@ contains
         else
           of(i)%c = level%inverse*of(i)%c
         end if
-        if (i == size(levels)) cycle
       end associate
-      associate (wider => levels(i + 1))
-        associate (share => shares(wider%dim))
-          do s = 1, size(wider%child, 2)
-            do m = 1, size(wider%child, 1)
-              if (wider%child(m, s) == 0) cycle
-              of(i)%c(:, wider%child(m, s)) = of(i)%c(:, wider%child(m, s)) &
-                & + share(m)*of(i + 1)%c(:, s)
-            end do
-          end do
-        end associate
-      end associate
+      if (i < size(levels)) call add_parents(levels(i + 1), of(i + 1)%c, of(i)%c)
     end do
     call spread_out(conditions, levels(1), of(1)%c, w)
   end subroutine add_grids
 
-  !> What a spline has of each of its children.
-  pure function shares(dim) result(share)
-    integer, intent(in) :: dim
-    real(wp) :: share(5**dim)
-    real(wp), parameter :: along(5) = [1.0_wp, 4.0_wp, 6.0_wp, 4.0_wp, 1.0_wp]/8
-    integer :: m, d
+  !> The sums over a grid's splines, from those over the splines of the next finer grid.
+  subroutine sum_children(level, finer, c)
+    type(level_type), intent(in) :: level
+    real(wp), intent(in) :: finer(:, :)  ! (components, splines of the finer grid)
+    real(wp), intent(inout) :: c(:, :)   ! (components, splines) set
+    real(wp) :: share(5**level%dim)
+    integer :: s, m
 
-    do m = 1, size(share)
-      share(m) = product([(along(1 + mod((m - 1)/5**(d - 1), 5)), d=1, dim)])
+    share = shares(level%dim)
+    !$omp parallel do schedule(static) default(none) shared(level, finer, c, share) private(s, m)
+    do s = 1, size(c, 2)
+      c(:, s) = 0.0_wp
+      do m = 1, size(share)
+        if (level%child(m, s) == 0) cycle
+        c(:, s) = c(:, s) + share(m)*finer(:, level%child(m, s))
+      end do
     end do
-  end function shares
+  end subroutine sum_children
+
+  !> Add what the splines of a grid are to those of the next finer one, `finer`.
+  subroutine add_parents(level, c, finer)
+    type(level_type), intent(in) :: level
+    real(wp), intent(in) :: c(:, :)         ! (components, splines)
+    real(wp), intent(inout) :: finer(:, :)  ! (components, splines of the finer grid)
+    real(wp) :: share(5**level%dim)
+    integer :: s, i
+
+    share = shares(level%dim)
+    !$omp parallel do schedule(static) default(none) shared(level, finer, c, share) private(s, i)
+    do s = 1, size(finer, 2)
+      do i = level%above(s), level%above(s + 1) - 1
+        finer(:, s) = finer(:, s) + share(level%parent(2, i))*c(:, level%parent(1, i))
+      end do
+    end do
+  end subroutine add_parents
 
   !> Solve by the factor of the widest grid.
   pure subroutine solve(level, c)
@@ -592,7 +369,8 @@ contains
     x = all_of_it(level%chosen)
     associate (f => level%factor)
       do i = 1, size(x)
-        x(i) = (x(i) - dot_product(f(i, :i - 1), x(:i - 1)))/f(i, i)
+        x(i) = x(i)/f(i, i)
+        x(i + 1:) = x(i + 1:) - x(i)*f(i + 1:size(x), i)
       end do
       do i = size(x), 1, -1
         x(i) = (x(i) - dot_product(f(i + 1:size(x), i), x(i + 1:)))/f(i, i)
@@ -645,14 +423,14 @@ contains
       do i = int(level%start(cell)), int(level%start(cell + 1)) - 1
         k = int(level%order(i))
         if (level%of_stretch) then
-          call values_at(level, k, value)
+          call values_at(level%grid_type, k, value)
           fields = conditions%stiffness(k)*r(:before, k)
           do m = 1, splines
             of_cell(:, m, cell) = of_cell(:, m, cell) + fields*value(m)
           end do
           cycle
         end if
-        call splines_at(level, k, value, gradient)
+        call splines_at(level%grid_type, k, value, gradient)
         fields = conditions%shift(k)*r(before + dim*(dim + 1)/2 + 1:, k)
         do x = 1, dim
           strains(:dim, x) = conditions%strain(k)*r(before + rows(:dim, x), k)
@@ -693,14 +471,14 @@ contains
     do k = 1, conditions%classes
       fields = 0.0_wp
       if (level%of_stretch) then
-        call values_at(level, k, value)
+        call values_at(level%grid_type, k, value)
         do m = 1, 4**dim
           fields = fields + value(m)*c(:, level%spline(m, level%cell(k)))
         end do
         w(:before, k) = w(:before, k) + conditions%stiffness(k)*fields
         cycle
       end if
-      call splines_at(level, k, value, gradient)
+      call splines_at(level%grid_type, k, value, gradient)
       strains = 0.0_wp
       do m = 1, 4**dim
         s = int(level%spline(m, level%cell(k)))

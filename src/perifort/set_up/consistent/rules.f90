@@ -2,6 +2,7 @@
 module pd_set_up_consistent_rules
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp, i8
+  use pd_base_long_work, only: long_work_type
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_mesh_part, only: count_pieces, count_twins
@@ -181,11 +182,12 @@ contains
 
   !> Give the model the weights of its bonds. An error is set if there are none, or if a body that
   !> breaks could gain energy.
-  subroutine weigh_bonds(scene, system, materials, fixed, error)
+  subroutine weigh_bonds(scene, system, materials, fixed, work, error)
     type(scene_type), intent(in) :: scene               !! with consistent weights
     type(system_type), intent(inout) :: system          !! with body, whole family and model
     type(material_type), intent(in) :: materials(:)     !! (any number) by the points' numbers
     logical, intent(in) :: fixed(:)                     !! of `loaded_sides`
+    type(long_work_type), intent(inout) :: work         !! says how far this is
     type(error_type), allocatable, intent(out) :: error
     type(solution_type) :: stretch, dilatation
     type(bond_weights_type) :: weights
@@ -198,10 +200,10 @@ contains
     cut = cut .or. size(scene%contacts) > 0
     if (allocated(system%model%horizon)) then
       call consistent_weights(system%body, system%family, materials, fixed, breaking, weights, &
-        & stretch, dilatation, error, system%model)
+        & stretch, dilatation, error, work, system%model)
     else
       call consistent_weights(system%body, system%family, materials, fixed, breaking, weights, &
-        & stretch, dilatation, error)
+        & stretch, dilatation, error, work)
     end if
     call place_fault(error, scene, 'horizon', 1, 'surface_correction')
     if (allocated(error)) return

@@ -3,6 +3,7 @@
 module pd_set_up_consistent_weights
   use pd_base_error, only: error_type, fail
   use pd_base_kinds, only: wp
+  use pd_base_long_work, only: long_work_type
   use pd_base_text, only: to_text
   use pd_body_body, only: body_type
   use pd_body_meshes, only: surface_areas
@@ -50,7 +51,7 @@ contains
   !> load acts on change; the body gets them. An error is set if a point of a lattice has no second
   !> one behind it, or if no weights fulfil the conditions.
   subroutine consistent_weights(body, family, materials, fixed, breaking, weights, stretch, &
-    & dilatation, error, model)
+    & dilatation, error, work, model)
     type(body_type), intent(inout) :: body
       !! all on lattices, or one mesh or cloud, in the family's slots
     class(family_type), intent(in) :: family         !! whole: no bond cut
@@ -61,6 +62,7 @@ contains
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work      !! says how far the iterations are
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     real(wp), allocatable :: area(:, :), changed(:, :), of_stretch(:, :), of_dilatation(:, :)
     real(wp), allocatable :: bounds(:)
@@ -82,7 +84,7 @@ contains
       if (all(body%sides%axis == 0)) then
         face(body%sides%slot) = body%sides%face
         call weights_and_areas(body, family, materials, face, bounds, area, weights, stretch, &
-          & dilatation, error, model)
+          & dilatation, error, work, model)
         if (.not. allocated(error)) body%surface_area = area
         return
       end if
@@ -101,24 +103,24 @@ contains
     end if
     if (.not. allocated(area)) then
       call weights_of_areas(body, family, materials, of_stretch, of_dilatation, .false., &
-        & bounds(least:), weights, stretch, dilatation, error)
+        & bounds(least:), weights, stretch, dilatation, error, work)
       return
     end if
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds(least:positive), weights, stretch, dilatation, error, model)
+      & bounds(least:positive), weights, stretch, dilatation, error, work, model)
     if (.not. allocated(error)) return
     where (any(abs(area) > 0.0_wp, dim=2) .and. .not. fixed) face = body%volume/body%spacing
     if (any(face > 0.0_wp)) then
       changed = area
       call weights_and_areas(body, family, materials, face, bounds(:positive), changed, &
-        & weights, stretch, dilatation, error, model)
+        & weights, stretch, dilatation, error, work, model)
       if (.not. allocated(error)) then
         body%surface_area = changed
         return
       end if
     end if
     call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds(positive + 1:), weights, stretch, dilatation, error, model)
+      & bounds(positive + 1:), weights, stretch, dilatation, error, work, model)
   end subroutine consistent_weights
 
   !> Weights together with surface areas: Gb, Gd and areas are unknowns of one set of conditions. An
@@ -126,7 +128,7 @@ contains
   !> and Gd that grow with the body; neither need there be with those of triangles, tetrahedra or
   !> round parts of lattices. An error is set if no weights fulfil the conditions.
   subroutine weights_and_areas(body, family, materials, face, bounds, area, weights, stretch, &
-    & dilatation, error, model)
+    & dilatation, error, work, model)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)   ! all of one stiffness
@@ -137,6 +139,7 @@ contains
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work
     type(model_type), intent(in), optional :: model
     type(groups_type) :: groups
     type(conditions_type) :: of_stretch, of_dilatation, conditions
@@ -152,7 +155,7 @@ contains
     call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, model)
     call join_conditions(of_stretch, of_dilatation, mu(1), a(1), part_of_face*face(groups%first), &
       & conditions)
-    call solve(conditions, bounds, 'stretch and the dilatation', G, stretch, error)
+    call solve(conditions, bounds, 'stretch and the dilatation', G, stretch, error, work)
     if (allocated(error)) return
     do c = 1, groups%n_classes
       associate (k => groups%first(c))
@@ -187,7 +190,7 @@ contains
   !> like surroundings have one weight; where that leaves no solution, surroundings are looked at
   !> farther, and in the end each bond has a weight of its own.
   subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, uneven, bounds, &
-    & weights, stretch, dilatation, error, model)
+    & weights, stretch, dilatation, error, work, model)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
     class(family_type), intent(in) :: family         !! whole: no bond cut
     type(material_type), intent(in) :: materials(:)  !! (any number) by the points' numbers
@@ -196,12 +199,13 @@ contains
     real(wp), intent(in) :: of_dilatation(:, :)
       !! (n_slots, dim) a over the largest a x area, summed over regions [m2]
     logical, intent(in) :: uneven
-      !! no points are alike; and of Gd no bound is asked for, which would take ten times as long
+      !! no points are alike, and of Gd no bound is asked for
     real(wp), intent(in) :: bounds(:)                !! on Gb, tried one after another [-]
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch      !! how Gb was found
     type(solution_type), intent(out) :: dilatation   !! how Gd was found
     type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work      !! says how far the iterations are
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
     integer, parameter :: farthest = 3
     integer :: reach
@@ -211,7 +215,7 @@ contains
     if (uneven) reach = 0
     do
       call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounds, &
-        & uneven, weights, stretch, dilatation, error, model)
+        & uneven, weights, stretch, dilatation, error, work, model)
       if (reach == 0 .or. .not. allocated(error)) return
       reach = merge(0, reach + 1, reach == farthest .or. stretch%hopeless .or. dilatation%hopeless)
     end do
@@ -220,7 +224,7 @@ contains
   !> Weights where bonds have one weight if all looks alike within `reach` horizons. An error is set
   !> if none fulfil the conditions.
   subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounds, &
-    & uneven, weights, stretch, dilatation, error, model)
+    & uneven, weights, stretch, dilatation, error, work, model)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)
@@ -231,11 +235,13 @@ contains
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work
     type(model_type), intent(in), optional :: model
     type(groups_type) :: groups
     type(conditions_type) :: conditions
     real(wp), allocatable :: Gb(:), Gd(:)
     real(wp) :: scale
+    integer :: first
 
     scale = maxval(abs(of_dilatation))
     if (.not. scale > 0.0_wp) scale = 1.0_wp
@@ -243,34 +249,39 @@ contains
       & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
     if (allocated(error)) return
     call stretch_conditions(body, family, materials, groups, of_stretch, conditions, model)
-    call solve(conditions, bounds, 'stretch', Gb, stretch, error)
+    call solve(conditions, bounds, 'stretch', Gb, stretch, error, work)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions, model)
-    call solve(conditions, bounds_of_dilatation(merge(size(bounds_of_dilatation), 1, uneven):), &
-      & 'dilatation', Gd, dilatation, error)
+    ! the bounds on Gd would take ten times as long, and in space most of all weights are at them
+    first = 1
+    if (uneven .or. (reach == 0 .and. body%dim == 3)) first = size(bounds_of_dilatation)
+    call solve(conditions, bounds_of_dilatation(first:), 'dilatation', Gd, dilatation, error, &
+      & work)
     if (allocated(error)) return
     call spread_weights(body, groups, Gb, Gd, weights)
   end subroutine weights_at_reach
 
   !> The least change within the first of some bounds that allow one.
-  subroutine solve(conditions, bounds, what, G, solution, error)
+  subroutine solve(conditions, bounds, what, G, solution, error, work)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: bounds(:)
     character(*), intent(in) :: what
     real(wp), allocatable, intent(out) :: G(:)
     type(solution_type), intent(out) :: solution
     type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work
     character(:), allocatable :: why
     integer :: b, iterations
     logical :: found
 
+    call work%turn_to('weights of the '//what)
     found = .false.
     solution%unknowns = conditions%unknowns
     do b = 1, size(bounds)
       solution%bound = bounds(b)
       call least_change(conditions, bounds(b), G, solution%residual, iterations, found, &
-        & solution%hopeless)
+        & solution%hopeless, work)
       solution%iterations = solution%iterations + iterations
       if (found .or. solution%hopeless) exit
     end do

@@ -9,6 +9,8 @@
 !> crack go so many bonds by length, and as many as have broken tell how far the tip has come.
 module pd_set_up_toughness_grow
   use pd_base_kinds, only: wp
+  use pd_base_long_work, only: long_work_type
+  use pd_base_text, only: to_text
   use pd_family_volume, only: volume_rule_type
   use pd_law_material, only: new_material
   use pd_law_weighted, only: weighted_law_type
@@ -55,12 +57,14 @@ contains
   end function radius_of
 
   !> The toughness of a lattice for a law.
-  subroutine grow_crack(law, subject, diagonal, toughness, radius)
+  subroutine grow_crack(law, subject, diagonal, toughness, radius, work)
     class(weighted_law_type), intent(in) :: law     !! with its Poisson's ratio and influence
     type(subject_type), intent(in) :: subject       !! the lattice
     logical, intent(in) :: diagonal                 !! the crack grows along diagonals of cells
     type(toughness_type), intent(out) :: toughness  !! relative to the Gc of the law's formula
     real(wp), intent(in), optional :: radius        !! of the disc; `radius_of` it [spacings]
+    type(long_work_type), intent(inout), optional :: work
+      !! says how far the crack is; absent: nothing does
     class(weighted_law_type), allocatable :: one
     type(disc_type) :: disc
     real(wp), allocatable :: u(:, :, :), field(:, :, :), next(:, :, :)
@@ -94,6 +98,10 @@ contains
     do while (broken < wanted .and. toughness%solves < most)
       call relax(disc, tolerance, u, toughness%iterations)
       toughness%solves = toughness%solves + 1
+      if (present(work)) then
+        if (work%is_due()) call work%tell('crack of '//to_text(broken)//' of '//to_text(wanted) &
+          & //' bonds')
+      end if
       call most_stretched(disc, u, s, bond)
       if (.not. s > 0.0_wp) exit
       counts = broken >= begun

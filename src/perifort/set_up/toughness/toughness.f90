@@ -3,6 +3,7 @@
 module pd_set_up_toughness_toughness
   use pd_base_clock, only: duration_text, wall_time
   use pd_base_kinds, only: wp
+  use pd_base_long_work, only: long_work_type
   use pd_base_text, only: to_text
   use pd_base_warnings, only: warnings_type
   use pd_body_body, only: body_type
@@ -27,7 +28,7 @@ contains
 
   !> Give the materials of a scene that ask for it a critical stretch by the lattice. Where that
   !> cannot be had the formula's stays, and a note tells why.
-  subroutine set_critical_by_lattice(scene, body, delta, materials, laws, notes)
+  subroutine set_critical_by_lattice(scene, body, delta, materials, laws, notes, work)
     type(scene_type), intent(in) :: scene                !! a checked scene
     type(body_type), intent(in) :: body                  !! knows the spacings of its points
     real(wp), intent(in) :: delta                        !! horizon [m]
@@ -35,6 +36,7 @@ contains
     type(law_item_type), intent(inout) :: laws(:)        !! (materials) that have these materials
     type(warnings_type), intent(inout) :: notes          !! gets a note for each that keeps it, and
                                                          !! for each that is not tabulated
+    type(long_work_type), intent(inout) :: work          !! says how far a solve is
     type(subject_type) :: subject
     character(:), allocatable :: reason, name
     integer :: i
@@ -43,7 +45,8 @@ contains
       if (scene%materials(i)%critical /= 'lattice') cycle
       name = 'material '//to_text(i)
       call subject_of(scene, body, delta, subject, reason)
-      if (reason == '') call solve(laws(i)%law, subject, materials(i), notes, name, reason)
+      if (reason == '') call solve(laws(i)%law, subject, materials(i), notes, name, &
+        & work, reason)
       if (reason /= '') call notes%add('critical '//name, name//": critical = 'chapter', since "// &
         & reason, tell=.false.)
       laws(i)%law%material = materials(i)
@@ -83,12 +86,13 @@ contains
   end subroutine subject_of
 
   !> The critical stretch of a material by its lattice, from the table or a solve.
-  subroutine solve(law, subject, material, notes, name, reason)
+  subroutine solve(law, subject, material, notes, name, work, reason)
     class(bond_law_type), intent(in) :: law
     type(subject_type), intent(in) :: subject
     type(material_type), intent(inout) :: material  !! with s_c of the formula; gets the lattice's
     type(warnings_type), intent(inout) :: notes
     character(*), intent(in) :: name                !! of the material, for notes
+    type(long_work_type), intent(inout) :: work
     character(:), allocatable, intent(out) :: reason  !! why there is none; else empty
     type(weighted_law_type) :: plain
     type(toughness_type) :: straight, diagonal
@@ -106,12 +110,14 @@ contains
         & material%diagonal_toughness, found)
       if (.not. found) then
         begin = wall_time()
-        call grow_crack(law, subject, .false., straight)
+        call work%turn_to('toughness of the lattice, straight')
+        call grow_crack(law, subject, .false., straight, work=work)
         if (.not. straight%known) then
           reason = 'no crack grows straight through the lattice'
           return
         end if
-        call grow_crack(law, subject, .true., diagonal)
+        call work%turn_to('toughness of the lattice, diagonal')
+        call grow_crack(law, subject, .true., diagonal, work=work)
         material%toughness = straight%largest
         material%mean_toughness = straight%mean
         material%diagonal_toughness = merge(diagonal%largest, 0.0_wp, diagonal%known)
