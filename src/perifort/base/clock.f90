@@ -7,7 +7,7 @@ module pd_base_clock
   implicit none (type, external)
   private
   public :: wall_time, duration_text, output_is_terminal, phase_timer_type, progress_type
-  public :: progress_text
+  public :: progress_text, rewrite_line, terminal_interval, log_interval
 
   integer, parameter :: name_length = 32       !! longest name of a phase that is kept [characters]
   integer, parameter :: line_width = 79        !! a rewritten line must not wrap [characters]
@@ -289,9 +289,7 @@ contains
       & self%load)
     if (present(note)) line = line//'  '//note
     if (self%terminal) then
-      line = line(:min(len(line), line_width))
-      ! Return to the first column, write, and clear the rest of an older, longer line.
-      write (self%unit, '(a)', advance='no') achar(13)//line//achar(27)//'[K'
+      call rewrite_line(self%unit, line)
       self%open_line = .true.
     else
       write (self%unit, '(a)') line
@@ -299,6 +297,15 @@ contains
     flush (self%unit)
     if (step >= self%total) call self%finish()
   end subroutine update_progress
+
+  !> Write a line of a terminal in place of what stands there; an empty one erases it.
+  subroutine rewrite_line(unit, line)
+    integer, intent(in) :: unit       !! of the terminal
+    character(*), intent(in) :: line  !! cut to the width of a terminal
+
+    ! Return to the first column, write, and clear the rest of an older, longer line.
+    write (unit, '(a)', advance='no') achar(13)//line(:min(len(line), line_width))//achar(27)//'[K'
+  end subroutine rewrite_line
 
   !> End the line, so that the next output starts on a new one. May be called at any time.
   subroutine finish_progress(self)

@@ -3,16 +3,14 @@
 !> the end, or now and then a full line in a log.
 module pd_base_long_work
   use, intrinsic :: iso_fortran_env, only: output_unit
-  use pd_base_clock, only: duration_text, output_is_terminal, wall_time
+  use pd_base_clock, only: duration_text, log_interval, output_is_terminal, rewrite_line, &
+    & terminal_interval, wall_time
   use pd_base_kinds, only: wp
   implicit none (type, external)
   private
   public :: long_work_type
 
-  real(wp), parameter :: patience = 2.0_wp            !! before the first line [s]
-  real(wp), parameter :: terminal_interval = 0.2_wp   !! between rewritings [s]
-  real(wp), parameter :: log_interval = 10.0_wp       !! between lines of a log [s]
-  integer, parameter :: line_width = 79               !! a rewritten line must not wrap [characters]
+  real(wp), parameter :: patience = 2.0_wp  !! before the first line [s]
 
   !> One piece of long work after another. Not begun, it says nothing.
   type :: long_work_type
@@ -78,8 +76,7 @@ contains
     line = text//'  for '//duration_text(self%shown - self%started)
     if (allocated(self%subject)) line = self%subject//'  '//line
     if (self%terminal) then
-      write (self%unit, '(a)', advance='no') achar(13)//line(:min(len(line), line_width)) &
-        & //achar(27)//'[K'
+      call rewrite_line(self%unit, line)
       self%open_line = .true.
     else
       write (self%unit, '(a)') line
@@ -92,7 +89,7 @@ contains
     class(long_work_type), intent(inout) :: self  !! without an open line on return
 
     if (self%open_line) then
-      write (self%unit, '(a)', advance='no') achar(13)//achar(27)//'[K'
+      call rewrite_line(self%unit, '')
       flush (self%unit)
     end if
     self%open_line = .false.

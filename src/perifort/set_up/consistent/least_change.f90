@@ -21,8 +21,6 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
   real(wp), parameter :: uneven = 1.0e-10_wp
     !! of those of points that all differ, and of others that more steps do not lower [-]
-  real(wp), parameter :: enough = 1.0e-9_wp
-    !! of those of points that all differ that more steps do not lower, or not soon [-]
   real(wp), parameter :: part_of_changes = 1.0e-2_wp
     !! bonds that come to the bound or leave it in a step, over all at it
   real(wp), parameter :: much = 1.0e3_wp            !! growth of an error that is rounding
@@ -119,7 +117,7 @@ contains
     end do
     ! more steps do not lower what is left, or take too long
     residual = maxval(abs(r))
-    found = residual <= merge(enough, uneven, conditions%alone)
+    found = residual <= uneven
   end subroutine least_change
 
   !> Note which weights are not at the bound. `settled`: they are nearly those of the step before,

@@ -41,6 +41,9 @@ module pd_set_up_consistent_weights
   !> Of Gd there are none above 0 in the plane either, and those that are not negative are far from
   !> 1.
   real(wp), parameter :: bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
+  !> Points in space, each with weights of its own, up to which Gd has bounds: most weights are at
+  !> them.
+  integer, parameter :: most_bounded = 8000
   !> Change of a surface area that counts as much as one of a weight by 1 [faces].
   real(wp), parameter :: part_of_face = 0.03_wp
 
@@ -253,9 +256,10 @@ contains
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions, model)
-    ! the bounds on Gd would take ten times as long, and in space most of all weights are at them
+    ! the bounds on Gd would take ten times as long, or the iterations would not end
     first = 1
-    if (uneven .or. (reach == 0 .and. body%dim == 3)) first = size(bounds_of_dilatation)
+    if (uneven .or. (reach == 0 .and. body%dim == 3 .and. groups%n_classes > most_bounded)) &
+      & first = size(bounds_of_dilatation)
     call solve(conditions, bounds_of_dilatation(first:), 'dilatation', Gd, dilatation, error, &
       & work)
     if (allocated(error)) return
