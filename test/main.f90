@@ -17,6 +17,7 @@ program main
   use test_base_interrupt, only: collect_base_interrupt
   use test_base_long_work, only: collect_base_long_work
   use test_base_lookup, only: collect_base_lookup
+  use test_base_shares, only: collect_base_shares
   use test_base_text, only: collect_base_text
   use test_base_threads, only: collect_base_threads
   use test_base_version, only: collect_base_version
@@ -161,6 +162,7 @@ program main
   call register('base_interrupt', collect_base_interrupt)
   call register('base_long_work', collect_base_long_work)
   call register('base_lookup', collect_base_lookup)
+  call register('base_shares', collect_base_shares)
   call register('base_text', collect_base_text)
   call register('base_threads', collect_base_threads)
   call register('base_version', collect_base_version)

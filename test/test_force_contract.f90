@@ -789,7 +789,7 @@ contains
     type(subject_type) :: subject
     real(wp), allocatable :: u(:, :), force(:, :), other(:, :), p(:), p_other(:)
     integer(i8) :: weights, packs
-    integer :: dim, variant, i
+    integer :: dim, variant, i, c
 
     do dim = 1, 3
       do variant = 1, 3
@@ -810,6 +810,11 @@ contains
                 & //name_of(subject, 0))
               if (i == 1) call expect_true(error, count(kept%shape > 0_i8) &
                 & > size(kept%shape)/2, 'few shapes are shared')
+              ! bars have no crack
+              if (i == 1 .and. dim > 1) call expect_true(error, any(kept%shape > 0_i8 .and. [(any( &
+                & family%intact(family%start(c):family%start(c + 1) - 1) &
+                & /= family%bits(family%start(c):family%start(c + 1) - 1)), &
+                & c = 1, size(kept%shape))]), 'no cluster with a shape has broken bonds')
             end associate
           end select
           call expect_close(error, other, force, 1.0e-13_wp*max_abs(force), 'force, ' &

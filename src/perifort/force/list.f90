@@ -5,19 +5,20 @@ module pd_force_list
   use pd_base_error, only: internal_fault
   use pd_base_kinds, only: wp, i1, i8
   use pd_base_lanes, only: lanes
+  use pd_base_shares, only: shares_type
   use pd_family_clusters, only: lane_bit
   use pd_family_list, only: list_family_type
   use pd_force_general, only: mark_slot
   use pd_force_list_fast, only: choose_loop
   use pd_force_list_general, only: work_type, fill_tables, cluster_theta, cluster_force, &
-    & cluster_energy, take_given, take_up
+    & cluster_energy, take_given, take_place, take_up
   use pd_force_list_loop, only: all_tables, for_energy, for_force, for_theta, no_tables, &
     & pass_loop, task_type, weights_alone
   use pd_force_list_points, only: new_task, plain_task, survey
   use pd_force_list_tables, only: make_tables
   use pd_force_model, only: early, force_options_type, model_type, options_of, p_of, t_of
   use pd_force_polynomial, only: fast_limit, narrow, wide
-  use pd_force_workspace, only: all_blocks, at_moved, at_p, at_volume, early_blocks, late_blocks, &
+  use pd_force_workspace, only: all_blocks, at_p, at_volume, early_blocks, late_blocks, &
     & list_workspace_type
   implicit none (type, external)
   private
@@ -27,6 +28,9 @@ module pd_force_list
   !> the wide one, beyond. Where bonds have a fixed order, `large` has the bits of lanes beyond
   !> instead.
   integer(i1), parameter :: little = 0_i1, more = 1_i1, beyond = 2_i1
+
+  !> Clusters that a thread takes at once.
+  integer, parameter :: at_once = 32
 
   !> The loops of a pass, and the strains for which they are valid.
   type :: loops_type
@@ -49,14 +53,15 @@ contains
     integer :: k
 
     if (allocated(workspace%given)) then
-      if (size(workspace%at, 2) /= family%n_slots) &
+      if (size(workspace%place, 2) /= family%n_slots) &
         & call internal_fault('a workspace of another family')
       return
     end if
-    allocate (workspace%at(at_p, family%n_slots), source=0.0_wp)
+    allocate (workspace%place(at_volume, family%n_slots), workspace%moved(at_p, family%n_slots), &
+      & source=0.0_wp)
     do k = 1, family%n_slots
-      workspace%at(:family%dim, k) = family%x(:, k)
-      workspace%at(at_volume, k) = family%volume(k)
+      workspace%place(:family%dim, k) = family%x(:, k)
+      workspace%place(at_volume, k) = family%volume(k)
     end do
     allocate (workspace%large(size(family%start) - 1), source=little)
     call survey(family, model, workspace)
@@ -80,30 +85,35 @@ contains
       !! `early_blocks`, then, in a call of its own, `late_blocks`; `all_blocks` if absent
     type(loops_type) :: loops
     type(work_type) :: work
+    type(shares_type) :: shares
     real(wp) :: sums(lanes, 3)
     integer(i1) :: strain
-    integer :: c, i, k, l, range(2)
+    integer :: c, i, k, l, first, last
 
     call prepare_list(family, model, workspace)
     call new_loops(family, model, options, for_theta, loops)
-    call choose_clusters(family, blocks, range)
+    call share_clusters(family, blocks, shares)
     call gather_state(family, blocks, u, workspace)
-    !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, workspace, p, strained, loops, range) &
-    !$omp private(work, sums, strain, c, i, k, l)
-    do i = range(1), range(2)
-      c = cluster_of_turn(family, i)
-      call take_up(family, workspace, c, work)
-      if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
-      strain = little
-      call sum_cluster(family, model, options, workspace, loops, for_theta, work, strain, sums, &
-        & strained)
-      workspace%large(c) = strain
-      do l = 1, lanes
-        k = work%first + l - 1
-        p(k) = p_of(model, k)*t_of(model, k)*sums(l, 1)
+    !$omp parallel default(none) private(work, sums, strain, c, i, k, l, first, last) &
+    !$omp shared(family, model, options, workspace, p, strained, loops, shares)
+    do
+      call shares%take(first, last)
+      if (first > last) exit
+      do i = first, last
+        c = cluster_of_turn(family, i)
+        call take_up(family, workspace, c, work)
+        if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
+        strain = little
+        call sum_cluster(family, model, options, workspace, loops, for_theta, work, strain, sums, &
+          & strained)
+        workspace%large(c) = strain
+        do l = 1, lanes
+          k = work%first + l - 1
+          p(k) = p_of(model, k)*t_of(model, k)*sums(l, 1)
+        end do
       end do
     end do
+    !$omp end parallel
   end subroutine list_dilatation
 
   !> Force density of all slots (n_slots, dim) [N/m3]. With a dilatation this follows
@@ -125,34 +135,39 @@ contains
       !! `early_blocks`, then, in a call of its own, `late_blocks`; `all_blocks` if absent
     type(loops_type) :: loops
     type(work_type) :: work
+    type(shares_type) :: shares
     real(wp) :: sums(lanes, 3)
     integer(i1) :: strain
-    integer :: c, d, i, range(2)
+    integer :: c, d, i, first, last
 
     call prepare_list(family, model, workspace)
     call new_loops(family, model, options, for_force, loops)
-    call choose_clusters(family, blocks, range)
+    call share_clusters(family, blocks, shares)
     ! with a dilatation, the pass before has gathered the displacements
     if (options%dilatation) then
       call gather_p(family, blocks, p, workspace)
     else
       call gather_state(family, blocks, u, workspace)
     end if
-    !$omp parallel do schedule(dynamic, 32) default(none) &
-    !$omp shared(family, model, options, workspace, force, strained, loops, range) &
-    !$omp private(work, sums, strain, c, d, i)
-    do i = range(1), range(2)
-      c = cluster_of_turn(family, i)
-      call take_up(family, workspace, c, work)
-      if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
-      ! the pass before has checked the strain
-      strain = merge(workspace%large(c), little, options%dilatation)
-      call sum_cluster(family, model, options, workspace, loops, for_force, work, strain, sums, &
-        & strained)
-      do d = 1, model%dim
-        force(work%first:work%first + lanes - 1, d) = sums(:, d)
+    !$omp parallel default(none) private(work, sums, strain, c, d, i, first, last) &
+    !$omp shared(family, model, options, workspace, force, strained, loops, shares)
+    do
+      call shares%take(first, last)
+      if (first > last) exit
+      do i = first, last
+        c = cluster_of_turn(family, i)
+        call take_up(family, workspace, c, work)
+        if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
+        ! the pass before has checked the strain
+        strain = merge(workspace%large(c), little, options%dilatation)
+        call sum_cluster(family, model, options, workspace, loops, for_force, work, strain, sums, &
+          & strained)
+        do d = 1, model%dim
+          force(work%first:work%first + lanes - 1, d) = sums(:, d)
+        end do
       end do
     end do
+    !$omp end parallel
   end subroutine list_force
 
   !> Strain energy density of all slots [J/m3]. With `theta` that of the stretches alone, and the
@@ -180,6 +195,7 @@ contains
     !$omp private(work, sums, missed, c, k, l)
     do c = 1, size(workspace%large)
       call take_up(family, workspace, c, work)
+      call take_place(workspace, work)
       call take_given(workspace, work)
       if (options%thermal .or. model%weighted .or. model%consistent .or. family%fixed_order) then
         associate (e => family%start(c), n => work%n)
@@ -283,7 +299,7 @@ contains
     type(force_options_type), intent(in) :: options
     type(list_workspace_type), intent(in) :: workspace
     type(loops_type), intent(in) :: loops
-    type(work_type), intent(in) :: work
+    type(work_type), intent(inout) :: work
     integer(i1), intent(inout) :: strain
     real(wp), intent(inout) :: sums(lanes, 3)
     type(task_type) :: task
@@ -330,6 +346,7 @@ contains
     task%limit = max(loops%narrow, loops%wide)
     general = .true.
     if (task%limit > 0.0_wp) then
+      call take_place(workspace, work)
       call run_loop(family, workspace, work, loops%stored, task, sums, missed)
       general = iand(strain, lane_bit) /= 0_i1
       do l = 1, lanes
@@ -347,24 +364,38 @@ contains
     end do
   end subroutine sum_lanes
 
-  !> The loop for the tables that the cluster has.
+  !> The loop for the tables that the cluster has. That for shapes takes all of their bonds.
   subroutine run_either(family, workspace, work, loops, task, sums, missed)
     type(list_family_type), intent(in) :: family
     type(list_workspace_type), intent(in) :: workspace
-    type(work_type), intent(in) :: work
+    type(work_type), intent(inout) :: work
     type(loops_type), intent(in) :: loops
     type(task_type), intent(in) :: task
     real(wp), intent(inout) :: sums(lanes, 3)
     logical, intent(out) :: missed
 
+    if (workspace%shape(work%cluster) > 0_i8 .and. is_whole(family, work)) then
+      call run_loop(family, workspace, work, loops%shaped, task, sums, missed)
+      return
+    end if
+    call take_place(workspace, work)
     if (workspace%stored(work%cluster) == 0_i8) then
       call run_loop(family, workspace, work, loops%plain, task, sums, missed)
-    else if (workspace%shape(work%cluster) == 0_i8) then
-      call run_loop(family, workspace, work, loops%stored, task, sums, missed)
     else
-      call run_loop(family, workspace, work, loops%shaped, task, sums, missed)
+      call run_loop(family, workspace, work, loops%stored, task, sums, missed)
     end if
   end subroutine run_either
+
+  !> Whether all bonds of a cluster are intact.
+  pure logical function is_whole(family, work)
+    type(list_family_type), intent(in) :: family
+    type(work_type), intent(in) :: work
+
+    associate (first => family%start(work%cluster), last => family%start(work%cluster + 1) - 1)
+      ! all of them, without an exit, is done in vector registers
+      is_whole = iany(ieor(family%intact(first:last), family%bits(first:last))) == 0_i1
+    end associate
+  end function is_whole
 
   !> One loop over the packs of a cluster, or over the bonds of some of its lanes.
   subroutine run_loop(family, workspace, work, loop, task, sums, missed, some)
@@ -387,14 +418,15 @@ contains
     d = merge(b, 1_i8, size(workspace%weight_D) > 0)
     if (present(some)) then
       call loop(work%n, family%member(:, e:last), family%first(e:last), &
-        & iand(family%intact(e:last), some), workspace%at, workspace%given, &
+        & iand(family%intact(e:last), some), workspace%place, workspace%moved, workspace%given, &
         & family%fraction(:, f:), workspace%geometry(:, s:), workspace%weight_D(:, d:), &
         & workspace%weight_S(:, b:), work%own, task, sums, missed)
       return
     end if
     call loop(work%n, family%member(:, e:last), family%first(e:last), family%intact(e:last), &
-      & workspace%at, workspace%given, family%fraction(:, f:), workspace%geometry(:, s:), &
-      & workspace%weight_D(:, d:), workspace%weight_S(:, b:), work%own, task, sums, missed)
+      & workspace%place, workspace%moved, workspace%given, family%fraction(:, f:), &
+      & workspace%geometry(:, s:), workspace%weight_D(:, d:), workspace%weight_S(:, b:), work%own, &
+      & task, sums, missed)
   end subroutine run_loop
 
   !> Copy displacements, point by point: what a bond needs of its other end then stands in one
@@ -408,7 +440,7 @@ contains
 
     if (are_late(blocks)) then
       do d = 1, size(u, 2)
-        workspace%at(at_moved + d, family%copies) = u(family%copies, d)
+        workspace%moved(d, family%copies) = u(family%copies, d)
       end do
       return
     end if
@@ -416,15 +448,15 @@ contains
     case (3)
       !$omp parallel do schedule(static) default(none) shared(u, workspace) private(k)
       do k = 1, size(u, 1)
-        workspace%at(at_moved + 1:at_moved + 3, k) = u(k, :3)
+        workspace%moved(:3, k) = u(k, :3)
       end do
     case (2)
       !$omp parallel do schedule(static) default(none) shared(u, workspace) private(k)
       do k = 1, size(u, 1)
-        workspace%at(at_moved + 1:at_moved + 2, k) = u(k, :2)
+        workspace%moved(:2, k) = u(k, :2)
       end do
     case default
-      workspace%at(at_moved + 1, :) = u(:, 1)
+      workspace%moved(1, :) = u(:, 1)
     end select
   end subroutine gather_state
 
@@ -437,38 +469,42 @@ contains
     integer :: k
 
     if (are_late(blocks)) then
-      workspace%at(at_p, family%copies) = p(family%copies)
+      workspace%moved(at_p, family%copies) = p(family%copies)
       return
     end if
     !$omp parallel do schedule(static) default(none) shared(p, workspace) private(k)
     do k = 1, size(p)
-      workspace%at(at_p, k) = p(k)
+      workspace%moved(at_p, k) = p(k)
     end do
   end subroutine gather_p
 
   ! ---------------------------------------------------------------- which clusters
 
-  !> The first and the last turn of the clusters that a pass takes.
-  subroutine choose_clusters(family, blocks, range)
+  !> Share out the turns of the clusters that a pass takes.
+  subroutine share_clusters(family, blocks, shares)
     type(list_family_type), intent(in) :: family
     integer, intent(in), optional :: blocks
-    integer, intent(out) :: range(2)
-    integer :: which
+    type(shares_type), intent(inout) :: shares
+    integer :: which, first, last
 
     which = all_blocks
     if (present(blocks)) which = blocks
-    range = [1, size(family%start) - 1]
-    if (which == all_blocks) return
-    if (.not. allocated(family%turn)) call internal_fault('early clusters where none are late')
+    first = 1
+    last = size(family%start) - 1
+    if (which /= all_blocks .and. .not. allocated(family%turn)) &
+      & call internal_fault('early clusters where none are late')
     select case (which)
+    case (all_blocks)
+      continue
     case (early_blocks)
-      range(2) = family%n_early
+      last = family%n_early
     case (late_blocks)
-      range(1) = family%n_early + 1
+      first = family%n_early + 1
     case default
       call internal_fault('a pass over unknown clusters')
     end select
-  end subroutine choose_clusters
+    call shares%begin(first, last, at_once)
+  end subroutine share_clusters
 
   !> The cluster of a turn. Its sums are its own alone, and so do not depend on the turn.
   pure integer function cluster_of_turn(family, i) result(c)

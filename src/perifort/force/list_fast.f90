@@ -78,169 +78,169 @@ contains
     end if
   end subroutine choose_one
 
-  subroutine plain_projected_theta_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_projected_theta_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_theta_2
 
-  subroutine plain_theta_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_theta_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_theta_2
 
-  subroutine plain_bond_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_bond_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .false., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_bond_force_2
 
-  subroutine plain_projected_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_projected_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_force_2
 
-  subroutine plain_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_force_2
 
-  subroutine shaped_projected_theta_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_projected_theta_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine shaped_projected_theta_2
 
-  subroutine shaped_theta_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_theta_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine shaped_theta_2
 
-  subroutine shaped_bond_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_bond_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .true., shaped = .true., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine shaped_bond_force_2
 
-  subroutine shaped_projected_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_projected_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine shaped_projected_force_2
 
-  subroutine shaped_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine shaped_force_2
 
-  subroutine projected_energy_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine projected_energy_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_energy
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine projected_energy_2
 
-  subroutine energy_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine energy_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_energy
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine energy_2
 
-  subroutine plain_projected_theta_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_projected_theta_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_theta_3
 
-  subroutine plain_theta_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_theta_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_theta_3
 
-  subroutine plain_bond_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_bond_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .false., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_bond_force_3
 
-  subroutine plain_projected_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_projected_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine plain_projected_force_3
 
-  subroutine plain_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine plain_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine plain_force_3
 
-  subroutine shaped_projected_theta_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_projected_theta_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine shaped_projected_theta_3
 
-  subroutine shaped_theta_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_theta_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine shaped_theta_3
 
-  subroutine shaped_bond_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_bond_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .true., shaped = .true., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine shaped_bond_force_3
 
-  subroutine shaped_projected_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_projected_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine shaped_projected_force_3
 
-  subroutine shaped_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine shaped_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .true., shaped = .true., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine shaped_force_3
 
-  subroutine projected_energy_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine projected_energy_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_energy
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine projected_energy_3
 
-  subroutine energy_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine energy_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_energy
     logical, parameter :: stored = .false., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'

@@ -10,18 +10,22 @@ module pd_force_list_general
   use pd_force_list_loop, only: least
   use pd_force_list_points, only: given_q, given_half, given_D, given_S
   use pd_force_model, only: bond_factors_of, force_options_type, model_type
-  use pd_force_workspace, only: list_workspace_type, at_volume, at_moved, at_p
+  use pd_force_workspace, only: list_workspace_type, at_volume, at_p
   implicit none (type, external)
   private
   public :: work_type, fill_tables, cluster_theta, cluster_force, cluster_energy, take_up, &
-    & take_given
+    & take_place, take_given
+
+  !> Where the displacement and what the model gives stand in `own`, behind the position.
+  integer, parameter :: own_moved = 4, own_given = 8
 
   !> What one cluster is worked with: one for each thread.
   type :: work_type
     integer :: cluster = 0
     integer :: first = 1                       !! its first slot
     integer :: n = 0                           !! its packs
-    real(wp) :: own(lanes, 16) = 0.0_wp        !! what `at` and `given` have of its own slots
+    real(wp) :: own(lanes, 16) = 0.0_wp        !! what `place`, `moved` and `given` have of
+                                               !! its own slots
     real(wp), allocatable :: stretch(:, :)     !! (q_k + q_j) Gb vc V_j/|xi|, 0 where there is no
                                                !! intact bond (lane, pack)
     real(wp), allocatable :: dilatation(:, :)  !! Gd vc V_j
@@ -47,20 +51,33 @@ contains
     work%n = int(family%start(c + 1) - family%start(c))
     do d = 1, at_p
       do l = 1, lanes
-        work%own(l, d) = workspace%at(d, work%first + l - 1)
+        work%own(l, own_moved + d) = workspace%moved(d, work%first + l - 1)
       end do
     end do
   end subroutine take_up
 
-  !> Take what the model gives its slots, too.
-  pure subroutine take_given(workspace, work)
-    type(list_workspace_type), intent(in) :: workspace
-    type(work_type), intent(inout) :: work
+  !> Take where its slots are, too.
+  pure subroutine take_place(workspace, work)
+    type(list_workspace_type), intent(in) :: workspace  !! prepared
+    type(work_type), intent(inout) :: work              !! of the cluster it has taken up
     integer :: d, l
 
-    do d = 1, at_p
+    do d = 1, at_volume
       do l = 1, lanes
-        work%own(l, at_p + d) = workspace%given(d, work%first + l - 1)
+        work%own(l, d) = workspace%place(d, work%first + l - 1)
+      end do
+    end do
+  end subroutine take_place
+
+  !> Take what the model gives its slots, too.
+  pure subroutine take_given(workspace, work)
+    type(list_workspace_type), intent(in) :: workspace  !! prepared
+    type(work_type), intent(inout) :: work              !! of the cluster it has taken up
+    integer :: d, l
+
+    do d = 1, size(workspace%given, 1)
+      do l = 1, lanes
+        work%own(l, own_given + d) = workspace%given(d, work%first + l - 1)
       end do
     end do
   end subroutine take_given
@@ -92,6 +109,7 @@ contains
     integer :: i, j, m, f, l
 
     call allocate_tables(family, work)
+    call take_place(workspace, work)
     call take_given(workspace, work)
     if (model%consistent) then
       do l = 1, lanes
@@ -106,12 +124,12 @@ contains
       m = family%member(2, e)
       from = iand(family%first(e), lane_bit) /= 0_i1
       there = iand(bits(i), lane_bit) /= 0_i1
-      x = merge(workspace%at(1, j), workspace%at(1, m), from) - work%own(:, 1)
-      y = merge(workspace%at(2, j), workspace%at(2, m), from) - work%own(:, 2)
-      z = merge(workspace%at(3, j), workspace%at(3, m), from) - work%own(:, 3)
-      weight = merge(merge(workspace%at(at_volume, j), workspace%at(at_volume, m), from), &
+      x = merge(workspace%place(1, j), workspace%place(1, m), from) - work%own(:, 1)
+      y = merge(workspace%place(2, j), workspace%place(2, m), from) - work%own(:, 2)
+      z = merge(workspace%place(3, j), workspace%place(3, m), from) - work%own(:, 3)
+      weight = merge(merge(workspace%place(at_volume, j), workspace%place(at_volume, m), from), &
         & 0.0_wp, there)
-      q = work%own(:, at_p + given_q)
+      q = work%own(:, own_given + given_q)
       if (.not. own) then
         q = q + merge(workspace%given(given_q, j), workspace%given(given_q, m), from)
       else
@@ -125,11 +143,11 @@ contains
       case (volume_exact)
         weight = weight*family%fraction(:, e)
       case default
-        spacing = work%own(:, at_p + given_half) &
+        spacing = work%own(:, own_given + given_half) &
           & + merge(workspace%given(given_half, j), workspace%given(given_half, m), from)
         if (family%rule%ratio > 0.0_wp) then
           ! the bits of `horizon_of_bond`: halves are exact
-          delta = family%rule%ratio*(2*max(work%own(:, at_p + given_half), &
+          delta = family%rule%ratio*(2*max(work%own(:, own_given + given_half), &
             & merge(workspace%given(given_half, j), workspace%given(given_half, m), from)))
           weight = weight*max(0.0_wp, min(1.0_wp, (delta + spacing/2 - length)/spacing))
         else
@@ -171,10 +189,10 @@ contains
       y = y/length
       z = z/length
       do f = given_D, given_S, given_S - given_D
-        a = work%own(:, at_p + f) + merge(workspace%given(f, j), workspace%given(f, m), from)
-        b = work%own(:, at_p + f + 1) &
+        a = work%own(:, own_given + f) + merge(workspace%given(f, j), workspace%given(f, m), from)
+        b = work%own(:, own_given + f + 1) &
           & + merge(workspace%given(f + 1, j), workspace%given(f + 1, m), from)
-        c = work%own(:, at_p + f + 2) &
+        c = work%own(:, own_given + f + 2) &
           & + merge(workspace%given(f + 2, j), workspace%given(f + 2, m), from)
         ! with a common denominator there is one division
         a = 0.5_wp*a*b*c/sqrt(merge((x*b*c)**2 + (y*a*c)**2 + (z*a*b)**2, 1.0_wp, there))
@@ -227,7 +245,8 @@ contains
       call deform_cluster(family, model, options, workspace, work, i, s, lambda, r, y, p)
       s = work%stretch(:, i)*s
       if (options%dilatation) &
-        & s = s + (work%own(:, at_p) + p)*work%dilatation(:, i)*work%geometry(:, i)*lambda
+        & s = s + (work%own(:, own_moved + at_p) + p)*work%dilatation(:, i) &
+        & *work%geometry(:, i)*lambda
       do c = 1, 3
         force(:, c) = force(:, c) + s*r*y(:, c)
       end do
@@ -292,11 +311,11 @@ contains
     m = family%member(2, pack)
     from = iand(family%first(pack), lane_bit) /= 0_i1
     do c = 1, 3
-      xi(:, c) = merge(workspace%at(c, j), workspace%at(c, m), from) - work%own(:, c)
-      eta(:, c) = merge(workspace%at(at_moved + c, j), workspace%at(at_moved + c, m), from) &
-        & - work%own(:, at_moved + c)
+      xi(:, c) = merge(workspace%place(c, j), workspace%place(c, m), from) - work%own(:, c)
+      eta(:, c) = merge(workspace%moved(c, j), workspace%moved(c, m), from) &
+        & - work%own(:, own_moved + c)
     end do
-    p = merge(workspace%at(at_p, j), workspace%at(at_p, m), from)
+    p = merge(workspace%moved(at_p, j), workspace%moved(at_p, m), from)
     heat = 0.0_wp
     if (options%thermal) heat = work%heat &
       & + merge(model%expansion(j), model%expansion(m), from)/2

@@ -57,28 +57,32 @@ module pd_force_list_loop
 
   abstract interface
     !> Sums of one cluster's bonds, see bond_pass.inc.
-    subroutine pass_loop(n, member, first, intact, at, given, fraction, geometry, weight_D, &
-      & weight_S, own, task, sums, missed)
+    subroutine pass_loop(n, member, first, intact, place, moved, given, fraction, geometry, &
+      & weight_D, weight_S, own, task, sums, missed)
       import :: wp, i1, i4, lanes, task_type
       implicit none (type, external)
       integer, intent(in) :: n                    !! packs
       integer(i4), intent(in) :: member(2, n)     !! slots of their members
       integer(i1), intent(in) :: first(n)         !! the lanes that have the first
-      integer(i1), intent(in) :: intact(n)        !! the lanes with an intact bond
+      integer(i1), intent(in) :: intact(n)        !! the lanes with an intact bond: all that
+                                                  !! have one, if xi is stored
       ! allow(C071): the loops know the members, not how many slots there are.
-      real(wp), intent(in) :: at(8, *)            !! what slots have: position, volume,
-                                                  !! displacement, p
+      real(wp), intent(in) :: place(4, *)         !! what slots have: position, volume,
+      ! allow(C071): as above.
+      real(wp), intent(in) :: moved(4, *)         !! displacement, p
       ! allow(C071): as above.
       real(wp), intent(in) :: given(8, *)         !! and q, half the spacing, factors D and S
       ! allow(C071): as above.
       real(wp), intent(in) :: fraction(lanes, *)  !! vc, if stored
       ! allow(C071): as above.
-      real(wp), intent(in) :: geometry(lanes, *)  !! xi and 2/|xi|^2, if stored
+      real(wp), intent(in) :: geometry(lanes, *)  !! xi and 2/|xi|^2, if stored: below 0 in
+                                                  !! lanes with the pack's second member, 0 in
+                                                  !! empty ones
       ! allow(C071): as above.
       real(wp), intent(in) :: weight_D(lanes, *)  !! Gd vc V of each lane, if stored
       ! allow(C071): as above.
       real(wp), intent(in) :: weight_S(lanes, *)  !! (q_k + q_j) Gb vc V |xi|, if stored
-      real(wp), intent(in) :: own(lanes, 16)      !! `at` and `given` of the lanes
+      real(wp), intent(in) :: own(lanes, 16)      !! `place`, `moved` and `given` of the lanes
       type(task_type), intent(in) :: task         !! what all bonds of the cluster have in common
       real(wp), intent(inout) :: sums(lanes, 3)
         !! of each lane: theta [m3]; components of the force density [N/m3]; or energy [J/m3] and

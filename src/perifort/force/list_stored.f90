@@ -42,71 +42,71 @@ contains
     end if
   end subroutine choose_stored
 
-  subroutine stored_projected_theta_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_projected_theta_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_theta_2
 
-  subroutine stored_theta_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_theta_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_theta
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_theta_2
 
-  subroutine stored_bond_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_bond_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .true., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_bond_force_2
 
-  subroutine stored_projected_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_projected_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_force_2
 
-  subroutine stored_force_2(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_force_2(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 2, pass = for_force
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_force_2
 
-  subroutine stored_projected_theta_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_projected_theta_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_theta_3
 
-  subroutine stored_theta_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_theta_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_theta
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'
   end subroutine stored_theta_3
 
-  subroutine stored_bond_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_bond_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .true., shaped = .false., state = .false., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_bond_force_3
 
-  subroutine stored_projected_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_projected_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .true.
     include 'bond_pass.inc'
   end subroutine stored_projected_force_3
 
-  subroutine stored_force_3(n, member, first, intact, at, given, fraction, geometry, &
-    & weight_D, weight_S, own, task, sums, missed)
+  subroutine stored_force_3(n, member, first, intact, place, moved, given, fraction, &
+    & geometry, weight_D, weight_S, own, task, sums, missed)
     integer, parameter :: dim = 3, pass = for_force
     logical, parameter :: stored = .true., shaped = .false., state = .true., projected = .false.
     include 'bond_pass.inc'

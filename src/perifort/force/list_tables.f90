@@ -410,7 +410,8 @@ contains
     end associate
   end function same_weights
 
-  !> xi of the lanes in pack `e` of cluster `c`, and 2/|xi|^2; 0 and 1 where there is no bond.
+  !> xi of the lanes in pack `e` of cluster `c`, and 2/|xi|^2, below 0 where the bond goes to the
+  !> pack's second member; all 0 where there is no bond.
   pure subroutine geometry_of(family, c, e, geometry)
     type(list_family_type), intent(in) :: family
     integer, intent(in) :: c
@@ -432,7 +433,8 @@ contains
         & - family%x(d, k + 1:k + lanes), 0.0_wp, there)
       square = square + geometry(:, d)**2
     end do
-    geometry(:, columns(family)) = 2/merge(square, 2.0_wp, there)
+    geometry(:, columns(family)) = merge(merge(2.0_wp, -2.0_wp, from) &
+      & /merge(square, 1.0_wp, there), 0.0_wp, there)
   end subroutine geometry_of
 
   !> Columns of a pack in `geometry`. The loops have two components at least.

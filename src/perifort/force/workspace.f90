@@ -11,15 +11,16 @@ module pd_force_workspace
   private
   public :: workspace_type, lattice_workspace_type, list_workspace_type, weights_type, singles_type
   public :: composite_workspace_type, generic_workspace_type
-  public :: at_volume, at_moved, at_p
+  public :: at_volume, at_p
   public :: all_blocks, early_blocks, late_blocks
 
   !> Which blocks of a lattice or clusters of a list a pass takes: all, or those that need nothing
   !> of copies of other ranks' points and then, in a call of its own, the others.
   integer, parameter :: all_blocks = 0, early_blocks = 1, late_blocks = 2
 
-  !> Where things stand in `at`: behind the position come volume, displacement and p.
-  integer, parameter :: at_volume = 4, at_moved = 4, at_p = 8
+  !> Where the volume stands in `place`, behind the position, and p in `moved`, behind the
+  !> displacement.
+  integer, parameter :: at_volume = 4, at_p = 4
 
   !> Weights of the bonds of one block, or of many that are alike, in the order of `offsets_type`.
   !> Families in mixed precision keep the single ones; lengths are those of their blocks.
@@ -65,8 +66,8 @@ module pd_force_workspace
     integer :: least_shared = 8                !! clusters that tables are made for, if they share
                                                !! them; tests take fewer or more
     integer(i8) :: key_bits = not(0_i8)        !! bits of keys that count: all, but in tests
-    real(wp), allocatable :: at(:, :)          !! of each slot, in one place: position, volume,
-                                               !! displacement and p of the pass (8, n_slots)
+    real(wp), allocatable :: place(:, :)       !! of each slot, side by side: position and volume
+    real(wp), allocatable :: moved(:, :)       !! displacement and p of the pass (4, n_slots)
     real(wp), allocatable :: given(:, :)       !! what the model gives each slot (8, n_slots), and
     integer(i1), allocatable :: plain(:)       !! 1 for clusters where all of that is alike
                                                !! (`pd_force_list_points`)
@@ -147,7 +148,8 @@ contains
 
     bytes = 0_i8
     if (.not. allocated(workspace%given)) return
-    bytes = 8*(size(workspace%at, kind=i8) + size(workspace%given, kind=i8) &
+    bytes = 8*(size(workspace%place, kind=i8) + size(workspace%moved, kind=i8) &
+      & + size(workspace%given, kind=i8) &
       & + size(workspace%weight_D, kind=i8) + size(workspace%weight_S, kind=i8) &
       & + size(workspace%geometry, kind=i8)) + 18_i8*size(workspace%large)
   end function bytes_of_list
