@@ -21,6 +21,7 @@ contains
       & new_unittest('lattices: the same families as brute force', test_lattices), &
       & new_unittest('random clouds of varying spacing: the same families as brute force', &
       & test_clouds), &
+      & new_unittest('points of several grids: the same families as brute force', test_grids), &
       & new_unittest('whole families have the known numbers of members', test_counts), &
       & new_unittest('membership at the horizon does not depend on rounding', test_edge), &
       & new_unittest('distant points need no extra memory', test_far_flung), &
@@ -53,11 +54,12 @@ contains
   !> Families of `body` against all pairs, by the points' numbers, and their weights against the
   !> volume correction. Lists have its formula in a loop of their own, and so have their force
   !> loops, which test_force_contract holds to these weights for every rule.
-  subroutine compare(body, rule, what, error)
+  subroutine compare(body, rule, what, error, apart)
     type(body_type), intent(in) :: body
     type(volume_rule_type), intent(in) :: rule
     character(*), intent(in) :: what
     type(error_type), allocatable, intent(inout) :: error
+    logical, intent(in), optional :: apart  !! without the bonds within grids
     type(body_type) :: sorted
     type(list_family_type) :: family
     type(bonds_type) :: bonds
@@ -68,7 +70,7 @@ contains
     integer :: i, b
 
     sorted = body
-    call new_list_family(sorted, rule, family)
+    call new_list_family(sorted, rule, family, apart)
     allocate (half_reach(body%n_points))
     do i = 1, body%n_points
       half_reach(i) = reach(rule, body%spacing(i), body%dim)/2
@@ -78,6 +80,8 @@ contains
     do i = 1, body%n_points
       call family%bonds_of(int(sorted%slot(i)), bonds)
       call brute_force_neighbours(body%x, half_reach, i, truth)
+      if (present(apart)) truth = pack(truth, body%grid(truth) == 0_i2 &
+        & .or. body%grid(truth) /= body%grid(i))
       total = total + size(truth)
       mine = .false.
       theirs = .false.
@@ -143,6 +147,41 @@ contains
       end do
     end do
   end subroutine test_clouds
+
+  !> Points of several grids, side by side or mixed, and of none, with spacings that differ; more
+  !> grids than are kept apart, too. With all bonds, and without those within grids.
+  subroutine test_grids(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: n = 400, grids(3) = [2, 5, 100]
+    type(body_type) :: body
+    integer :: dim, i, c, g, kind, state
+    logical :: mixed
+
+    state = 7
+    do dim = 1, 3
+      do g = 1, size(grids)
+        do kind = 1, 2
+          mixed = kind == 2
+          call allocate_points(body, dim, n)
+          do i = 1, n
+            ! numbers from 0 on, of which some are missing
+            body%grid(i) = int(2*merge(mod(i, grids(g)), (i - 1)*grids(g)/n, mixed), i2)
+            do c = 1, dim
+              body%x(i, c) = noise(state)
+            end do
+            body%x(i, 1) = merge(5*body%x(i, 1), 10.0_wp*i/n, mixed)
+            body%spacing(i) = 0.06_wp*2.0_wp**mod(int(body%grid(i)/2), 3)
+          end do
+          body%volume = body%spacing**dim
+          body%material = 1_i2
+          call compare(body, volume_rule_type(volume_linear, 0.4_wp), 'grids', error)
+          call compare(body, volume_rule_type(volume_linear, 0.4_wp), 'between grids', error, &
+            & apart=.true.)
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+  end subroutine test_grids
 
   !> At delta = 3.015 spacings: the integer points within 3 of the origin: 6, 28, 122.
   subroutine test_counts(error)

@@ -13,8 +13,8 @@ module pd_family_clusters
   !> The bit by which a lane is marked.
   integer(i1), parameter :: lane_bit(lanes) = int([1, 2, 4, 8, 16, 32, 64, -128], i1)
 
-  !> Points in rows of cells along x. Every other row is walked backwards, so that the end of a row
-  !> and the beginning of the next lie side by side.
+  !> Points, or a group of them, in rows of cells along x. Every other row is walked backwards, so
+  !> that the end of a row and the beginning of the next lie side by side.
   type :: rows_type
     integer :: count(3) = 1                !! cells along each direction
     real(wp) :: lower(3) = 0.0_wp          !! corner of the first cell [m]
@@ -26,9 +26,10 @@ contains
 
   !> Sort the points `x` (n, dim) into rows of cells about `edge` [m] wide, along the rows by their
   !> x. `order(i)` is the number of the point that becomes the i-th.
-  subroutine order_in_rows(x, edge, rows, order)
+  subroutine order_in_rows(x, edge, before, rows, order)
     real(wp), intent(in) :: x(:, :)                    !! (n, dim) positions [m]
     real(wp), intent(in) :: edge                       !! least width of a cell [m]
+    integer, intent(in) :: before                      !! points of other groups, which come first
     type(rows_type), intent(out) :: rows  !! of cells that hold the points in their new order
     integer(i4), allocatable, intent(out) :: order(:)  !! (n) a permutation of 1 to n
     type(cells_type) :: cells
@@ -54,6 +55,7 @@ contains
       end do
     end do
     rows%first(size(rows%first)) = int(n + 1, i4)
+    rows%first = rows%first + int(before, i4)
   end subroutine order_in_rows
 
   !> Whether a row, counted from 0, is walked backwards.
@@ -92,7 +94,7 @@ contains
     real(wp), intent(in), contiguous :: own(:)
       !! (n) what reaches farther by the larger one of both ends [m]
     integer(i2), intent(in), contiguous :: label(:)     !! (n) of each point; 0: none, like no other
-    type(rows_type), intent(in) :: rows                 !! as `order_in_rows` made them
+    type(rows_type), intent(in) :: rows(:)              !! (groups) as `order_in_rows` made them
     integer(i8), allocatable, intent(out) :: start(:)
       !! (clusters + 1) first member of each cluster
     integer(i4), allocatable, intent(out) :: member(:)  !! (members of all clusters) their points
@@ -254,8 +256,8 @@ contains
     end do
   end subroutine choose_partners
 
-  !> Search the cells around cluster `c`: the number of its members, and as many of them as
-  !> there is room for.
+  !> Search the cells of all groups around cluster `c`: the number of its members, and as many of
+  !> them as there is room for.
   pure subroutine visit(x, half_reach, own, label, labelled, most, rows, c, found, member, bits)
     real(wp), intent(in), contiguous :: x(:, :)
     real(wp), intent(in), contiguous :: half_reach(:)
@@ -263,51 +265,77 @@ contains
     integer(i2), intent(in), contiguous :: label(:)
     logical, intent(in) :: labelled            !! some point has a label
     real(wp), intent(in) :: most               !! largest half reach and largest own one [m]
-    type(rows_type), intent(in) :: rows
+    type(rows_type), intent(in) :: rows(:)
     integer, intent(in) :: c
     integer, intent(out) :: found
     integer(i4), intent(inout) :: member(:)
     integer(i1), intent(inout) :: bits(:)
-    integer, parameter :: piece = 64
-    real(wp) :: code(piece), near
-    integer :: low(3), high(3), first, last, d, j, i, iy, iz, row, from, to
+    real(wp) :: lower(3), upper(3), near
+    integer :: first, last, d, g, iy, iz, low(3), high(3), row, from, to
 
     first = lanes*(c - 1) + 1
     last = min(first + lanes - 1, size(x, 1))
     near = maxval(half_reach(first:last)) + most
-    low = 0
-    high = 0
+    lower = 0.0_wp
+    upper = 0.0_wp
     do d = 1, size(x, 2)
-      low(d) = cell_along(rows, d, minval(x(first:last, d)) - near)
-      high(d) = cell_along(rows, d, maxval(x(first:last, d)) + near)
+      lower(d) = minval(x(first:last, d)) - near
+      upper(d) = maxval(x(first:last, d)) + near
     end do
     found = 0
-    do iz = low(3), high(3)
-      do iy = low(2), high(2)
-        row = iy + rows%count(2)*iz
-        from = 1 + rows%count(1)*row + low(1)
-        to = 1 + rows%count(1)*row + high(1)
-        if (is_backwards(row)) then
-          from = rows%count(1)*(row + 1) - high(1)
-          to = rows%count(1)*(row + 1) - low(1)
-        end if
-        do j = rows%first(from), rows%first(to + 1) - 1, piece
-          call compare(x, half_reach, own, first, last, j, min(j + piece, rows%first(to + 1)) &
-            & - 1, code)
-          if (labelled) call leave_out(label, first, last, j, min(j + piece, rows%first(to + 1)) &
-            & - 1, code)
-          do i = 1, min(piece, rows%first(to + 1) - j)
-            if (code(i) <= 0.0_wp) cycle
-            found = found + 1
-            if (found > size(member)) cycle
-            member(found) = int(j + i - 1, i4)
-            ! the sign is the last bit
-            bits(found) = int(merge(code(i) - 256, code(i), code(i) > 127), i1)
-          end do
+    do g = 1, size(rows)
+      if (any(lower > rows(g)%lower + rows(g)%count*rows(g)%size .or. upper < rows(g)%lower)) cycle
+      low = 0
+      high = 0
+      do d = 1, size(x, 2)
+        low(d) = cell_along(rows(g), d, lower(d))
+        high(d) = cell_along(rows(g), d, upper(d))
+      end do
+      do iz = low(3), high(3)
+        do iy = low(2), high(2)
+          row = iy + rows(g)%count(2)*iz
+          from = 1 + rows(g)%count(1)*row + low(1)
+          to = 1 + rows(g)%count(1)*row + high(1)
+          if (is_backwards(row)) then
+            from = rows(g)%count(1)*(row + 1) - high(1)
+            to = rows(g)%count(1)*(row + 1) - low(1)
+          end if
+          call visit_row(x, half_reach, own, label, labelled, first, last, &
+            & rows(g)%first(from), rows(g)%first(to + 1) - 1, found, member, bits)
         end do
       end do
     end do
   end subroutine visit
+
+  !> Add those of the points `from` to `to` that are members of the cluster `first:last`.
+  pure subroutine visit_row(x, half_reach, own, label, labelled, first, last, from, to, found, &
+    & member, bits)
+    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp), intent(in), contiguous :: half_reach(:)
+    real(wp), intent(in), contiguous :: own(:)
+    integer(i2), intent(in), contiguous :: label(:)
+    logical, intent(in) :: labelled
+    integer, intent(in) :: first, last, from, to
+    integer, intent(inout) :: found
+    integer(i4), intent(inout) :: member(:)
+    integer(i1), intent(inout) :: bits(:)
+    integer, parameter :: piece = 64
+    real(wp) :: code(piece)
+    integer :: i, j
+
+    do j = from, to, piece
+      call compare(x, half_reach, own, first, last, j, min(j + piece - 1, to), code)
+      if (labelled) call leave_out(label, first, last, j, min(j + piece - 1, to), code)
+      do i = 1, min(piece, to - j + 1)
+        if (code(i) <= 0.0_wp) cycle
+        found = found + 1
+        if (found > size(member)) cycle
+        member(found) = int(j + i - 1, i4)
+        ! the sign is the last bit
+        bits(found) = int(merge(code(i) - 256, code(i), code(i) > 127), i1)
+      end do
+    end do
+  end subroutine visit_row
 
   !> The bits of the cluster's lanes `first:last` for each of the points `from:to`, as numbers.
   pure subroutine compare(x, half_reach, own, first, last, from, to, code)

@@ -66,20 +66,15 @@ contains
     type(list_family_type), intent(out) :: family  !! whole, all bonds intact
     logical, intent(in), optional :: apart
       !! bonds within grids are elsewhere; absent: they are here
-    type(rows_type) :: rows
+    type(rows_type), allocatable :: rows(:)
     type(volume_rule_type) :: beyond
     real(wp), allocatable :: half_reach(:), own(:)
     integer(i4), allocatable :: order(:), point(:), member(:)
     integer(i2), allocatable :: label(:)
-    real(wp) :: spacing
     integer :: k, n
 
     n = body%n_points
-    spacing = maxval(body%spacing)
-    ! cells for the finest points: in cells for the coarsest ones, eight fine points in a row along
-    ! x would not lie close together
-    if (rule%ratio > 0.0_wp) spacing = minval(body%spacing)
-    call order_in_rows(body%x, rows_high(body)*spacing, rows, order)
+    call order_points(body, rule, rows, order)
     allocate (point(lanes*((n + lanes - 1)/lanes)), source=0_i4)
     point(:n) = body%point(order)
     call arrange(body, point)
@@ -125,20 +120,68 @@ contains
     end if
   end subroutine new_list_family
 
+  !> The order of points in clusters. Those of one grid stand together, in cells for their spacing:
+  !> clusters of two grids would be loose, and hardly one like another.
+  subroutine order_points(body, rule, rows, order)
+    type(body_type), intent(in) :: body                 !! in point order
+    type(volume_rule_type), intent(in) :: rule          !! volume correction and horizon
+    type(rows_type), allocatable, intent(out) :: rows(:)
+      !! (groups) the cells of each grid, or of all points
+    integer(i4), allocatable, intent(out) :: order(:)   !! (n_points) the points in their order
+    integer, parameter :: most_groups = 64              !! every cluster looks at all of them
+    logical :: has_points(0:huge(1_i2))
+    integer(i4), allocatable :: some(:), sorted(:)
+    integer :: g, i, k
+
+    has_points = .false.
+    do k = 1, body%n_points
+      has_points(body%grid(k)) = .true.
+    end do
+    if (count(has_points) > most_groups .or. count(has_points) < 2) then
+      allocate (rows(1))
+      call order_in_rows(body%x, edge_of(body%spacing, all(body%grid > 0_i2)), 0, rows(1), order)
+      return
+    end if
+    allocate (rows(count(has_points)), order(0))
+    i = 0
+    do g = 0, ubound(has_points, 1)
+      if (.not. has_points(g)) cycle
+      i = i + 1
+      some = pack([(int(k, i4), k=1, body%n_points)], body%grid(:body%n_points) == g)
+      call order_in_rows(body%x(some, :), edge_of(body%spacing(some), g > 0), size(order), &
+        & rows(i), sorted)
+      order = [order, some(sorted)]
+    end do
+
+  contains
+
+    !> Width of the cells for points with these spacings [m].
+    pure real(wp) function edge_of(spacing, on_grids)
+      real(wp), intent(in) :: spacing(:)
+      logical, intent(in) :: on_grids
+
+      edge_of = maxval(spacing)
+      ! cells for the finest points: in cells for the coarsest ones, eight fine points in a row
+      ! along x would not lie close together
+      if (rule%ratio > 0.0_wp) edge_of = minval(spacing)
+      ! bonds in a fixed order have no tables in common
+      edge_of = rows_high(body%dim, on_grids .and. .not. body%order%reproducible)*edge_of
+    end function edge_of
+  end subroutine order_points
+
   !> How many points lie above each other in a row of cells, so that clusters, eight points that
   !> follow each other in a row, are compact: eight in 1D, two by two by two in 3D. In 2D three by
   !> three, where packs have most bonds; but four by two on a lattice, where all clusters of a row
   !> then have one shape, whose tables stay in the first-level cache.
-  pure integer function rows_high(body)
-    type(body_type), intent(in) :: body  !! with the grids of its points
+  pure integer function rows_high(dim, alike)
+    integer, intent(in) :: dim    !! dimensions
+    logical, intent(in) :: alike  !! points on lattices, whose clusters have tables in common
 
-    select case (body%dim)
+    select case (dim)
     case (1)
       rows_high = lanes
     case (2)
-      rows_high = 3
-      ! bonds in a fixed order have no tables in common
-      if (all(body%grid(:body%n_points) > 0_i2) .and. .not. body%order%reproducible) rows_high = 2
+      rows_high = merge(2, 3, alike)
     case default
       rows_high = 2
     end select

@@ -49,8 +49,9 @@ contains
       if (alone(family%alike(k)) == 1_i1) isolated = isolated + 1
     end do
     isolated = int(count_of_ranks(body%order, int(isolated, i8)))
-    k = findloc(other > 0, .true., dim=1)
-    if (k == 0) return
+    if (all(other == 0_i4)) return
+    ! the first of these points, whatever the slots; it is named first
+    k = body%slot(minval(body%point, mask=other > 0_i4))
     j = other(k)
     if (body%body(k) /= body%body(j)) then
       call fail(error, 'points of bodies '//to_text(int(body%body(k)))//' and '// &

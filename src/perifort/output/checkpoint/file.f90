@@ -17,7 +17,7 @@ module pd_output_checkpoint_file
 
   character(*), parameter :: magic = 'perifort checkpoint'//newline
   integer(i8), parameter :: order = 72623859790382856_i8  !! bytes 8, 7, .. 1, low ones first
-  integer(i8), parameter :: format_version = 2_i8
+  integer(i8), parameter :: format_version = 3_i8
   integer(i8), parameter :: head_bytes = len(magic) + 3*8, tail_bytes = 8
   integer(i8), parameter :: block_bytes = 1048576_i8
   integer, parameter :: longest_name = 64
