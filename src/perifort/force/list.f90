@@ -101,11 +101,9 @@ contains
       if (first > last) exit
       do i = first, last
         c = cluster_of_turn(family, i)
-        call take_up(family, workspace, c, work)
-        if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
         strain = little
-        call sum_cluster(family, model, options, workspace, loops, for_theta, work, strain, sums, &
-          & strained)
+        call sum_cluster(family, model, options, workspace, loops, for_theta, c, work, strain, &
+          & sums, strained)
         workspace%large(c) = strain
         do l = 1, lanes
           k = work%first + l - 1
@@ -156,12 +154,10 @@ contains
       if (first > last) exit
       do i = first, last
         c = cluster_of_turn(family, i)
-        call take_up(family, workspace, c, work)
-        if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
         ! the pass before has checked the strain
         strain = merge(workspace%large(c), little, options%dilatation)
-        call sum_cluster(family, model, options, workspace, loops, for_force, work, strain, sums, &
-          & strained)
+        call sum_cluster(family, model, options, workspace, loops, for_force, c, work, strain, &
+          & sums, strained)
         do d = 1, model%dim
           force(work%first:work%first + lanes - 1, d) = sums(:, d)
         end do
@@ -244,9 +240,10 @@ contains
     if (loops%wide <= loops%narrow) loops%wide = 0.0_wp
   end subroutine new_loops
 
-  !> Sums of a cluster by whatever is valid for its strain, which is at least `strain`; on return
-  !> `strain` says how far it is strained. Slots beyond the loops are marked, if bonds can break.
-  subroutine sum_cluster(family, model, options, workspace, loops, pass, work, strain, sums, &
+  !> Take up cluster `c`. Its sums by whatever is valid for its strain, which is at least `strain`;
+  !> on return `strain` says how far it is strained. Slots beyond the loops are marked, if bonds can
+  !> break.
+  subroutine sum_cluster(family, model, options, workspace, loops, pass, c, work, strain, sums, &
     & strained)
     type(list_family_type), intent(in) :: family
     type(model_type), intent(in) :: model
@@ -254,12 +251,15 @@ contains
     type(list_workspace_type), intent(in) :: workspace
     type(loops_type), intent(in) :: loops
     integer, intent(in) :: pass                !! `for_theta` or `for_force`
+    integer, intent(in) :: c
     type(work_type), intent(inout) :: work
     integer(i1), intent(inout) :: strain
     real(wp), intent(inout) :: sums(lanes, 3)
     integer(i1), intent(inout), contiguous :: strained(:)
     logical :: general
 
+    call take_up(family, workspace, c, work)
+    if (model%breaking) strained(work%first:work%first + lanes - 1) = 0_i1
     if (family%fixed_order) then
       call sum_lanes(family, model, options, workspace, loops, pass, work, strain, sums)
       general = strain /= little
