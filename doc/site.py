@@ -109,9 +109,9 @@ def main():
     log.parent.mkdir(parents=True, exist_ok=True)
     log.write_text(run.stdout + run.stderr, encoding="utf-8")
     said = re.sub(r"\x1b\[[0-9;]*m", "", run.stdout + run.stderr)
-    # its progress names sources, of which one is error.f90
+    # lines of progress, with a bar, name sources and variables, of which some are called error
     warnings = [line.strip() for line in said.splitlines()
-                if re.search(r"\b(warning|error)\b(?!\.f90)", line, re.I)]
+                if "━" not in line and re.search(r"\b(warning|error)\b", line, re.I)]
     for line in faults + warnings[:20]:
         print(line, file=sys.stderr)
     if run.returncode or faults or warnings or not (out / "index.html").exists():
