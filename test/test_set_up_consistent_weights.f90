@@ -53,6 +53,7 @@ contains
       & test_alike), &
       & new_unittest('long: uniform strains are in equilibrium with classical tractions', &
       & test_uniform), &
+      & new_unittest('weights of the whole box far from missing cells', test_missing_cells), &
       & new_unittest('long: uniform strains of bodies of two materials', test_two_materials), &
       & new_unittest('strains that leave tractions continuous need no force', test_continuous), &
       & new_unittest('two materials in series', test_series), &
@@ -255,6 +256,71 @@ contains
       end do
     end do
   end subroutine test_uniform
+
+  !> Plates and a block with holes: uniform strains are in equilibrium, with the areas of faces and
+  !> where areas change; points far from the hole have the weights of the whole box, to the last
+  !> bit; and what those near it have does not depend on the size of the plate.
+  subroutine test_missing_cells(error)
+    type(error_type), allocatable, intent(out) :: error
+    integer, parameter :: few = 4  ! horizons that are near
+    type(scene_type) :: scene
+    type(set_up_type) :: set_up, whole
+    type(bonds_type) :: bonds
+    real(wp) :: middle(3), extremes(4, 2)
+    integer :: cells(3), i, k, o, apart
+
+    do i = 1, 4
+      cells = [48, 44, 1]
+      if (i == 2) cells = [56, 60, 1]
+      if (i == 3) cells = [60, 60, 1]
+      if (i == 4) cells = [30, 22, 6]
+      middle = [cells(1)/2, 22, 0]*spacing
+      if (i == 4) middle(:2) = [9, 11]*spacing
+      call box_scene(cells(:merge(3, 2, i == 4)), spacing, 0.3_wp, scene)
+      scene%horizon%surface_correction = 'consistent'
+      call ready(scene, whole, error)
+      if (allocated(error)) return
+      if (allocated(scene%removed)) deallocate (scene%removed)
+      allocate (scene%removed(1))
+      scene%removed(1)%shape = 'cylinder'
+      scene%removed(1)%centre = middle
+      ! 12 spacings: there are no weights Gb of 0.05 with the areas of faces
+      scene%removed(1)%radius = merge(12.0_wp, merge(2.2_wp, 6.2_wp, i == 4), i == 3)*spacing
+      call ready(scene, set_up, error)
+      if (allocated(error)) return
+      call strain_all(set_up%system, 'missing cells '//text_of(real(i, wp)), error)
+      if (allocated(error)) return
+      call expect_true(error, allocated(set_up%system%body%surface_area) .eqv. i == 3, &
+        & 'areas change: '//text_of(real(i, wp)))
+      call allocate_bonds(set_up%system%family, bonds)
+      apart = 0
+      associate (body => set_up%system%body, own => set_up%system%model%weights, &
+        & box => whole%system%model%weights)
+        call expect_true(error, body%n_slots == whole%system%body%n_slots, 'the same slots')
+        do k = 1, body%n_slots
+          if (body%point(k) == 0) cycle
+          o = whole%system%body%point(k)
+          if (norm2(body%x(k, :2) - middle(:2)) <= scene%removed(1)%radius + (few + 1)*body%delta) &
+            & cycle
+          apart = apart + 1
+          call expect_true(error, o > 0, 'a point of the box')
+          call set_up%system%family%bonds_of(k, bonds)
+          call expect_close(error, own%Gb(own%before(k) + 1:own%before(k) + bonds%n), &
+            & box%Gb(box%before(k) + 1:box%before(k) + bonds%n), 0.0_wp, 'Gb far from the hole')
+          call expect_close(error, own%Gd(own%before(k) + 1:own%before(k) + bonds%n), &
+            & box%Gd(box%before(k) + 1:box%before(k) + bonds%n), 0.0_wp, 'Gd far from the hole')
+          if (allocated(error)) return
+        end do
+        call expect_true(error, apart > 0, 'points far from the hole')
+        if (i < 3) extremes(:, i) = [minval(own%Gb), maxval(own%Gb), minval(own%Gd), &
+          & maxval(own%Gd)]
+      end associate
+      if (allocated(error)) return
+    end do
+    call expect_close(error, extremes(:, 2), extremes(:, 1), 1.0e-8_wp, 'a larger plate')
+    call expect_true(error, extremes(1, 1) > 0.049_wp .and. extremes(3, 1) > -0.501_wp, &
+      & 'the bounds of the weights')
+  end subroutine test_missing_cells
 
   !> Put every uniform strain on a system.
   subroutine strain_all(system, what, error)

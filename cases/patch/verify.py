@@ -76,7 +76,7 @@ def hole(case, correction):
     Its values beyond a horizon from the rim are continued to it by the terms of the classical
     solution: 1, (a/r)^2, (a/r)^4.
     """
-    radius, side, points, thickness = 0.005, 0.05, 60, 5e-4
+    radius, side, points, thickness = 0.005, 0.05, 100, 5e-4
     spacing = side / points
     path = Path(__file__).resolve().parents[1] / "plate_hole" / "elastic.nml"
     text = path.read_text(encoding="utf-8").replace("2.7541e-4", "2.7541e-10")

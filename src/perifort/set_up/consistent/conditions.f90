@@ -12,7 +12,7 @@ module pd_set_up_consistent_conditions
   implicit none (type, external)
   private
   public :: conditions_type, stretch_conditions, dilatation_conditions, join_conditions, kind_of, &
-    & of_stretches, of_dilatation, coefficients, most_rows, triple_products, area_products
+    & of_stretches, of_dilatation, of_area, coefficients, most_rows, triple_products, area_products
 
   !> What an unknown is.
   integer, parameter :: of_stretches = 1   !! a weight Gb
@@ -44,6 +44,8 @@ module pd_set_up_consistent_conditions
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
     logical :: alone = .false.              !! whether each unknown is of one bond, or an area's
+    real(wp), allocatable :: base(:)        !! (unknowns) weight that a value of 1 stands for; not
+                                            !! allocated: 1
     ! what multipliers of smooth fields depend on:
     real(wp) :: spacing = 0.0_wp            !! mean of the classes' first points [m]
     real(wp), allocatable :: x(:, :)        !! (dim, classes) positions of these points [m]
@@ -99,6 +101,7 @@ contains
     end do
     ! their size is of no account
     conditions%stiffness = conditions%stiffness/maxval(conditions%stiffness)
+    if (allocated(groups%known_b)) call take_known(groups%known_b, conditions)
     call turn(conditions)
   end subroutine stretch_conditions
 
@@ -144,9 +147,56 @@ contains
       conditions%of_area(c) = body%spacing(k)/body%volume(k)
       conditions%right(row + 1:, c) = -area(k, :)*body%spacing(k)/body%volume(k)
     end do
+    if (allocated(groups%known_d)) call take_known(groups%known_d, conditions)
     call turn(conditions)
     call note_smooth(body, materials, a, groups, conditions)
   end subroutine dilatation_conditions
+
+  !> Take bonds without a group out of the conditions: what their known weights give goes to the
+  !> right side. Others are counted from theirs.
+  subroutine take_known(known, conditions)
+    real(wp), intent(in) :: known(:)                    ! (bonds) weights [-]
+    type(conditions_type), intent(inout) :: conditions  ! unknowns not yet turned
+    real(wp) :: values(most_rows)
+    logical, allocatable :: kept(:)
+    integer(i8), allocatable :: start(:)
+    integer(i8) :: e
+    integer :: c, low, high
+
+    allocate (kept, source=conditions%unknown > 0)
+    allocate (start, source=conditions%start)
+    start(1) = 1_i8
+    do c = 1, conditions%classes
+      do e = conditions%start(c), conditions%start(c + 1) - 1
+        ! all unknowns of these conditions are of one kind
+        if (.not. kept(e)) conditions%unknown(e) = 1_i4
+        call coefficients(conditions, e, values, low, high)
+        conditions%right(low:high, c) = conditions%right(low:high, c) &
+          & - (known(e) - merge(1.0_wp, 0.0_wp, kept(e)))*values(low:high)
+      end do
+      start(c + 1) = start(c) + count(kept(conditions%start(c):conditions%start(c + 1) - 1))
+    end do
+    conditions%start = start
+    conditions%unknown = pack(conditions%unknown, kept)
+    allocate (conditions%base(conditions%unknowns))
+    conditions%base(conditions%unknown) = pack(known, kept)
+    conditions%n = keep_rows(conditions%n)
+    conditions%factor = keep_rows(conditions%factor)
+
+  contains
+
+    pure function keep_rows(values) result(rows)
+      real(wp), intent(in) :: values(:, :)
+      real(wp), allocatable :: rows(:, :)
+      integer :: i
+
+      allocate (rows(count(kept), size(values, 2)))
+      do i = 1, size(values, 2)
+        rows(:, i) = pack(values(:, i), kept)
+      end do
+    end function keep_rows
+
+  end subroutine take_known
 
   !> Note what multipliers of smooth fields depend on: with w V/(t spacing) for the force and
   !> a V/t times the symmetric gradient of w for theta, a bond gets as good as nothing.
@@ -221,6 +271,8 @@ contains
       end do
     end do
     conditions%start(conditions%classes + 1) = at + 1
+    if (allocated(stretch%base)) conditions%base = [stretch%base, dilatation%base, &
+      & spread(1.0_wp, 1, conditions%unknowns - size(stretch%base) - size(dilatation%base))]
     call turn(conditions)
 
   contains

@@ -21,6 +21,9 @@ module pd_set_up_consistent_groups
     integer(i8), allocatable :: start(:)    !! (classes + 1) first bond of each class's slot
     integer(i4), allocatable :: group(:)    !! of its bonds, in the order of `bonds_of`
     type(patterns_type) :: patterns         !! of all families
+    real(wp), allocatable :: known_b(:)     !! of bonds: Gb of those without a group; of others what
+                                            !! they change from. Not allocated: all have groups [-]
+    real(wp), allocatable :: known_d(:)     !! the same of Gd [-]
   end type groups_type
 
 contains
@@ -28,7 +31,7 @@ contains
   !> Classes and groups of a body's bonds. `area` tells points apart that look alike and have other
   !> surface areas. Points are alike if what is within `reach` horizons, from bond to bond, looks
   !> alike. An error is set if two points of a family are at one place.
-  subroutine find_groups(body, family, area, reach, groups, error)
+  subroutine find_groups(body, family, area, reach, groups, error, inside)
     type(body_type), intent(in) :: body       !! arranged in the slots of the family
     class(family_type), intent(in) :: family  !! whole
     real(wp), intent(in) :: area(:, :)        !! (n_slots, any) surface areas, or what they do [any]
@@ -36,7 +39,9 @@ contains
       !! horizons; 0: every point is a class and every bond a group of its own
     type(groups_type), intent(out) :: groups
     type(error_type), allocatable, intent(out) :: error
-
+    logical, intent(in), optional :: inside(:)
+      !! (n_slots) points that have classes, with a reach of 0; bonds to others have group 0.
+      !! Absent: all have
     type(patterns_type) :: patterns
     integer(i4), allocatable :: label(:)
     integer :: round
@@ -44,7 +49,9 @@ contains
     call find_patterns(body, family, patterns, error)
     if (allocated(error)) return
     if (reach == 0) then
-      call part_all(body, patterns, groups)
+      label = merge(1_i4, 0_i4, patterns%of > 0)
+      if (present(inside)) label = merge(label, 0_i4, inside)
+      call part_all(label > 0, groups)
     else
       call find_shapes(body, family, patterns)
       label = int(body%material, i4)
@@ -110,17 +117,16 @@ contains
     end associate
   end subroutine spread_weights
 
-  !> Every slot with bonds a class of its own.
-  subroutine part_all(body, patterns, groups)
-    type(body_type), intent(in) :: body
-    type(patterns_type), intent(in) :: patterns
+  !> A class for each of some slots.
+  subroutine part_all(has_class, groups)
+    logical, intent(in) :: has_class(:)  ! (n_slots)
     type(groups_type), intent(inout) :: groups
     integer :: k
 
-    allocate (groups%class(body%n_slots), source=0_i4)
-    allocate (groups%first(count(patterns%of > 0)))
-    do k = 1, body%n_slots
-      if (patterns%of(k) == 0) cycle
+    allocate (groups%class(size(has_class)), source=0_i4)
+    allocate (groups%first(count(has_class)))
+    do k = 1, size(has_class)
+      if (.not. has_class(k)) cycle
       groups%n_classes = groups%n_classes + 1
       groups%class(k) = int(groups%n_classes, i4)
       groups%first(groups%n_classes) = int(k, i4)
@@ -234,7 +240,7 @@ contains
     integer(i8), allocatable :: parent(:)
     integer(i8) :: one, other, e, i
     integer :: k, j, c, d, p
-    logical, allocatable :: same(:), inside(:)
+    logical, allocatable :: same(:), inside(:), outside(:)
 
     parent = [(e, e=1_i8, groups%start(groups%n_classes + 1) - 1)]
     allocate (inside(groups%n_classes), same(body%n_slots), source=.false.)
@@ -248,6 +254,7 @@ contains
         if (groups%class(k + patterns%ahead(i)) /= groups%class(k)) same(k) = .false.
       end do
     end do
+    allocate (outside(size(parent)), source=.false.)
     do k = 1, body%n_slots
       c = int(groups%class(k))
       if (c == 0) cycle
@@ -260,7 +267,8 @@ contains
       do i = patterns%start(p), patterns%start(p + 1) - 1
         j = k + int(patterns%ahead(i))
         d = int(groups%class(j))
-        if (j < k .and. d /= c) cycle
+        if (d == 0) outside(bond_of(c, patterns%key(i))) = .true.
+        if (d == 0 .or. (j < k .and. d /= c)) cycle
         one = root(parent, bond_of(c, patterns%key(i)))
         other = root(parent, bond_of(d, patterns%mate(i)))
         parent(max(one, other)) = min(one, other)
@@ -269,6 +277,7 @@ contains
     allocate (groups%group(size(parent)), source=0_i4)
     groups%n_groups = 0
     do e = 1, size(parent, kind=i8)
+      if (outside(e)) cycle
       one = root(parent, e)
       if (one == e) then
         groups%n_groups = groups%n_groups + 1

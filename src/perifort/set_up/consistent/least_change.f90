@@ -27,6 +27,9 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: far = 1.0e-6_wp            !! error of a first step that more do not mend
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
+  real(wp), parameter :: stays = 0.7_wp  !! part of the error that a step in vain leaves
+  integer, parameter :: in_vain = 2      !! steps in vain after which there is no solution
+  integer, parameter :: idle = 30        !! iterations of a step that do not lower the error
   integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
@@ -44,7 +47,8 @@ contains
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: low
       !! smallest allowed weight, or `unbounded`; of Gb alone where it is found with Gd [-]
-    real(wp), allocatable, intent(out) :: G(:)   !! (unknowns) weights [-]
+    real(wp), allocatable, intent(out) :: G(:)
+      !! (unknowns) weights, counted from their base where they have one [-]
     real(wp), intent(out) :: residual            !! largest error of a condition [-]
     integer, intent(out) :: iterations           !! of the conjugate gradients
     logical, intent(out) :: found
@@ -56,7 +60,7 @@ contains
     logical :: settled
     type(level_type), allocatable :: levels(:)
     real(wp) :: value, before, slope, along, linear, length, history(most_newton), allowed, part
-    integer :: newton, halving
+    integer :: newton, halving, vain
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
       allocate (r(rows, classes), step(rows, classes), of_one(rows, classes), source=0.0_wp)
@@ -64,12 +68,14 @@ contains
       allocate (G(n))
       allocate (free(n), source=.true.)
       allocate (lows(n), source=low)
+      if (allocated(conditions%base)) lows = lows - (conditions%base - 1)
       if (conditions%stretches > 0) lows(conditions%stretches + 1:) = unbounded
     end associate
     iterations = 0
     found = .false.
     hopeless = .false.
     linear = 0.0_wp
+    vain = 0
     if (conditions%alone) then
       call new_levels(conditions, levels)
       allowed = uneven
@@ -111,6 +117,15 @@ contains
         hopeless = iterations == most_iterations .and. maxval(abs(r)) > far
         if (hopeless) return
       end if
+      ! nearly the same weights stay at the bound, and so does the error
+      if (low > unbounded .and. length >= 1 .and. maxval(abs(r)) > max(far, stays*residual) .and. &
+        & abs(count(t + 1 > lows) - count(tried + 1 > lows)) &
+        & <= part_of_changes*count(t + 1 <= lows)) then
+        vain = vain + 1
+      else
+        vain = 0
+      end if
+      if (vain == in_vain) exit
       t = tried
       linear = linear + length*along
       before = value
@@ -168,7 +183,7 @@ contains
     real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
     real(wp), allocatable :: best(:, :)
     real(wp) :: rho, rho_before, alpha, beta, curvature, target, error, least
-    integer :: c, i, most
+    integer :: c, i, most, at
 
     call factorize(conditions, free, factor)
     allocate (rest, source=r)
@@ -182,6 +197,7 @@ contains
     if (.not. all(free)) target = max(target, 1.0e-6_wp*maxval(abs(r)))
     if (size(levels) > 0) target = max(0.3_wp*uneven, part*maxval(abs(r)))
     least = huge(1.0_wp)
+    at = 0
     most = most_iterations
     if (.not. settled) most = nint(most_bounded*wider(conditions))
     do i = 1, most
@@ -218,9 +234,13 @@ contains
         step = best
         exit
       end if
-      if (error >= least) cycle
+      if (error >= least) then
+        if (i - at > idle .and. .not. settled) exit
+        cycle
+      end if
       least = error
       best = step
+      at = i
     end do
   end subroutine solve
 

@@ -6,33 +6,39 @@
 !> where S is the symmetric gradient of a smooth w: that is like one of sixth order. Blocks of
 !> points alone would need iterations by the width of the body over its spacing, or by its cube. So
 !> z, and w with S = a grad w, are also taken from cubic B-splines on grids, each twice as wide as
-!> the one before (Bramble, Pasciak and Xu, Math. Comput. 55 (1990) 1), with diagonals; w on the
-!> widest grid with a factor.
+!> the one before (Bramble, Pasciak and Xu, Math. Comput. 55 (1990) 1), with diagonals. On the first
+!> grid that has few enough splines, the widest one, their whole matrix is solved: z and w together,
+!> since areas that change join them.
 module pd_set_up_consistent_levels
   use pd_base_kinds, only: wp, i4, i8
-  use pd_set_up_consistent_conditions, only: area_products, conditions_type, kind_of, &
+  use pd_set_up_consistent_conditions, only: area_products, conditions_type, kind_of, of_area, &
     & of_dilatation, of_stretches, triple_products
-  use pd_set_up_consistent_splines, only: find_children, forget_points, grid_type, place_points, &
-    & shares, spline_at, splines_at, values_at
+  use pd_set_up_consistent_envelope, only: add_product, envelope_type, factorize_envelope, &
+    & new_envelope, solve_envelope, work_of_envelope
+  use pd_set_up_consistent_splines, only: find_children, forget_points, grid_type, order_splines, &
+    & place_points, shares, spline_at, splines_at
   implicit none (type, external)
   private
   public :: level_type, new_levels, add_levels
 
   real(wp), parameter :: finest = 2.0_wp       !! width of the finest cells [mean spacings]
-  integer, parameter :: narrow = 20            !! points across that need no grids of z
-  integer, parameter :: most_of_widest = 340   !! unknowns of the widest grid of w
-  integer, parameter :: packet = 256           !! bonds whose products are summed at once
   real(wp), parameter :: damping = 0.5_wp      !! of the diagonals, which overlap
-  real(wp), parameter :: follows = 1.0e-10_wp  !! pivot of a row that follows from others [-]
+  real(wp), parameter :: nothing = 1.0e-10_wp  !! part of the largest diagonal that is none
+  !> Multiplications that the factor of the widest grid may take: as many, and so many for each
+  !> point.
+  real(wp), parameter :: most_work = 3.0e8_wp, work_of_point = 1.0e5_wp
+  integer, parameter :: bonds_of_row = 60      !! that the matrix is made of, for each of its rows
+  integer, parameter :: last_of_all(3) = [4, 16, 36]  !! splines that its factor takes last: a few
+                                                      !! more than fields without effect need
+  real(wp), parameter :: golden = 0.6180339887498949_wp
 
-  !> A grid of B-splines, for z or for w, and the inverse of its matrix.
+  !> A grid of B-splines, and the inverse of its matrix. Components are those of z, then of w, as
+  !> far as the conditions have them.
   type, extends(grid_type) :: level_type
-    logical :: of_stretch = .false.              !! whether the splines are those of z
-    integer :: components = 0                    !! of z, or of w
+    integer :: of_z = 0                          !! components of z
+    integer :: components = 0                    !! all
     real(wp), allocatable :: inverse(:, :)       !! (components, splines) of the diagonal
-    real(wp), allocatable :: factor(:, :)        !! of the widest grid: of its scaled matrix
-    real(wp), allocatable :: scale(:)            !! that makes its diagonal 1
-    integer, allocatable :: chosen(:)            !! unknowns of the factor, in its order
+    type(envelope_type), allocatable :: factor   !! of the widest grid: of its matrix
   end type level_type
 
 contains
@@ -40,26 +46,16 @@ contains
   !> All grids of a body.
   subroutine new_levels(conditions, levels)
     type(conditions_type), intent(in) :: conditions          !! on Gb, Gd or both
-    type(level_type), allocatable, intent(out) :: levels(:)
-      !! from fine to wide: those of z, if the body is wide, then those of w
-
-    allocate (levels(0))
-    if (conditions%stretches > 0 .and. conditions%classes > narrow**conditions%dim) &
-      & call append_levels(conditions, .true., levels)
-    if (conditions%dilatations > 0) call append_levels(conditions, .false., levels)
-  end subroutine new_levels
-
-  !> The grids of z or of w.
-  subroutine append_levels(conditions, of_stretch, levels)
-    type(conditions_type), intent(in) :: conditions
-    logical, intent(in) :: of_stretch
-    type(level_type), allocatable, intent(inout) :: levels(:)
+    type(level_type), allocatable, intent(out) :: levels(:)  !! from fine to wide
     type(level_type), allocatable :: more(:)
     integer(i4), allocatable :: numbers(:), finer(:)
-    real(wp) :: low(conditions%dim), edge(conditions%dim)
-    integer :: cells(conditions%dim), fine(conditions%dim)
+    integer, allocatable :: place(:), lowest(:)
+    real(wp) :: low(conditions%dim), edge(conditions%dim), farthest
+    integer :: cells(conditions%dim), fine(conditions%dim), last
     logical :: widest
 
+    allocate (levels(0))
+    farthest = longest_reach(conditions)
     low = minval(conditions%x, dim=2)
     edge = finest*conditions%spacing
     cells = int((maxval(conditions%x, dim=2) - low)/edge) + 1
@@ -68,13 +64,19 @@ contains
       more(:size(levels)) = levels
       call move_alloc(more, levels)
       associate (level => levels(size(levels)))
-        level%of_stretch = of_stretch
-        level%components = merge(conditions%before, conditions%dim, of_stretch)
+        if (conditions%stretches > 0) level%of_z = conditions%before
+        level%components = level%of_z
+        if (conditions%dilatations > 0) level%components = level%of_z + conditions%dim
         call place_points(conditions%x, low, edge, cells, level%grid_type, numbers)
-        widest = all(cells == 1)
-        if (.not. of_stretch) widest = widest .or. &
-          & level%dim*(size(level%first) - 1) <= most_of_widest
-        if (widest .and. .not. of_stretch) then
+        ! four splines along an axis reach a point, and a bond may leave the point's cell
+        last = last_of_all(conditions%dim)
+        call order_splines(level%grid_type, cells, numbers, 4 + int(farthest/edge(1)), last, &
+          & place, lowest)
+        widest = all(cells == 1) .or. work_of_envelope(lowest, level%components) <= most_work &
+          & + work_of_point*conditions%classes
+        if (widest) then
+          allocate (level%factor)
+          call new_envelope(place, lowest, last, level%components, level%factor)
           call factorize(conditions, level)
         else
           call find_diagonal(conditions, level)
@@ -90,51 +92,69 @@ contains
       cells = (cells + 1)/2
       edge = 2*edge
     end do
-  end subroutine append_levels
+  end subroutine new_levels
 
-  !> What a spline at point k, as any component, gives the unknown of bond `e` of k, over
-  !> `pattern_of` that unknown and component.
-  pure real(wp) function share_of(conditions, of_stretch, k, e, value, gradient) result(share)
+  !> The longest component of a bond between points that all differ.
+  pure real(wp) function longest_reach(conditions) result(farthest)
     type(conditions_type), intent(in) :: conditions
-    logical, intent(in) :: of_stretch
+    integer :: u
+
+    farthest = 0.0_wp
+    do u = 1, conditions%stretches + conditions%dilatations
+      associate (first => conditions%first(u), class => conditions%class, &
+        & bond => conditions%bond)
+        farthest = max(farthest, maxval(abs(conditions%x(:, class(bond(first))) &
+          & - conditions%x(:, class(bond(first + 1))))))
+      end associate
+    end do
+  end function longest_reach
+
+  !> What a spline at point k gives the unknown of bond `e` of k, over `pattern_of` that unknown: as
+  !> a component of z, and of w.
+  pure function shares_of(conditions, k, e, value, gradient) result(share)
+    type(conditions_type), intent(in) :: conditions
     integer, intent(in) :: k
     integer(i8), intent(in) :: e
-    real(wp), intent(in) :: value, gradient(:)
+    real(wp), intent(in) :: value, gradient(:)  ! of the spline
+    real(wp) :: share(2)
     real(wp) :: along
-    integer :: kind
 
     share = 0.0_wp
-    kind = kind_of(conditions, int(conditions%unknown(e)))
-    if (kind == merge(of_dilatation, of_stretches, of_stretch)) return
     associate (n => conditions%n(conditions%bond(conditions%first(conditions%unknown(e))), :), &
       & f => conditions%factor(e, :))
       ! seen from the other end the direction is the opposite one
       along = sign(1.0_wp, dot_product(n, conditions%n(e, :)))
-      if (of_stretch) then
-        share = along*conditions%stiffness(k)*f(1)*value
-      else
-        share = along*conditions%shift(k)*f(2)*value
-        if (kind == of_dilatation) share = share &
+      select case (kind_of(conditions, int(conditions%unknown(e))))
+      case (of_stretches)
+        share(1) = along*conditions%stiffness(k)*f(1)*value
+      case (of_dilatation)
+        share(2) = along*conditions%shift(k)*f(2)*value &
           & + conditions%strain(k)*f(1)*dot_product(gradient, n)
-      end if
+      case default
+        ! a component of an area
+        share = [conditions%stiffness(k)*f(1), conditions%shift(k)*f(2)]*value
+      end select
     end associate
-  end function share_of
+  end function shares_of
 
   !> What the shares of an unknown are multiplied with for each component.
-  pure subroutine pattern_of(conditions, of_stretch, u, pattern)
+  pure subroutine pattern_of(conditions, of_z, u, pattern)
     type(conditions_type), intent(in) :: conditions
-    logical, intent(in) :: of_stretch
+    integer, intent(in) :: of_z            ! components of z
     integer, intent(in) :: u
     real(wp), intent(inout) :: pattern(:)  ! (components) set
 
     associate (n => conditions%n(conditions%bond(conditions%first(u)), :))
-      if (.not. of_stretch) then
-        pattern = n
-      else if (kind_of(conditions, u) == of_stretches) then
+      pattern = 0.0_wp
+      select case (kind_of(conditions, u))
+      case (of_stretches)
         call triple_products(n, pattern)
-      else
+      case (of_dilatation)
+        pattern(of_z + 1:) = n
+      case default
         call area_products(n, pattern)
-      end if
+        pattern(of_z + 1:) = n
+      end select
     end associate
   end subroutine pattern_of
 
@@ -142,16 +162,17 @@ contains
   subroutine find_diagonal(conditions, level)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(inout) :: level
-    real(wp), allocatable :: share(:), diagonal(:), pattern(:)
+    real(wp), allocatable :: share(:, :), diagonal(:), pattern(:)
     integer(i4), allocatable :: seen(:), met(:)
-    real(wp) :: value, gradient(level%dim), part
+    real(wp) :: value, gradient(level%dim), part(2)
     integer(i8) :: e
-    integer :: s, i, p, k, u, n
+    integer :: s, i, p, k, u, n, z
 
     allocate (level%inverse(level%components, size(level%first) - 1))
-    !$omp parallel default(none) shared(conditions, level) &
+    z = level%of_z
+    !$omp parallel default(none) shared(conditions, level, z) &
     !$omp private(share, diagonal, pattern, seen, met, value, gradient, part, e, s, i, p, k, u, n)
-    allocate (share(conditions%unknowns), met(conditions%unknowns))
+    allocate (share(2, conditions%unknowns), met(conditions%unknowns))
     allocate (seen(conditions%unknowns), source=0_i4)
     allocate (diagonal(level%components), pattern(level%components))
     !$omp do schedule(dynamic, 8)
@@ -161,16 +182,15 @@ contains
         associate (cell => level%under(1, i))
           do p = level%start(cell), level%start(cell + 1) - 1
             k = int(level%order(p))
-            call spline_at(level%grid_type, int(level%under(2, i)), k, value, &
-              & gradient)
+            call spline_at(level%grid_type, int(level%under(2, i)), k, value, gradient)
             do e = conditions%start(k), conditions%start(k + 1) - 1
               u = int(conditions%unknown(e))
-              part = share_of(conditions, level%of_stretch, k, e, value, gradient)
+              part = shares_of(conditions, k, e, value, gradient)
               if (seen(u) == s) then
-                share(u) = share(u) + part
+                share(:, u) = share(:, u) + part
               else
                 seen(u) = int(s, i4)
-                share(u) = part
+                share(:, u) = part
                 n = n + 1
                 met(n) = int(u, i4)
               end if
@@ -181,128 +201,89 @@ contains
       diagonal = 0.0_wp
       do i = 1, n
         u = int(met(i))
-        if (.not. abs(share(u)) > 0.0_wp) cycle
-        call pattern_of(conditions, level%of_stretch, u, pattern)
-        diagonal = diagonal + (share(u)*pattern)**2
+        call pattern_of(conditions, z, u, pattern)
+        diagonal(:z) = diagonal(:z) + (share(1, u)*pattern(:z))**2
+        diagonal(z + 1:) = diagonal(z + 1:) + (share(2, u)*pattern(z + 1:))**2
       end do
       level%inverse(:, s) = diagonal
     end do
     !$omp end parallel
-    part = follows*maxval(level%inverse)
-    level%inverse = damping/max(level%inverse, part)
+    call invert(level%inverse(:z, :))
+    call invert(level%inverse(z + 1:, :))
+
+  contains
+
+    subroutine invert(diagonals)
+      real(wp), intent(inout) :: diagonals(:, :)
+      diagonals = damping/max(diagonals, nothing*maxval(diagonals))
+    end subroutine invert
+
   end subroutine find_diagonal
 
-  !> Cholesky's factor of the matrix of the widest grid of w.
+  !> Cholesky's factor of the matrix of the widest grid, from as many bonds as its splines need.
   subroutine factorize(conditions, level)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(inout) :: level
-    real(wp), allocatable :: of_bonds(:, :)
-    real(wp) :: value(64), gradient(3, 64), share
+    real(wp) :: value(64), gradient(64, 3), pattern(level%components), parts(of_stretches:of_area)
+    real(wp), allocatable :: vector(:, :)
+    real(wp) :: needed, share(2)
+    integer, allocatable :: at(:)
     integer(i8) :: i, e
-    integer :: n, first, last, u, m, k, at, column, dim
+    integer :: met(128), n_met, u, m, k, s, z, low, high
 
-    dim = level%dim
-    n = dim*(size(level%first) - 1)
-    allocate (level%factor(n, n), source=0.0_wp)
-    allocate (of_bonds(n, packet))
-    do first = conditions%stretches + 1, conditions%unknowns, packet
-      last = min(conditions%unknowns, first + packet - 1)
-      !$omp parallel default(none) private(value, gradient, share, i, e, u, m, k, at, column) &
-      !$omp shared(conditions, level, of_bonds, first, last, dim, n)
-      !$omp do schedule(dynamic, 16)
-      do u = first, last
-        of_bonds(:, u - first + 1) = 0.0_wp
-        do i = conditions%first(u), conditions%first(u + 1) - 1
-          e = conditions%bond(i)
-          k = int(conditions%class(e))
-          call splines_at(level%grid_type, k, value, gradient)
-          do m = 1, 4**dim
-            share = share_of(conditions, .false., k, e, value(m), gradient(:dim, m))
-            at = dim*(level%spline(m, level%cell(k)) - 1)
-            of_bonds(at + 1:at + dim, u - first + 1) = of_bonds(at + 1:at + dim, u - first + 1) &
-              & + share*conditions%n(conditions%bond(conditions%first(u)), :)
-          end do
+    z = level%of_z
+    needed = real(bonds_of_row, wp)*size(level%factor%first)
+    parts = 1.0_wp
+    if (conditions%stretches > needed) parts(of_stretches) = needed/conditions%stretches
+    if (conditions%dilatations > needed) parts(of_dilatation) = needed/conditions%dilatations
+    allocate (at(size(level%first) - 1), source=0)
+    allocate (vector(level%components, size(met)))
+    do u = 1, conditions%unknowns
+      associate (part => parts(kind_of(conditions, u)))
+        ! multiples of this are spread evenly, and with them the directions of bonds
+        if (modulo(u*golden, 1.0_wp) > part) cycle
+        call pattern_of(conditions, z, u, pattern)
+        pattern = pattern/sqrt(part)
+      end associate
+      n_met = 0
+      do i = conditions%first(u), conditions%first(u + 1) - 1
+        e = conditions%bond(i)
+        k = int(conditions%class(e))
+        call splines_at(level%grid_type, k, value, gradient)
+        do m = 1, 4**level%dim
+          s = int(level%spline(m, level%cell(k)))
+          if (at(s) == 0) then
+            n_met = n_met + 1
+            met(n_met) = s
+            vector(:, n_met) = 0.0_wp
+            at(s) = n_met
+          end if
+          share = shares_of(conditions, k, e, value(m), gradient(m, :level%dim))
+          vector(:z, at(s)) = vector(:z, at(s)) + share(1)*pattern(:z)
+          vector(z + 1:, at(s)) = vector(z + 1:, at(s)) + share(2)*pattern(z + 1:)
         end do
       end do
-      !$omp do schedule(static)
-      do column = 1, n
-        level%factor(:, column) = level%factor(:, column) + matmul(of_bonds(:, :last - first + 1), &
-          & of_bonds(column, :last - first + 1))
-      end do
-      !$omp end parallel
+      low = merge(z + 1, 1, kind_of(conditions, u) == of_dilatation)
+      high = merge(z, level%components, kind_of(conditions, u) == of_stretches)
+      call add_product(met(:n_met), vector(:, :n_met), low, high, level%factor)
+      at(met(:n_met)) = 0
     end do
-    ! splines at the rim overlap few points: all have diagonals of 1
-    allocate (level%scale(n), source=0.0_wp)
-    do column = 1, n
-      if (level%factor(column, column) > 0.0_wp) level%scale(column) = &
-        & 1/sqrt(level%factor(column, column))
-    end do
-    do column = 1, n
-      level%factor(:, column) = level%scale*level%factor(:, column)*level%scale(column)
-    end do
-    call factorize_pivoted(level%factor, level%chosen)
+    call factorize_envelope(level%factor)
   end subroutine factorize
-
-  !> Cholesky's factor of a semidefinite matrix with a diagonal of 1 or 0: rows in the order of the
-  !> largest pivot, until what is left follows from those before. So no pivot is a rounding error,
-  !> though all quadratic fields w are without effect.
-  pure subroutine factorize_pivoted(f, chosen)
-    real(wp), intent(inout) :: f(:, :)               !! the matrix; its factor in the chosen order
-    integer, allocatable, intent(out) :: chosen(:)   !! rows in their order
-    real(wp) :: left(size(f, 1)), column(size(f, 1))
-    real(wp), allocatable :: factor(:, :)
-    integer :: order(size(f, 1)), n, i, at
-
-    n = size(f, 1)
-    allocate (factor(n, n), source=0.0_wp)
-    do i = 1, n
-      left(i) = f(i, i)
-    end do
-    do i = 1, n
-      at = maxloc(left, dim=1)
-      if (.not. left(at) > follows) exit
-      order(i) = at
-      column = (f(:, at) - matmul(factor(:, :i - 1), factor(at, :i - 1)))/sqrt(left(at))
-      left = left - column**2
-      column(order(:i - 1)) = 0.0_wp
-      left(order(:i)) = 0.0_wp
-      factor(:, i) = column
-    end do
-    i = i - 1
-    chosen = order(:i)
-    f(:i, :i) = factor(chosen, :i)
-  end subroutine factorize_pivoted
 
   !> Add to `w` what the grids give for the residual `r`.
   subroutine add_levels(conditions, levels, r, w)
     type(conditions_type), intent(in) :: conditions  !! of the grids
-    type(level_type), intent(in) :: levels(:)        !! of `new_levels`
+    type(level_type), intent(in) :: levels(:)        !! of `new_levels`; may be none
     real(wp), intent(in) :: r(:, :)                  !! (rows, points) [-]
     real(wp), intent(inout) :: w(:, :)               !! (rows, points), added to [-]
-    integer :: i, first
-
-    first = 1
-    do i = 1, size(levels)
-      if (i < size(levels)) then
-        if (allocated(levels(i + 1)%child)) cycle
-      end if
-      call add_grids(conditions, levels(first:i), r, w)
-      first = i + 1
-    end do
-  end subroutine add_levels
-
-  !> Add what the grids of z or of w give.
-  subroutine add_grids(conditions, levels, r, w)
-    type(conditions_type), intent(in) :: conditions
-    type(level_type), intent(in) :: levels(:)
-    real(wp), intent(in) :: r(:, :)
-    real(wp), intent(inout) :: w(:, :)
     type :: values_type
       real(wp), allocatable :: c(:, :)  ! (components, splines)
     end type values_type
     type(values_type) :: of(size(levels))
     integer :: i
 
+    if (size(levels) == 0) return
     allocate (of(1)%c(levels(1)%components, size(levels(1)%first) - 1))
     call gather(conditions, levels(1), r, of(1)%c)
     do i = 2, size(levels)
@@ -312,7 +293,7 @@ contains
     do i = size(levels), 1, -1
       associate (level => levels(i))
         if (allocated(level%factor)) then
-          call solve(level, of(i)%c)
+          call solve_envelope(level%factor, of(i)%c)
         else
           of(i)%c = level%inverse*of(i)%c
         end if
@@ -320,7 +301,7 @@ contains
       if (i < size(levels)) call add_parents(levels(i + 1), of(i + 1)%c, of(i)%c)
     end do
     call spread_out(conditions, levels(1), of(1)%c, w)
-  end subroutine add_grids
+  end subroutine add_levels
 
   !> The sums over a grid's splines, from those over the splines of the next finer grid.
   subroutine sum_children(level, finer, c)
@@ -358,29 +339,6 @@ contains
     end do
   end subroutine add_parents
 
-  !> Solve by the factor of the widest grid.
-  pure subroutine solve(level, c)
-    type(level_type), intent(in) :: level
-    real(wp), intent(inout) :: c(:, :)
-    real(wp) :: all_of_it(size(c)), x(size(level%chosen))
-    integer :: i
-
-    all_of_it = level%scale*reshape(c, [size(c)])
-    x = all_of_it(level%chosen)
-    associate (f => level%factor)
-      do i = 1, size(x)
-        x(i) = x(i)/f(i, i)
-        x(i + 1:) = x(i + 1:) - x(i)*f(i + 1:size(x), i)
-      end do
-      do i = size(x), 1, -1
-        x(i) = (x(i) - dot_product(f(i + 1:size(x), i), x(i + 1:)))/f(i, i)
-      end do
-    end associate
-    all_of_it = 0.0_wp
-    all_of_it(level%chosen) = x
-    c = reshape(level%scale*all_of_it, shape(c))
-  end subroutine solve
-
   !> The rows of the conditions with the products of two components, behind those of the stretch.
   pure function rows_of(dim) result(rows)
     integer, intent(in) :: dim
@@ -404,42 +362,35 @@ contains
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
     real(wp), intent(in) :: r(:, :)
-    real(wp), intent(inout) :: c(:, :)  !! (components, splines) set
+    real(wp), intent(inout) :: c(:, :)  ! (components, splines) set
     real(wp), allocatable :: of_cell(:, :, :)
-    real(wp) :: fields(level%components), strains(3, 3), value(64), gradient(3, 64)
-    integer :: rows(3, 3), cell, i, k, m, s, x, dim, before, splines
+    real(wp) :: value(64), gradient(64, 3)
+    integer :: rows(3, 3), cell, i, k, x, y, s, n, z, dim, before
 
     dim = level%dim
-    splines = 4**dim
+    n = 4**dim
+    z = level%of_z
     before = conditions%before
     rows = rows_of(dim)
-    strains = 0.0_wp
-    allocate (of_cell(level%components, splines, size(level%start) - 1))
-    !$omp parallel default(none) shared(conditions, level, r, c, of_cell, rows, dim, before) &
-    !$omp shared(splines) private(fields, strains, value, gradient, cell, i, k, m, s, x)
+    allocate (of_cell(n, level%components, size(level%start) - 1))
+    !$omp parallel default(none) shared(conditions, level, r, c, of_cell, rows, dim, before, n, z) &
+    !$omp private(value, gradient, cell, i, k, x, y, s)
     !$omp do schedule(dynamic, 8)
     do cell = 1, size(of_cell, 3)
       of_cell(:, :, cell) = 0.0_wp
       do i = int(level%start(cell)), int(level%start(cell + 1)) - 1
         k = int(level%order(i))
-        if (level%of_stretch) then
-          call values_at(level%grid_type, k, value)
-          fields = conditions%stiffness(k)*r(:before, k)
-          do m = 1, splines
-            of_cell(:, m, cell) = of_cell(:, m, cell) + fields*value(m)
-          end do
-          cycle
-        end if
         call splines_at(level%grid_type, k, value, gradient)
-        fields = conditions%shift(k)*r(before + dim*(dim + 1)/2 + 1:, k)
-        do x = 1, dim
-          strains(:dim, x) = conditions%strain(k)*r(before + rows(:dim, x), k)
+        do x = 1, z
+          of_cell(:, x, cell) = of_cell(:, x, cell) + conditions%stiffness(k)*r(x, k)*value(:n)
         end do
-        do m = 1, splines
-          do x = 1, dim
-            of_cell(x, m, cell) = of_cell(x, m, cell) + fields(x)*value(m) &
-              & + sum(strains(:dim, x)*gradient(:dim, m))
-          end do
+        do x = 1, level%components - z
+          associate (sums => of_cell(:, z + x, cell))
+            sums = sums + conditions%shift(k)*r(before + dim*(dim + 1)/2 + x, k)*value(:n)
+            do y = 1, dim
+              sums = sums + conditions%strain(k)*r(before + rows(y, x), k)*gradient(:n, y)
+            end do
+          end associate
         end do
       end do
     end do
@@ -447,7 +398,7 @@ contains
     do s = 1, size(c, 2)
       c(:, s) = 0.0_wp
       do i = level%first(s), level%first(s + 1) - 1
-        c(:, s) = c(:, s) + of_cell(:, level%under(2, i), level%under(1, i))
+        c(:, s) = c(:, s) + of_cell(level%under(2, i), :, level%under(1, i))
       end do
     end do
     !$omp end parallel
@@ -457,44 +408,37 @@ contains
   subroutine spread_out(conditions, level, c, w)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level
-    real(wp), intent(in) :: c(:, :)     !! (components, splines)
-    real(wp), intent(inout) :: w(:, :)  !! (rows, points), added to
-    real(wp) :: fields(level%components), strains(3, 3), value(64), gradient(3, 64)
-    integer :: rows(3, 3), k, x, y, m, s, dim, before
+    real(wp), intent(in) :: c(:, :)     ! (components, splines)
+    real(wp), intent(inout) :: w(:, :)  ! (rows, points), added to
+    real(wp) :: value(64), gradient(64, 3), here(64, level%components)
+    integer :: rows(3, 3), cell, i, k, x, y, n, z, dim, before, row
 
     dim = level%dim
+    n = 4**dim
+    z = level%of_z
     before = conditions%before
     rows = rows_of(dim)
-    !$omp parallel do schedule(static) default(none) &
-    !$omp shared(conditions, level, c, w, dim, rows, before) &
-    !$omp private(fields, strains, value, gradient, k, x, y, m, s)
-    do k = 1, conditions%classes
-      fields = 0.0_wp
-      if (level%of_stretch) then
-        call values_at(level%grid_type, k, value)
-        do m = 1, 4**dim
-          fields = fields + value(m)*c(:, level%spline(m, level%cell(k)))
-        end do
-        w(:before, k) = w(:before, k) + conditions%stiffness(k)*fields
-        cycle
-      end if
-      call splines_at(level%grid_type, k, value, gradient)
-      strains = 0.0_wp
-      do m = 1, 4**dim
-        s = int(level%spline(m, level%cell(k)))
-        fields = fields + value(m)*c(:, s)
-        do x = 1, dim
-          strains(:dim, x) = strains(:dim, x) + gradient(:dim, m)*c(x, s)
-        end do
+    !$omp parallel do schedule(dynamic, 8) default(none) &
+    !$omp shared(conditions, level, c, w, rows, dim, before, n, z) &
+    !$omp private(value, gradient, here, cell, i, k, x, y, row)
+    do cell = 1, size(level%start) - 1
+      do i = 1, n
+        here(i, :) = c(:, level%spline(i, cell))
       end do
-      do x = 1, dim
-        associate (row => before + dim*(dim + 1)/2 + x)
-          w(row, k) = w(row, k) + conditions%shift(k)*fields(x)
-        end associate
-        do y = 1, dim
-          associate (row => before + rows(x, y))
-            w(row, k) = w(row, k) + conditions%strain(k)*strains(y, x)
-          end associate
+      do i = int(level%start(cell)), int(level%start(cell + 1)) - 1
+        k = int(level%order(i))
+        call splines_at(level%grid_type, k, value, gradient)
+        do x = 1, z
+          w(x, k) = w(x, k) + conditions%stiffness(k)*dot_product(value(:n), here(:n, x))
+        end do
+        do x = 1, level%components - z
+          row = before + dim*(dim + 1)/2 + x
+          w(row, k) = w(row, k) + conditions%shift(k)*dot_product(value(:n), here(:n, z + x))
+          do y = 1, dim
+            row = before + rows(x, y)
+            w(row, k) = w(row, k) + conditions%strain(k)*dot_product(gradient(:n, y), &
+              & here(:n, z + x))
+          end do
         end do
       end do
     end do

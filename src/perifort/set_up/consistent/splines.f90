@@ -4,7 +4,7 @@ module pd_set_up_consistent_splines
   use pd_base_kinds, only: wp, i4
   implicit none (type, external)
   private
-  public :: grid_type, place_points, find_children, forget_points, splines_at, values_at, &
+  public :: grid_type, place_points, find_children, order_splines, forget_points, splines_at, &
     & spline_at, shares
 
   !> A grid. A point sees four splines along each axis. Cells without points are left out, and
@@ -125,6 +125,129 @@ contains
     grid%parent(2, :) = mod(next(:n) - 1, 5**grid%dim) + 1
   end subroutine find_children
 
+  !> An order of a grid's splines in which neighbours are near each other: from one end on, by
+  !> their distance from it, as Cuthill and McKee number a matrix; and the lowest of the splines
+  !> that are within some cells of each. Some that lie far from each other come last.
+  subroutine order_splines(grid, cells, numbers, within, spread, place, lowest)
+    type(grid_type), intent(in) :: grid      !! with its points
+    integer, intent(in) :: cells(:)          !! (dim) of the grid along each axis
+    integer(i4), intent(in) :: numbers(:)    !! (places) of the grid's splines; 0: none
+    integer, intent(in) :: within            !! cells along each axis
+    integer, intent(inout) :: spread         !! splines that come last, fewer where there are not
+                                             !! so many
+    integer, allocatable, intent(out) :: place(:)   !! (splines) of each in the order
+    integer, allocatable, intent(out) :: lowest(:)  !! (splines in their order)
+    integer, allocatable :: where_is(:), order(:)
+    logical, allocatable :: last(:)
+    integer :: n, s, start, pass
+
+    n = maxval(numbers)
+    allocate (where_is(n), place(n), lowest(n), order(n))
+    do s = 1, size(numbers)
+      if (numbers(s) > 0) where_is(numbers(s)) = s - 1
+    end do
+    ! the last one found from anywhere is an end
+    start = 1
+    do pass = 1, 2
+      call walk(start)
+      start = order(n)
+    end do
+    call find_last()
+    order = [pack(order, .not. last(order)), pack(order, last(order))]
+    place(order) = [(s, s=1, n)]
+    do s = 1, n
+      lowest(place(s)) = place(s)
+      call look_around(s, within)
+    end do
+    lowest(n - spread + 1:) = 1
+
+  contains
+
+    !> The splines that come last: each as far as can be from those before, none at the rim.
+    subroutine find_last()
+      real :: distance(n)
+      integer :: under(n), i
+
+      allocate (last(n), source=.false.)
+      under = grid%first(2:) - grid%first(:n)
+      spread = min(spread, n)
+      distance = merge(1.0e30, 0.0, 2*under >= maxval(under))
+      do i = 1, spread
+        s = maxloc(distance, dim=1, mask=.not. last)
+        if (.not. distance(s) > 0.0) exit
+        last(s) = .true.
+        associate (at => place_of(where_is(s), cells + 3))
+          do s = 1, n
+            distance(s) = min(distance(s), norm2(real(place_of(where_is(s), cells + 3) - at)))
+          end do
+        end associate
+      end do
+      spread = count(last)
+    end subroutine find_last
+
+    !> Number all splines, pieces that hang together one after another.
+    subroutine walk(start)
+      integer, intent(in) :: start
+      integer :: i, found, next
+
+      place = 0
+      found = 0
+      next = start
+      i = 0
+      do while (found < n)
+        found = found + 1
+        order(found) = next
+        place(next) = found
+        do while (i < found)
+          i = i + 1
+          call take_neighbours(order(i), found)
+        end do
+        if (found < n) next = findloc(place, 0, dim=1)
+      end do
+    end subroutine walk
+
+    !> Number the neighbours of a spline that have no number yet.
+    subroutine take_neighbours(s, found)
+      integer, intent(in) :: s
+      integer, intent(inout) :: found
+      integer :: m, o
+
+      do m = 1, 3**size(cells)
+        o = spline_beside(s, m, 1)
+        if (o == 0) cycle
+        if (place(o) > 0) cycle
+        found = found + 1
+        order(found) = o
+        place(o) = found
+      end do
+    end subroutine take_neighbours
+
+    subroutine look_around(s, within)
+      integer, intent(in) :: s, within
+      integer :: m, o
+
+      do m = 1, (2*within + 1)**size(cells)
+        o = spline_beside(s, m, within)
+        if (o > 0) lowest(place(s)) = min(lowest(place(s)), place(o))
+      end do
+    end subroutine look_around
+
+    !> Spline `m` of those that are within some cells of spline `s`; 0: none.
+    integer function spline_beside(s, m, within) result(o)
+      integer, intent(in) :: s, m, within
+      integer :: at(size(cells)), d
+
+      at = place_of(where_is(s), cells + 3)
+      do d = 1, size(cells)
+        at(d) = at(d) - within + mod((m - 1)/(2*within + 1)**(d - 1), 2*within + 1)
+      end do
+      o = 0
+      if (any(at < 0) .or. any(at >= cells + 3)) return
+      o = int(numbers(1 + dense(at, cells + 3)))
+    end function spline_beside
+
+  end subroutine order_splines
+
   !> Keep of a grid what it is to the next finer one.
   pure subroutine forget_points(grid)
     type(grid_type), intent(inout) :: grid  !! with children
@@ -135,54 +258,31 @@ contains
 
   !> All splines that reach point k, x fastest, and their gradients.
   pure subroutine splines_at(grid, k, value, gradient)
-    type(grid_type), intent(in) :: grid        !! with its points
+    type(grid_type), intent(in) :: grid       !! with its points
     integer, intent(in) :: k                  !! point
-    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
-    real(wp), intent(inout) :: gradient(:, :) !! (3, 4**dim) dim of them are set [1/m]
-    real(wp) :: v, s
-    integer :: m, n, i, j, d
+    real(wp), intent(inout) :: value(:)       !! (4**dim or more) set [-]
+    real(wp), intent(inout) :: gradient(:, :) !! (64, 3) 4**dim of dim are set [1/m]
+    integer :: n, i, d, b
 
     associate (of => grid%value(:, :, k), slope => grid%slope(:, :, k))
       value(:4) = of(:, 1)
-      gradient(1, :4) = slope(:, 1)
+      gradient(:4, 1) = slope(:, 1)
       n = 4
       do d = 2, grid%dim
         ! the first last, since the others are made of what it replaces
         do i = 4, 1, -1
-          v = of(i, d)
-          s = slope(i, d)
-          do m = 1, n
-            j = (i - 1)*n + m
-            gradient(d, j) = value(m)*s
-            gradient(:d - 1, j) = gradient(:d - 1, m)*v
-            value(j) = value(m)*v
-          end do
+          associate (first => (i - 1)*n + 1, last => i*n)
+            gradient(first:last, d) = value(:n)*slope(i, d)
+            do b = 1, d - 1
+              gradient(first:last, b) = gradient(:n, b)*of(i, d)
+            end do
+            value(first:last) = value(:n)*of(i, d)
+          end associate
         end do
         n = 4*n
       end do
     end associate
   end subroutine splines_at
-
-  !> All splines that reach point k, x fastest.
-  pure subroutine values_at(grid, k, value)
-    type(grid_type), intent(in) :: grid        !! with its points
-    integer, intent(in) :: k                  !! point
-    real(wp), intent(inout) :: value(:)       !! (4**dim) set [-]
-    integer :: m, n, i, d
-
-    associate (of => grid%value(:, :, k))
-      value(:4) = of(:, 1)
-      n = 4
-      do d = 2, grid%dim
-        do i = 4, 1, -1
-          do m = 1, n
-            value((i - 1)*n + m) = value(m)*of(i, d)
-          end do
-        end do
-        n = 4*n
-      end do
-    end associate
-  end subroutine values_at
 
   !> Spline `m` of those that reach point k, and its gradient.
   pure subroutine spline_at(grid, m, k, value, gradient)

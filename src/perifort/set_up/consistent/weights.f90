@@ -13,6 +13,7 @@ module pd_set_up_consistent_weights
   use pd_family_family, only: family_type
   use pd_force_model, only: model_type
   use pd_law_material, only: material_type, several_stiffnesses
+  use pd_set_up_consistent_boxes, only: box_type, fill_box, join_weights, take_from_box
   use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
     & join_conditions, stretch_conditions
   use pd_set_up_consistent_groups, only: find_groups, groups_type, spread_weights
@@ -70,8 +71,9 @@ contains
     real(wp), allocatable :: area(:, :), changed(:, :), of_stretch(:, :), of_dilatation(:, :)
     real(wp), allocatable :: bounds(:)
     real(wp) :: a(size(materials)), mu(size(materials)), face(body%n_slots)
-    integer :: alone, least, positive
-    logical :: uneven
+    type(box_type), allocatable :: box
+    integer :: alone, least, positive, most
+    logical :: uneven, hopeless
 
     least = merge(2, 1, body%dim == 3)
     bounds = bounds_of_stretch
@@ -109,21 +111,44 @@ contains
         & bounds(least:), weights, stretch, dilatation, error, work)
       return
     end if
-    call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds(least:positive), weights, stretch, dilatation, error, work, model)
-    if (.not. allocated(error)) return
+    of_stretch = mu(1)*area
+    of_dilatation = a(1)*area
     where (any(abs(area) > 0.0_wp, dim=2) .and. .not. fixed) face = body%volume/body%spacing
-    if (any(face > 0.0_wp)) then
-      changed = area
-      call weights_and_areas(body, family, materials, face, bounds(:positive), changed, &
-        & weights, stretch, dilatation, error, work, model)
-      if (.not. allocated(error)) then
-        body%surface_area = changed
-        return
-      end if
+    if (.not. uneven) then
+      most = huge(0)
+      call fill_box(body, family, area, box)
+      if (allocated(box)) most = count(box%near)/8
+      call shared_weights(body, family, materials, of_stretch, of_dilatation, &
+        & bounds(least:positive), most, weights, stretch, dilatation, error, work, model)
+      if (.not. allocated(error)) return
+      hopeless = stretch%hopeless .or. dilatation%hopeless
+      if (allocated(box)) call weigh_box(materials, bounds(least:positive), box, work)
     end if
-    call weights_of_areas(body, family, materials, mu(1)*area, a(1)*area, uneven, &
-      & bounds(positive + 1:), weights, stretch, dilatation, error, work, model)
+    do
+      ! where there is no weight of 0.05, one of 0 is rare
+      call own_weights(body, family, materials, of_stretch, of_dilatation, uneven, &
+        & bounds(least:max(least, positive - 1)), weights, stretch, dilatation, error, work, &
+        & model, box)
+      if (.not. allocated(error)) return
+      if (any(face > 0.0_wp)) then
+        changed = area
+        call weights_and_areas(body, family, materials, face, bounds(:positive), changed, &
+          & weights, stretch, dilatation, error, work, model, box)
+        if (.not. allocated(error)) then
+          body%surface_area = changed
+          return
+        end if
+      end if
+      if (.not. (uneven .or. hopeless)) then
+        call shared_weights(body, family, materials, of_stretch, of_dilatation, &
+          & bounds(positive + 1:), huge(0), weights, stretch, dilatation, error, work, model)
+        if (.not. allocated(error)) return
+      end if
+      call own_weights(body, family, materials, of_stretch, of_dilatation, uneven, &
+        & bounds(positive + 1:), weights, stretch, dilatation, error, work, model, box)
+      if (.not. (allocated(error) .and. allocated(box))) return
+      deallocate (box)
+    end do
   end subroutine consistent_weights
 
   !> Weights together with surface areas: Gb, Gd and areas are unknowns of one set of conditions. An
@@ -131,7 +156,7 @@ contains
   !> and Gd that grow with the body; neither need there be with those of triangles, tetrahedra or
   !> round parts of lattices. An error is set if no weights fulfil the conditions.
   subroutine weights_and_areas(body, family, materials, face, bounds, area, weights, stretch, &
-    & dilatation, error, work, model)
+    & dilatation, error, work, model, box)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)   ! all of one stiffness
@@ -144,6 +169,7 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(long_work_type), intent(inout) :: work
     type(model_type), intent(in), optional :: model
+    type(box_type), intent(in), optional :: box       ! around a lattice with missing cells
     type(groups_type) :: groups
     type(conditions_type) :: of_stretch, of_dilatation, conditions
     real(wp), allocatable :: G(:)
@@ -152,7 +178,7 @@ contains
 
     a = a_of(materials)
     mu = mu_of(materials, body%dim)
-    call find_groups(body, family, area, 0, groups, error)
+    call own_groups(body, family, area, groups, error, box)
     if (allocated(error)) return
     call stretch_conditions(body, family, materials, groups, mu(1)*area, of_stretch, model)
     call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, model)
@@ -171,11 +197,7 @@ contains
       dilatation%residual = stretch%residual
       stretch%unknowns = n
       dilatation%unknowns = n
-      stretch%least = minval(G(:n))
-      stretch%greatest = maxval(G(:n))
-      dilatation%least = minval(G(n + 1:2*n))
-      dilatation%greatest = maxval(G(n + 1:2*n))
-      call spread_weights(body, groups, G(:n), G(n + 1:2*n), weights)
+      call give_weights(body, groups, G(:n), G(n + 1:2*n), weights, stretch, dilatation, box)
     end associate
   end subroutine weights_and_areas
 
@@ -189,9 +211,8 @@ contains
       & 'the dimension, use more points across, or another correction'
   end function alone_text
 
-  !> Weights for given surface areas. An error is set if no weights fulfil the conditions. Bonds in
-  !> like surroundings have one weight; where that leaves no solution, surroundings are looked at
-  !> farther, and in the end each bond has a weight of its own.
+  !> Weights for given surface areas, shared ones or, if there are none, a weight for each bond. An
+  !> error is set if no weights fulfil the conditions.
   subroutine weights_of_areas(body, family, materials, of_stretch, of_dilatation, uneven, bounds, &
     & weights, stretch, dilatation, error, work, model)
     type(body_type), intent(in) :: body              !! arranged in the slots of the family
@@ -210,61 +231,170 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(long_work_type), intent(inout) :: work      !! says how far the iterations are
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
-    integer, parameter :: farthest = 3
-    integer :: reach
 
-    ! in space a second horizon would give ten times the unknowns for weights hardly nearer to 1
-    reach = merge(1, 2, body%dim == 3)
-    if (uneven) reach = 0
-    do
-      call weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounds, &
-        & uneven, weights, stretch, dilatation, error, work, model)
-      if (reach == 0 .or. .not. allocated(error)) return
-      reach = merge(0, reach + 1, reach == farthest .or. stretch%hopeless .or. dilatation%hopeless)
-    end do
+    if (.not. uneven) then
+      call shared_weights(body, family, materials, of_stretch, of_dilatation, bounds, huge(0), &
+        & weights, stretch, dilatation, error, work, model)
+      if (.not. allocated(error)) return
+    end if
+    call own_weights(body, family, materials, of_stretch, of_dilatation, uneven, bounds, weights, &
+      & stretch, dilatation, error, work, model)
   end subroutine weights_of_areas
 
-  !> Weights where bonds have one weight if all looks alike within `reach` horizons. An error is set
-  !> if none fulfil the conditions.
-  subroutine weights_at_reach(body, family, materials, of_stretch, of_dilatation, reach, bounds, &
-    & uneven, weights, stretch, dilatation, error, work, model)
+  !> Weights of which bonds in like surroundings have one; where that leaves no solution,
+  !> surroundings are looked at farther. An error is set if none fulfil the conditions.
+  subroutine shared_weights(body, family, materials, of_stretch, of_dilatation, bounds, &
+    & most_classes, weights, stretch, dilatation, error, work, model)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)
     real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
-    integer, intent(in) :: reach
     real(wp), intent(in) :: bounds(:)
-    logical, intent(in) :: uneven
+    integer, intent(in) :: most_classes   ! with more, none are looked for
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
     type(long_work_type), intent(inout) :: work
     type(model_type), intent(in), optional :: model
+    integer, parameter :: farthest = 3
     type(groups_type) :: groups
-    type(conditions_type) :: conditions
     real(wp), allocatable :: Gb(:), Gd(:)
     real(wp) :: scale
-    integer :: first
+    integer :: reach
 
     scale = maxval(abs(of_dilatation))
     if (.not. scale > 0.0_wp) scale = 1.0_wp
-    call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
-      & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
+    ! in space a second horizon would give ten times the unknowns for weights hardly nearer to 1
+    do reach = merge(1, 2, body%dim == 3), farthest
+      call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
+        & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
+      if (allocated(error)) return
+      if (groups%n_classes > most_classes) then
+        stretch%hopeless = .true.
+        call fail(error, 'too many kinds of surroundings for shared weights')
+        return
+      end if
+      call weights_of_groups(body, family, materials, of_stretch, of_dilatation, groups, bounds, &
+        & bounds_of_dilatation, Gb, Gd, stretch, dilatation, error, work, model)
+      if (.not. allocated(error)) then
+        call give_weights(body, groups, Gb, Gd, weights, stretch, dilatation)
+        return
+      end if
+      if (stretch%hopeless .or. dilatation%hopeless) return
+    end do
+  end subroutine shared_weights
+
+  !> Weights of which each bond has its own; with a `box`, of bonds near missing cells, others have
+  !> those of the box. An error is set if none fulfil the conditions.
+  subroutine own_weights(body, family, materials, of_stretch, of_dilatation, uneven, bounds, &
+    & weights, stretch, dilatation, error, work, model, box)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)
+    real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
+    logical, intent(in) :: uneven
+    real(wp), intent(in) :: bounds(:)
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch, dilatation
+    type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work
+    type(model_type), intent(in), optional :: model
+    type(box_type), intent(in), optional :: box
+    type(groups_type) :: groups
+    real(wp), allocatable :: Gb(:), Gd(:)
+    integer :: first
+
+    call own_groups(body, family, of_stretch, groups, error, box)
     if (allocated(error)) return
+    first = 1
+    ! near missing cells there are none above -0.1
+    if (present(box)) first = 2
+    ! the bounds on Gd would take ten times as long, or the iterations would not end
+    if (uneven .or. (body%dim == 3 .and. groups%n_classes > most_bounded)) &
+      & first = size(bounds_of_dilatation)
+    call weights_of_groups(body, family, materials, of_stretch, of_dilatation, groups, bounds, &
+      & bounds_of_dilatation(first:), Gb, Gd, stretch, dilatation, error, work, model)
+    if (allocated(error)) return
+    call give_weights(body, groups, Gb, Gd, weights, stretch, dilatation, box)
+  end subroutine own_weights
+
+  !> A group for each bond; with a `box`, for each bond near missing cells.
+  subroutine own_groups(body, family, area, groups, error, box)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    real(wp), intent(in) :: area(:, :)
+    type(groups_type), intent(out) :: groups
+    type(error_type), allocatable, intent(out) :: error
+    type(box_type), intent(in), optional :: box
+
+    if (present(box)) then
+      call find_groups(body, family, area, 0, groups, error, box%near)
+      if (.not. allocated(error)) call take_from_box(box, groups)
+    else
+      call find_groups(body, family, area, 0, groups, error)
+    end if
+  end subroutine own_groups
+
+  !> Give the slots the weights of groups, and those of the box, if there is one.
+  subroutine give_weights(body, groups, Gb, Gd, weights, stretch, dilatation, box)
+    type(body_type), intent(in) :: body
+    type(groups_type), intent(in) :: groups
+    real(wp), intent(in) :: Gb(:), Gd(:)                       ! (groups)
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(inout) :: stretch, dilatation  ! get the least and greatest weights
+    type(box_type), intent(in), optional :: box
+
+    if (present(box)) then
+      call join_weights(box, groups, Gb, Gd, weights)
+    else
+      call spread_weights(body, groups, Gb, Gd, weights)
+    end if
+    stretch%least = minval(weights%Gb)
+    stretch%greatest = maxval(weights%Gb)
+    dilatation%least = minval(weights%Gd)
+    dilatation%greatest = maxval(weights%Gd)
+  end subroutine give_weights
+
+  !> Give the box around a lattice its weights, which are shared; without such it is taken away.
+  subroutine weigh_box(materials, bounds, box, work)
+    type(material_type), intent(in) :: materials(:)     ! all of one stiffness
+    real(wp), intent(in) :: bounds(:)                   ! on Gb
+    type(box_type), allocatable, intent(inout) :: box
+    type(long_work_type), intent(inout) :: work
+    type(solution_type) :: stretch, dilatation
+    type(error_type), allocatable :: error
+    real(wp) :: a(size(materials)), mu(size(materials))
+
+    a = a_of(materials)
+    mu = mu_of(materials, box%body%dim)
+    call shared_weights(box%body, box%family, materials, mu(1)*box%area, a(1)*box%area, bounds, &
+      & huge(0), box%weights, stretch, dilatation, error, work)
+    if (allocated(error)) deallocate (box)
+  end subroutine weigh_box
+
+  !> Gb and Gd of groups. An error is set if none fulfil the conditions.
+  subroutine weights_of_groups(body, family, materials, of_stretch, of_dilatation, groups, &
+    & bounds, bounds_of_Gd, Gb, Gd, stretch, dilatation, error, work, model)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)
+    real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
+    type(groups_type), intent(in) :: groups
+    real(wp), intent(in) :: bounds(:), bounds_of_Gd(:)
+    real(wp), allocatable, intent(out) :: Gb(:), Gd(:)
+    type(solution_type), intent(out) :: stretch, dilatation
+    type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work
+    type(model_type), intent(in), optional :: model
+    type(conditions_type) :: conditions
+
     call stretch_conditions(body, family, materials, groups, of_stretch, conditions, model)
     call solve(conditions, bounds, 'stretch', Gb, stretch, error, work)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions, model)
-    ! the bounds on Gd would take ten times as long, or the iterations would not end
-    first = 1
-    if (uneven .or. (reach == 0 .and. body%dim == 3 .and. groups%n_classes > most_bounded)) &
-      & first = size(bounds_of_dilatation)
-    call solve(conditions, bounds_of_dilatation(first:), 'dilatation', Gd, dilatation, error, &
-      & work)
-    if (allocated(error)) return
-    call spread_weights(body, groups, Gb, Gd, weights)
-  end subroutine weights_at_reach
+    call solve(conditions, bounds_of_Gd, 'dilatation', Gd, dilatation, error, work)
+  end subroutine weights_of_groups
 
   !> The least change within the first of some bounds that allow one.
   subroutine solve(conditions, bounds, what, G, solution, error, work)
@@ -289,8 +419,7 @@ contains
       solution%iterations = solution%iterations + iterations
       if (found .or. solution%hopeless) exit
     end do
-    solution%least = minval(G)
-    solution%greatest = maxval(G)
+    if (allocated(conditions%base)) G = G + conditions%base - 1
     if (found) return
     if (solution%residual < 1.0_wp) then
       why = 'uniform strains would leave forces of '//to_text(solution%residual, 2)// &
