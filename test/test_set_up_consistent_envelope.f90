@@ -86,7 +86,8 @@ contains
   subroutine test_definite(error)
     type(error_type), allocatable, intent(out) :: error
     type(envelope_type) :: envelope
-    real(wp) :: matrix(nodes*components, nodes*components), c(components, nodes), x(nodes*components)
+    real(wp) :: matrix(nodes*components, nodes*components), c(components, nodes)
+    real(wp) :: x(nodes*components)
     logical :: singular
     integer :: i
 

@@ -33,6 +33,8 @@ module pd_set_up_consistent_conditions
     integer :: classes = 0
     integer :: unknowns = 0
     integer(i8), allocatable :: start(:)    !! (classes + 1) first bond of each class
+    integer(i8), allocatable :: last(:, :)  !! (2, classes) last bond of each class whose unknown is
+                                            !! a Gb, and last one where it is a Gd
     integer(i4), allocatable :: unknown(:)  !! of each bond
     real(wp), allocatable :: n(:, :)        !! (bonds, dim) unit vectors
     real(wp), allocatable :: factor(:, :)
@@ -339,12 +341,22 @@ contains
     end if
   end function kind_of
 
-  !> Note the bonds of each unknown.
+  !> Note the bonds of each unknown, and the kinds of unknowns of each class.
   subroutine turn(conditions)
     type(conditions_type), intent(inout) :: conditions
     integer(i8), allocatable :: next(:)
     integer(i8) :: e
-    integer :: c, u
+    integer :: c, u, kind
+
+    allocate (conditions%last(2, conditions%classes))
+    do c = 1, conditions%classes
+      conditions%last(:, c) = conditions%start(c) - 1
+      ! the unknowns of one kind have numbers above those of the kind before
+      do e = conditions%start(c), conditions%start(c + 1) - 1
+        kind = kind_of(conditions, int(conditions%unknown(e)))
+        if (kind /= of_area) conditions%last(kind:, c) = e
+      end do
+    end do
 
     allocate (conditions%first(conditions%unknowns + 1), source=0_i8)
     allocate (conditions%bond(size(conditions%unknown)), conditions%class(size(conditions%unknown)))

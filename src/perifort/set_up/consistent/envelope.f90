@@ -8,8 +8,8 @@ module pd_set_up_consistent_envelope
   use pd_base_kinds, only: wp, i8
   implicit none (type, external)
   private
-  public :: envelope_type, new_envelope, work_of_envelope, add_product, factorize_envelope, &
-    & solve_envelope
+  public :: envelope_type, new_envelope, work_of_envelope, add_product, add_block, move_to, &
+    & factorize_envelope, solve_envelope
 
   type :: envelope_type
     integer :: components = 0              !! rows of a block
@@ -25,6 +25,7 @@ module pd_set_up_consistent_envelope
 
   !> A smaller pivot is of a row that follows from those before: a rounding error.
   real(wp), parameter :: follows = 1.0e-10_wp
+  character(*), parameter :: outside = 'an element outside of an envelope'
 
 contains
 
@@ -81,7 +82,7 @@ contains
         column = envelope%components*(envelope%place(nodes(b)) - 1)
         do c = low, high
           row = envelope%components*(envelope%place(nodes(a)) - 1) + c
-          if (column + 1 < envelope%first(row)) call internal_fault('an element outside an envelope')
+          if (column + 1 < envelope%first(row)) call internal_fault(outside)
           last = merge(c, high, a == b)
           associate (at => envelope%before(row) + column)
             envelope%element(at + low:at + last) = envelope%element(at + low:at + last) &
@@ -91,6 +92,64 @@ contains
       end do
     end do
   end subroutine add_product
+
+  !> Add a matrix of nodes, each of its elements times the product of a pattern with its transpose.
+  subroutine add_block(nodes, block, pattern, low, high, envelope)
+    integer, intent(in) :: nodes(:)       !! nodes of the block's rows
+    real(wp), intent(in) :: block(:, :)   !! (nodes, nodes) symmetric
+    real(wp), intent(in) :: pattern(:)    !! (components)
+    integer, intent(in) :: low, high      !! first and last component that is not zero
+    type(envelope_type), intent(inout) :: envelope  !! not yet factorized
+    integer :: a, b
+
+    do a = 1, size(nodes)
+      do b = 1, size(nodes)
+        associate (p => envelope%place(nodes(a)), q => envelope%place(nodes(b)))
+          if (q <= p) call add_patterns(p, q, block(b, a), pattern, low, high, envelope)
+        end associate
+      end do
+    end do
+  end subroutine add_block
+
+  !> Add a matrix with one component for each node in the same way, and make it zero.
+  subroutine move_to(of_nodes, pattern, low, high, envelope)
+    type(envelope_type), intent(inout) :: of_nodes  !! of the same nodes in the same order
+    real(wp), intent(in) :: pattern(:)              !! (components)
+    integer, intent(in) :: low, high                !! first and last component that is not zero
+    type(envelope_type), intent(inout) :: envelope  !! not yet factorized
+    integer :: p, q
+
+    do p = 1, size(of_nodes%place)
+      do q = of_nodes%first(p), p
+        associate (value => of_nodes%element(of_nodes%before(p) + q))
+          if (.not. abs(value) > 0.0_wp) cycle
+          call add_patterns(p, q, value, pattern, low, high, envelope)
+          value = 0.0_wp
+        end associate
+      end do
+    end do
+  end subroutine move_to
+
+  !> Add to the elements of two places.
+  subroutine add_patterns(p, q, value, pattern, low, high, envelope)
+    integer, intent(in) :: p, q            ! places, the second not above the first
+    real(wp), intent(in) :: value, pattern(:)
+    integer, intent(in) :: low, high
+    type(envelope_type), intent(inout) :: envelope
+    integer :: c, last, row
+
+    do c = low, high
+      row = envelope%components*(p - 1) + c
+      last = merge(c, high, p == q)
+      associate (column => envelope%components*(q - 1))
+        if (column + 1 < envelope%first(row)) call internal_fault(outside)
+        associate (at => envelope%before(row) + column, part => value*pattern(c))
+          envelope%element(at + low:at + last) = envelope%element(at + low:at + last) &
+            & + part*pattern(low:last)
+        end associate
+      end associate
+    end do
+  end subroutine add_patterns
 
   !> Replace the matrix by its factor.
   subroutine factorize_envelope(envelope)

@@ -15,7 +15,7 @@ module pd_set_up_consistent_least_change
   use pd_set_up_consistent_products, only: block_of, spread_over, sums_of
   implicit none (type, external)
   private
-  public :: least_change, unbounded
+  public :: least_change, unbounded, most_iterations
 
   real(wp), parameter :: unbounded = -1.0e30_wp  !! the bound that is none
   real(wp), parameter :: tolerance = 1.0e-12_wp     !! of the conditions [-]
@@ -30,7 +30,7 @@ module pd_set_up_consistent_least_change
   real(wp), parameter :: stays = 0.7_wp  !! part of the error that a step in vain leaves
   integer, parameter :: in_vain = 2      !! steps in vain after which there is no solution
   integer, parameter :: idle = 30        !! iterations of a step that do not lower the error
-  integer, parameter :: most_iterations = 5000      !! of a step without weights at the bound
+  integer, parameter :: most_iterations = 5000      !! of a step where weights at the bound stay
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
   integer, parameter :: across = 40                 !! points across that these are enough for
@@ -43,10 +43,13 @@ contains
   !> Weights G (unknowns). `found`: they fulfil the conditions to 1e-12 (1e-10 if rounding leaves
   !> that), or where each bond has a weight of its own to 1e-10; otherwise no weights above the
   !> bound do, or none were found.
-  subroutine least_change(conditions, low, G, residual, iterations, found, hopeless, work)
+  subroutine least_change(conditions, low, most_shared, G, residual, iterations, found, hopeless, &
+    & work)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: low
       !! smallest allowed weight, or `unbounded`; of Gb alone where it is found with Gd [-]
+    integer, intent(in) :: most_shared
+      !! iterations of the first step after which weights that bonds share are given up
     real(wp), allocatable, intent(out) :: G(:)
       !! (unknowns) weights, counted from their base where they have one [-]
     real(wp), intent(out) :: residual            !! largest error of a condition [-]
@@ -56,16 +59,17 @@ contains
       !! bonds share weights, and with any bound the iterations would not converge
     type(long_work_type), intent(inout) :: work  !! says how far the iterations are
     real(wp), allocatable :: step(:, :), r(:, :), t(:), change(:), tried(:), lows(:), of_one(:, :)
+    real(wp), allocatable :: given(:)
     logical, allocatable :: free(:)
     logical :: settled
     type(level_type), allocatable :: levels(:)
     real(wp) :: value, before, slope, along, linear, length, history(most_newton), allowed, part
-    integer :: newton, halving, vain
+    integer :: newton, halving, vain, most
 
     associate (rows => conditions%rows, classes => conditions%classes, n => conditions%unknowns)
       allocate (r(rows, classes), step(rows, classes), of_one(rows, classes), source=0.0_wp)
       allocate (t(n), change(n), source=0.0_wp)
-      allocate (G(n))
+      allocate (G(n), given(size(conditions%unknown, kind=i8)))
       allocate (free(n), source=.true.)
       allocate (lows(n), source=low)
       if (allocated(conditions%base)) lows = lows - (conditions%base - 1)
@@ -98,10 +102,13 @@ contains
       call set_free(t + 1 > lows, free, settled)
       part = part_of_step
       if (low > unbounded) part = max(part, min(most_of_step, residual))
-      call solve(conditions, levels, free, settled, part, r, step, iterations, work)
+      most = most_iterations
+      if (.not. settled) most = nint(most_bounded*wider(conditions))
+      if (.not. conditions%alone .and. newton == 1) most = most_shared
+      call solve(conditions, levels, free, settled, part, most, r, given, step, iterations, work)
       ! multipliers of long waves are large, and what they give a bond is small: so the changes of
       ! weights are summed, and each step can mend what rounding leaves of the one before
-      call spread_over(conditions, spread(.true., 1, size(free)), step, change)
+      call spread_over(conditions, spread(.true., 1, size(free)), step, given, change)
       slope = sum(r*step)
       along = sum((conditions%right - of_one)*step)
       length = 1.0_wp
@@ -114,7 +121,7 @@ contains
         length = length/2
       end do
       if (.not. conditions%alone .and. newton == 1) then
-        hopeless = iterations == most_iterations .and. maxval(abs(r)) > far
+        hopeless = iterations >= most_shared .and. maxval(abs(r)) > far
         if (hopeless) return
       end if
       ! nearly the same weights stay at the bound, and so does the error
@@ -170,20 +177,22 @@ contains
 
   !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
   !> and r in its range but for what the bound cuts off.
-  subroutine solve(conditions, levels, free, settled, part, r, step, iterations, work)
+  subroutine solve(conditions, levels, free, settled, part, most, r, given, step, iterations, work)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: levels(:)
     logical, intent(in) :: free(:)
     logical, intent(in) :: settled  ! `free` hardly changes any more
-    real(wp), intent(in) :: part  ! of the error that may be left where there are grids
+    real(wp), intent(in) :: part    ! of the error that may be left where there are grids
+    integer, intent(in) :: most     ! iterations
     real(wp), intent(in) :: r(:, :)
+    real(wp), intent(inout) :: given(:)  ! (bonds) room
     real(wp), intent(inout) :: step(:, :)
     integer, intent(inout) :: iterations
     type(long_work_type), intent(inout) :: work
     real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
     real(wp), allocatable :: best(:, :)
     real(wp) :: rho, rho_before, alpha, beta, curvature, target, error, least
-    integer :: c, i, most, at
+    integer :: c, i, at
 
     call factorize(conditions, free, factor)
     allocate (rest, source=r)
@@ -198,8 +207,6 @@ contains
     if (size(levels) > 0) target = max(0.3_wp*uneven, part*maxval(abs(r)))
     least = huge(1.0_wp)
     at = 0
-    most = most_iterations
-    if (.not. settled) most = nint(most_bounded*wider(conditions))
     do i = 1, most
       call precondition(factor, rest, w)
       call add_levels(conditions, levels, rest, w)
@@ -210,7 +217,7 @@ contains
       do c = 1, size(p, 2)
         p(:, c) = w(:, c) + beta*p(:, c)
       end do
-      call spread_over(conditions, free, p, y)
+      call spread_over(conditions, free, p, given, y)
       call sums_of(conditions, y, product)
       curvature = product_of(p, product)
       if (.not. curvature > 0.0_wp) exit

@@ -11,12 +11,14 @@
 !> since areas that change join them.
 module pd_set_up_consistent_levels
   use pd_base_kinds, only: wp, i4, i8
+  use pd_base_lookup, only: lookup_type, mix
+  use pd_base_order, only: ascending_order
   use pd_set_up_consistent_conditions, only: area_products, conditions_type, kind_of, of_area, &
     & of_dilatation, of_stretches, triple_products
-  use pd_set_up_consistent_envelope, only: add_product, envelope_type, factorize_envelope, &
-    & new_envelope, solve_envelope, work_of_envelope
+  use pd_set_up_consistent_envelope, only: add_block, add_product, envelope_type, &
+    & factorize_envelope, move_to, new_envelope, solve_envelope, work_of_envelope
   use pd_set_up_consistent_splines, only: find_children, forget_points, grid_type, order_splines, &
-    & place_points, shares, spline_at, splines_at
+    & place_points, shares, splines_at
   implicit none (type, external)
   private
   public :: level_type, new_levels, add_levels
@@ -28,6 +30,7 @@ module pd_set_up_consistent_levels
   !> point.
   real(wp), parameter :: most_work = 3.0e8_wp, work_of_point = 1.0e5_wp
   integer, parameter :: bonds_of_row = 60      !! that the matrix is made of, for each of its rows
+  integer, parameter :: bonds_of_spline = 200  !! that a diagonal is made of, for each spline
   integer, parameter :: last_of_all(3) = [4, 16, 36]  !! splines that its factor takes last: a few
                                                       !! more than fields without effect need
   real(wp), parameter :: golden = 0.6180339887498949_wp
@@ -75,9 +78,7 @@ contains
         widest = all(cells == 1) .or. work_of_envelope(lowest, level%components) <= most_work &
           & + work_of_point*conditions%classes
         if (widest) then
-          allocate (level%factor)
-          call new_envelope(place, lowest, last, level%components, level%factor)
-          call factorize(conditions, level)
+          call factorize(conditions, level, place, lowest, last)
         else
           call find_diagonal(conditions, level)
         end if
@@ -158,56 +159,85 @@ contains
     end associate
   end subroutine pattern_of
 
-  !> The diagonal of a grid's matrix.
+  !> What splines give an unknown: those that reach its points, and their shares.
+  subroutine reach_of(conditions, level, u, met, n, share, at)
+    type(conditions_type), intent(in) :: conditions
+    type(level_type), intent(in) :: level   ! with its points
+    integer, intent(in) :: u                ! unknown
+    integer, intent(out) :: met(:)          ! (n) splines
+    integer, intent(out) :: n
+    real(wp), intent(out) :: share(:, :)    ! (2, n) as components of z, and of w
+    integer, intent(inout) :: at(:)         ! (splines) 0, before and after
+    real(wp) :: value(64), gradient(64, 3)
+    integer(i8) :: i
+    integer :: k, m, s
+
+    n = 0
+    do i = conditions%first(u), conditions%first(u + 1) - 1
+      k = int(conditions%class(conditions%bond(i)))
+      call splines_at(level%grid_type, k, value, gradient)
+      do m = 1, 4**level%dim
+        s = int(level%spline(m, level%cell(k)))
+        if (at(s) == 0) then
+          n = n + 1
+          met(n) = s
+          share(:, n) = 0.0_wp
+          at(s) = n
+        end if
+        share(:, at(s)) = share(:, at(s)) + shares_of(conditions, k, conditions%bond(i), value(m), &
+          & gradient(m, :level%dim))
+      end do
+    end do
+    at(met(:n)) = 0
+  end subroutine reach_of
+
+  !> Whether an unknown is one of those that stand for all of their kind. Multiples of the golden
+  !> section are spread evenly, and with them the directions of bonds.
+  elemental logical function stands_for_others(u, part)
+    integer, intent(in) :: u      ! unknown
+    real(wp), intent(in) :: part  ! of all that are wanted
+    stands_for_others = modulo(u*golden, 1.0_wp) <= part
+  end function stands_for_others
+
+  !> The parts of the unknowns of each kind that so many of a kind are; all areas.
+  pure function parts_of(conditions, needed) result(parts)
+    type(conditions_type), intent(in) :: conditions
+    real(wp), intent(in) :: needed
+    real(wp) :: parts(of_stretches:of_area)
+
+    parts(of_stretches) = min(1.0_wp, needed/max(1, conditions%stretches))
+    parts(of_dilatation) = min(1.0_wp, needed/max(1, conditions%dilatations))
+    parts(of_area) = 1.0_wp
+  end function parts_of
+
+  !> The diagonal of a grid's matrix, from as many bonds as it needs.
   subroutine find_diagonal(conditions, level)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(inout) :: level
-    real(wp), allocatable :: share(:, :), diagonal(:), pattern(:)
-    integer(i4), allocatable :: seen(:), met(:)
-    real(wp) :: value, gradient(level%dim), part(2)
-    integer(i8) :: e
-    integer :: s, i, p, k, u, n, z
+    real(wp) :: pattern(level%components), parts(of_stretches:of_area), share(2, 128)
+    integer :: met(128), u, n, m, z
+    integer, allocatable :: at(:)
 
-    allocate (level%inverse(level%components, size(level%first) - 1))
     z = level%of_z
-    !$omp parallel default(none) shared(conditions, level, z) &
-    !$omp private(share, diagonal, pattern, seen, met, value, gradient, part, e, s, i, p, k, u, n)
-    allocate (share(2, conditions%unknowns), met(conditions%unknowns))
-    allocate (seen(conditions%unknowns), source=0_i4)
-    allocate (diagonal(level%components), pattern(level%components))
-    !$omp do schedule(dynamic, 8)
-    do s = 1, size(level%first) - 1
-      n = 0
-      do i = level%first(s), level%first(s + 1) - 1
-        associate (cell => level%under(1, i))
-          do p = level%start(cell), level%start(cell + 1) - 1
-            k = int(level%order(p))
-            call spline_at(level%grid_type, int(level%under(2, i)), k, value, gradient)
-            do e = conditions%start(k), conditions%start(k + 1) - 1
-              u = int(conditions%unknown(e))
-              part = shares_of(conditions, k, e, value, gradient)
-              if (seen(u) == s) then
-                share(:, u) = share(:, u) + part
-              else
-                seen(u) = int(s, i4)
-                share(:, u) = part
-                n = n + 1
-                met(n) = int(u, i4)
-              end if
-            end do
-          end do
+    associate (splines => size(level%first) - 1)
+      allocate (level%inverse(level%components, splines), source=0.0_wp)
+      allocate (at(splines), source=0)
+      parts = parts_of(conditions, real(bonds_of_spline, wp)*splines)
+    end associate
+    do u = 1, conditions%unknowns
+      associate (part => parts(kind_of(conditions, u)))
+        if (.not. stands_for_others(u, part)) cycle
+        call pattern_of(conditions, z, u, pattern)
+        pattern = pattern**2/part
+      end associate
+      call reach_of(conditions, level, u, met, n, share, at)
+      do m = 1, n
+        associate (diagonal => level%inverse(:, met(m)))
+          diagonal(:z) = diagonal(:z) + share(1, m)**2*pattern(:z)
+          diagonal(z + 1:) = diagonal(z + 1:) + share(2, m)**2*pattern(z + 1:)
         end associate
       end do
-      diagonal = 0.0_wp
-      do i = 1, n
-        u = int(met(i))
-        call pattern_of(conditions, z, u, pattern)
-        diagonal(:z) = diagonal(:z) + (share(1, u)*pattern(:z))**2
-        diagonal(z + 1:) = diagonal(z + 1:) + (share(2, u)*pattern(z + 1:))**2
-      end do
-      level%inverse(:, s) = diagonal
     end do
-    !$omp end parallel
     call invert(level%inverse(:z, :))
     call invert(level%inverse(z + 1:, :))
 
@@ -220,56 +250,102 @@ contains
 
   end subroutine find_diagonal
 
-  !> Cholesky's factor of the matrix of the widest grid, from as many bonds as its splines need.
-  subroutine factorize(conditions, level)
+  !> Cholesky's factor of the matrix of the widest grid, from as many bonds as it needs. Bonds of
+  !> one direction have one pattern: what they give splines is summed first, cell by cell.
+  subroutine factorize(conditions, level, place, lowest, last)
     type(conditions_type), intent(in) :: conditions
-    type(level_type), intent(inout) :: level
-    real(wp) :: value(64), gradient(64, 3), pattern(level%components), parts(of_stretches:of_area)
-    real(wp), allocatable :: vector(:, :)
-    real(wp) :: needed, share(2)
-    integer, allocatable :: at(:)
-    integer(i8) :: i, e
-    integer :: met(128), n_met, u, m, k, s, z, low, high
+    type(level_type), intent(inout) :: level  ! gets its factor
+    integer, intent(in) :: place(:), lowest(:), last  ! as in `new_envelope`
+    type(envelope_type) :: of_direction
+    real(wp) :: pattern(level%components), parts(of_stretches:of_area), share(2, 128)
+    real(wp) :: block(128, 128), vector(level%components, 128)
+    integer, allocatable :: at(:), chosen(:), order(:), direction(:)
+    integer(i8), allocatable :: cells(:)
+    integer :: met(128), n, i, u, m, z, low, high, which
 
     z = level%of_z
-    needed = real(bonds_of_row, wp)*size(level%factor%first)
-    parts = 1.0_wp
-    if (conditions%stretches > needed) parts(of_stretches) = needed/conditions%stretches
-    if (conditions%dilatations > needed) parts(of_dilatation) = needed/conditions%dilatations
-    allocate (at(size(level%first) - 1), source=0)
-    allocate (vector(level%components, size(met)))
-    do u = 1, conditions%unknowns
-      associate (part => parts(kind_of(conditions, u)))
-        ! multiples of this are spread evenly, and with them the directions of bonds
-        if (modulo(u*golden, 1.0_wp) > part) cycle
+    allocate (level%factor)
+    call new_envelope(place, lowest, last, level%components, level%factor)
+    call new_envelope(place, lowest, last, 1, of_direction)
+    allocate (at(size(place)), source=0)
+    parts = parts_of(conditions, real(bonds_of_row, wp)*level%components*size(place))
+    associate (bonds => conditions%stretches + conditions%dilatations)
+      chosen = pack([(u, u=1, bonds)], stands_for_others([(u, u=1, bonds)], &
+        & merge(parts(of_stretches), parts(of_dilatation), [(u, u=1, bonds)] &
+        & <= conditions%stretches)))
+      do u = bonds + 1, conditions%unknowns
         call pattern_of(conditions, z, u, pattern)
-        pattern = pattern/sqrt(part)
-      end associate
-      n_met = 0
-      do i = conditions%first(u), conditions%first(u + 1) - 1
-        e = conditions%bond(i)
-        k = int(conditions%class(e))
-        call splines_at(level%grid_type, k, value, gradient)
-        do m = 1, 4**level%dim
-          s = int(level%spline(m, level%cell(k)))
-          if (at(s) == 0) then
-            n_met = n_met + 1
-            met(n_met) = s
-            vector(:, n_met) = 0.0_wp
-            at(s) = n_met
-          end if
-          share = shares_of(conditions, k, e, value(m), gradient(m, :level%dim))
-          vector(:z, at(s)) = vector(:z, at(s)) + share(1)*pattern(:z)
-          vector(z + 1:, at(s)) = vector(z + 1:, at(s)) + share(2)*pattern(z + 1:)
+        call reach_of(conditions, level, u, met, n, share, at)
+        do m = 1, n
+          vector(:z, m) = share(1, m)*pattern(:z)
+          vector(z + 1:, m) = share(2, m)*pattern(z + 1:)
         end do
+        call add_product(met(:n), vector(:, :n), 1, level%components, level%factor)
       end do
-      low = merge(z + 1, 1, kind_of(conditions, u) == of_dilatation)
-      high = merge(z, level%components, kind_of(conditions, u) == of_stretches)
-      call add_product(met(:n_met), vector(:, :n_met), low, high, level%factor)
-      at(met(:n_met)) = 0
+    end associate
+    call sort_by_direction(conditions, level, chosen, order, direction, cells)
+    block = 0.0_wp
+    do i = 1, size(order)
+      u = chosen(order(i))
+      which = merge(1, 2, kind_of(conditions, u) == of_stretches)
+      call reach_of(conditions, level, u, met, n, share, at)
+      do m = 1, n
+        block(:n, m) = block(:n, m) + share(which, m)*share(which, :n)
+      end do
+      if (i < size(order)) then
+        if (cells(order(i)) == cells(order(i + 1))) cycle
+      end if
+      ! the last one of these cells
+      call pattern_of(conditions, z, u, pattern)
+      pattern = pattern/sqrt(parts(kind_of(conditions, u)))
+      low = merge(1, z + 1, which == 1)
+      high = merge(z, level%components, which == 1)
+      call add_block(met(:n), block(:n, :n), [1.0_wp], 1, 1, of_direction)
+      block(:n, :n) = 0.0_wp
+      if (i < size(order)) then
+        if (direction(order(i)) == direction(order(i + 1))) cycle
+      end if
+      call move_to(of_direction, pattern, low, high, level%factor)
     end do
     call factorize_envelope(level%factor)
   end subroutine factorize
+
+  !> Sort bonds by their directions and the cells of their points.
+  subroutine sort_by_direction(conditions, level, chosen, order, direction, cells)
+    type(conditions_type), intent(in) :: conditions
+    type(level_type), intent(in) :: level
+    integer, intent(in) :: chosen(:)                    ! unknowns that are of bonds
+    integer, allocatable, intent(out) :: order(:)       ! (chosen) sorted
+    integer, allocatable, intent(out) :: direction(:)   ! (chosen) number of each
+    integer(i8), allocatable, intent(out) :: cells(:)   ! (chosen) number of direction and cells
+    real(wp), parameter :: parts = 2.0_wp**26   ! of a component that is 1
+    type(lookup_type) :: directions
+    integer(i8) :: key, n(conditions%dim)
+    integer :: i, u, number
+    logical :: is_new
+
+    allocate (direction(size(chosen)), cells(size(chosen)))
+    do i = 1, size(chosen)
+      u = chosen(i)
+      associate (first => conditions%first(u), count => int(size(level%start) - 1, i8))
+        n = nint(parts*conditions%n(conditions%bond(first), :), i8)
+        ! a direction and the opposite one are one
+        if (any(n /= 0_i8)) then
+          if (n(findloc(n /= 0_i8, .true., dim=1)) < 0_i8) n = -n
+        end if
+        key = int(kind_of(conditions, u), i8)
+        do number = 1, size(n)
+          key = mix(key, n(number))
+        end do
+        if (key == 0_i8) key = 1_i8
+        call directions%number_of(key, number, is_new)
+        direction(i) = number
+        cells(i) = (number*count + level%cell(conditions%class(conditions%bond(first))))*count &
+          & + level%cell(conditions%class(conditions%bond(first + 1)))
+      end associate
+    end do
+    order = ascending_order(cells)
+  end subroutine sort_by_direction
 
   !> Add to `w` what the grids give for the residual `r`.
   subroutine add_levels(conditions, levels, r, w)

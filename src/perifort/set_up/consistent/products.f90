@@ -3,8 +3,7 @@
 !> so that a processor takes eight at a time.
 module pd_set_up_consistent_products
   use pd_base_kinds, only: wp, i8
-  use pd_set_up_consistent_conditions, only: coefficients, conditions_type, kind_of, most_rows, &
-    & of_dilatation, of_stretches
+  use pd_set_up_consistent_conditions, only: coefficients, conditions_type, most_rows
   implicit none (type, external)
   private
   public :: sums_of, spread_over, block_of
@@ -20,70 +19,68 @@ contains
     real(wp), intent(inout) :: sums(:, :)  !! (rows, classes) set [-]
     real(wp) :: values(most_rows), of_bonds(most_run)
     integer(i8) :: e, last
-    integer :: c, i, kind, low, high
+    integer :: c, i, low, high
 
     !$omp parallel do schedule(dynamic, 64) default(none) shared(conditions, y, sums) &
-    !$omp private(values, of_bonds, e, last, c, i, kind, low, high)
+    !$omp private(values, of_bonds, e, last, c, i, low, high)
     do c = 1, conditions%classes
       sums(:, c) = 0.0_wp
-      e = conditions%start(c)
-      do while (e < conditions%start(c + 1))
-        call end_of_run(conditions, c, e, kind, last)
+      do e = conditions%start(c), conditions%last(1, c), most_run
+        last = min(e + most_run - 1, conditions%last(1, c))
         do i = 1, int(last - e) + 1
           of_bonds(i) = y(conditions%unknown(e + i - 1))
         end do
-        select case (kind)
-        case (of_stretches)
-          call sum_stretches(conditions%n(e:last, :), conditions%factor(e:last, 1), of_bonds, &
-            & sums(:conditions%before, c))
-        case (of_dilatation)
-          call sum_dilatations(conditions%n(e:last, :), conditions%factor(e:last, :), of_bonds, &
-            & sums(conditions%before + 1:, c))
-        case default
-          ! a component of an area
-          call coefficients(conditions, e, values, low, high)
-          sums(low:high, c) = sums(low:high, c) + of_bonds(1)*values(low:high)
-        end select
-        e = last + 1
+        call sum_stretches(conditions%n(e:last, :), conditions%factor(e:last, 1), of_bonds, &
+          & sums(:conditions%before, c))
+      end do
+      do e = conditions%last(1, c) + 1, conditions%last(2, c), most_run
+        last = min(e + most_run - 1, conditions%last(2, c))
+        do i = 1, int(last - e) + 1
+          of_bonds(i) = y(conditions%unknown(e + i - 1))
+        end do
+        call sum_dilatations(conditions%n(e:last, :), conditions%factor(e:last, :), of_bonds, &
+          & sums(conditions%before + 1:, c))
+      end do
+      ! components of areas
+      do e = conditions%last(2, c) + 1, conditions%start(c + 1) - 1
+        call coefficients(conditions, e, values, low, high)
+        sums(low:high, c) = sums(low:high, c) + y(conditions%unknown(e))*values(low:high)
       end do
     end do
   end subroutine sums_of
 
   !> The transposed product: what multipliers of the conditions give each unknown.
-  subroutine spread_over(conditions, free, multipliers, y)
+  subroutine spread_over(conditions, free, multipliers, given, y)
     type(conditions_type), intent(in) :: conditions
     logical, intent(in) :: free(:)             !! (unknowns) others get 0
     real(wp), intent(in) :: multipliers(:, :)  !! (rows, classes) [-]
+    real(wp), intent(inout) :: given(:)        !! (bonds) room for what each bond gets
     real(wp), intent(inout) :: y(:)            !! (unknowns) set [-]
-    real(wp), allocatable :: given(:)
     real(wp) :: values(most_rows), sum
     integer(i8) :: e, last, i
-    integer :: c, u, kind, low, high, pairs
+    integer :: c, u, low, high, pairs
 
-    allocate (given(size(conditions%unknown, kind=i8)))
     ! where each unknown is of one bond, its two ends follow each other
     pairs = merge(conditions%stretches + conditions%dilatations, 0, conditions%alone)
     !$omp parallel default(none) shared(conditions, free, multipliers, y, given, pairs) &
-    !$omp private(values, sum, e, last, i, c, u, kind, low, high)
+    !$omp private(values, sum, e, last, i, c, u, low, high)
     ! what the multipliers of a class give its bonds, class by class; then the sum of each unknown
     !$omp do schedule(dynamic, 64)
     do c = 1, conditions%classes
-      e = conditions%start(c)
-      do while (e < conditions%start(c + 1))
-        call end_of_run(conditions, c, e, kind, last)
-        select case (kind)
-        case (of_stretches)
-          call spread_stretches(conditions%n(e:last, :), conditions%factor(e:last, 1), &
-            & multipliers(:conditions%before, c), given(e:last))
-        case (of_dilatation)
-          call spread_dilatations(conditions%n(e:last, :), conditions%factor(e:last, :), &
-            & multipliers(conditions%before + 1:, c), given(e:last))
-        case default
-          ! a component of an area
-          call coefficients(conditions, e, values, low, high)
-          given(e) = dot_product(values(low:high), multipliers(low:high, c))
-        end select
-        e = last + 1
+      do e = conditions%start(c), conditions%last(1, c), most_run
+        last = min(e + most_run - 1, conditions%last(1, c))
+        call spread_stretches(conditions%n(e:last, :), conditions%factor(e:last, 1), &
+          & multipliers(:conditions%before, c), given(e:last))
+      end do
+      do e = conditions%last(1, c) + 1, conditions%last(2, c), most_run
+        last = min(e + most_run - 1, conditions%last(2, c))
+        call spread_dilatations(conditions%n(e:last, :), conditions%factor(e:last, :), &
+          & multipliers(conditions%before + 1:, c), given(e:last))
+      end do
+      ! components of areas
+      do e = conditions%last(2, c) + 1, conditions%start(c + 1) - 1
+        call coefficients(conditions, e, values, low, high)
+        given(e) = dot_product(values(low:high), multipliers(low:high, c))
       end do
     end do
     !$omp do schedule(static)
@@ -100,25 +97,6 @@ contains
     end do
     !$omp end parallel
   end subroutine spread_over
-
-  !> The last one of the bonds that follow bond `e` in class `c` and are of its kind, `most_run` of
-  !> them at most; an area stands alone.
-  pure subroutine end_of_run(conditions, c, e, kind, last)
-    type(conditions_type), intent(in) :: conditions
-    integer, intent(in) :: c
-    integer(i8), intent(in) :: e
-    integer, intent(out) :: kind
-    integer(i8), intent(out) :: last
-
-    kind = kind_of(conditions, int(conditions%unknown(e)))
-    last = e
-    if (kind /= of_stretches .and. kind /= of_dilatation) return
-    last = min(e + most_run, conditions%start(c + 1)) - 1
-    ! the unknowns of one kind have numbers above those of the kind before
-    do while (kind_of(conditions, int(conditions%unknown(last))) /= kind)
-      last = last - 1
-    end do
-  end subroutine end_of_run
 
   !> Add the rows of the stretch for values of Gb.
   pure subroutine sum_stretches(n, factor, y, sums)

@@ -5,7 +5,7 @@ module pd_set_up_consistent_splines
   implicit none (type, external)
   private
   public :: grid_type, place_points, find_children, order_splines, forget_points, splines_at, &
-    & spline_at, shares
+    & shares
 
   !> A grid. A point sees four splines along each axis. Cells without points are left out, and
   !> splines that reach none. Two cells of a grid fit in one of the next along each axis, so that a
@@ -283,28 +283,6 @@ contains
       end do
     end associate
   end subroutine splines_at
-
-  !> Spline `m` of those that reach point k, and its gradient.
-  pure subroutine spline_at(grid, m, k, value, gradient)
-    type(grid_type), intent(in) :: grid        !! with its points
-    integer, intent(in) :: m                  !! from 1, x fastest
-    integer, intent(in) :: k                  !! point
-    real(wp), intent(out) :: value            !! [-]
-    real(wp), intent(out) :: gradient(:)      !! (dim) [1/m]
-    integer :: d, i, offset(grid%dim)
-
-    offset = offset_of(m, grid%dim)
-    value = 1.0_wp
-    gradient = 1.0_wp
-    do d = 1, grid%dim
-      associate (v => grid%value(offset(d) + 1, d, k), s => grid%slope(offset(d) + 1, d, k))
-        value = value*v
-        do i = 1, grid%dim
-          gradient(i) = gradient(i)*merge(s, v, i == d)
-        end do
-      end associate
-    end do
-  end subroutine spline_at
 
   !> What a spline has of each of its children.
   pure function shares(dim) result(share)

@@ -17,7 +17,7 @@ module pd_set_up_consistent_weights
   use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
     & join_conditions, stretch_conditions
   use pd_set_up_consistent_groups, only: find_groups, groups_type, spread_weights
-  use pd_set_up_consistent_least_change, only: least_change, unbounded
+  use pd_set_up_consistent_least_change, only: least_change, most_iterations, unbounded
   implicit none (type, external)
   private
   public :: consistent_weights, weights_of_areas, solution_type, alone_text
@@ -42,6 +42,11 @@ module pd_set_up_consistent_weights
   !> Of Gd there are none above 0 in the plane either, and those that are not negative are far from
   !> 1.
   real(wp), parameter :: bounds_of_dilatation(*) = [-0.1_wp, -0.5_wp, -2.0_wp, unbounded]
+  !> Iterations after which shared weights are given up where only bonds near missing cells may have
+  !> their own instead.
+  integer, parameter :: few_iterations = 2000
+  !> Points near missing cells, over classes of points, from which on shared weights are tried.
+  integer, parameter :: points_of_class = 8
   !> Points in space, each with weights of its own, up to which Gd has bounds: most weights are at
   !> them.
   integer, parameter :: most_bounded = 8000
@@ -68,17 +73,14 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(long_work_type), intent(inout) :: work      !! says how far the iterations are
     type(model_type), intent(in), optional :: model  !! where points have horizons of their own
-    real(wp), allocatable :: area(:, :), changed(:, :), of_stretch(:, :), of_dilatation(:, :)
-    real(wp), allocatable :: bounds(:)
+    real(wp), allocatable :: area(:, :), of_stretch(:, :), of_dilatation(:, :), bounds(:)
     real(wp) :: a(size(materials)), mu(size(materials)), face(body%n_slots)
-    type(box_type), allocatable :: box
-    integer :: alone, least, positive, most
-    logical :: uneven, hopeless
+    integer :: alone, least
+    logical :: uneven, changed
 
     least = merge(2, 1, body%dim == 3)
     bounds = bounds_of_stretch
     if (breaking .and. body%dim == 2) bounds = [bounds_of_breaking, bounds_of_stretch]
-    positive = count(bounds >= 0.0_wp)
     a = a_of(materials)
     mu = mu_of(materials, body%dim)
     alone = 0
@@ -111,35 +113,71 @@ contains
         & bounds(least:), weights, stretch, dilatation, error, work)
       return
     end if
+    where (any(abs(area) > 0.0_wp, dim=2) .and. .not. fixed) face = body%volume/body%spacing
+    call weights_by_turns(body, family, materials, face, uneven, bounds, least, area, changed, &
+      & weights, stretch, dilatation, error, work, model)
+    if (changed .and. .not. allocated(error)) body%surface_area = area
+  end subroutine consistent_weights
+
+  !> Weights of lattices or of one mesh, whatever is found first: shared ones, own ones with the
+  !> areas of faces, both with a bound of 0 at least; own ones with areas that change; then those
+  !> with lower bounds. An error is set if none fulfil the conditions.
+  subroutine weights_by_turns(body, family, materials, face, uneven, bounds, least, area, &
+    & changed, weights, stretch, dilatation, error, work, model)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family
+    type(material_type), intent(in) :: materials(:)   ! all of one stiffness
+    real(wp), intent(in) :: face(:)                   ! (n_slots) as in `weights_and_areas` [m2]
+    logical, intent(in) :: uneven                     ! no points are alike
+    real(wp), intent(in) :: bounds(:)                 ! on Gb
+    integer, intent(in) :: least                      ! first of them with areas of faces
+    real(wp), intent(inout) :: area(:, :)             ! (n_slots, dim) outward ones; may change [m2]
+    logical, intent(out) :: changed                   ! whether they did
+    type(bond_weights_type), intent(out) :: weights
+    type(solution_type), intent(out) :: stretch, dilatation
+    type(error_type), allocatable, intent(out) :: error
+    type(long_work_type), intent(inout) :: work
+    type(model_type), intent(in), optional :: model
+    type(box_type), allocatable :: box
+    real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :), new_area(:, :)
+    real(wp) :: a(size(materials)), mu(size(materials))
+    integer :: positive, most
+    logical :: shared
+
+    a = a_of(materials)
+    mu = mu_of(materials, body%dim)
     of_stretch = mu(1)*area
     of_dilatation = a(1)*area
-    where (any(abs(area) > 0.0_wp, dim=2) .and. .not. fixed) face = body%volume/body%spacing
-    if (.not. uneven) then
+    positive = count(bounds >= 0.0_wp)
+    changed = .false.
+    shared = .not. uneven
+    if (shared) then
       most = huge(0)
       call fill_box(body, family, area, box)
-      if (allocated(box)) most = count(box%near)/8
+      if (allocated(box)) most = count(box%near)/points_of_class
       call shared_weights(body, family, materials, of_stretch, of_dilatation, &
         & bounds(least:positive), most, weights, stretch, dilatation, error, work, model)
       if (.not. allocated(error)) return
-      hopeless = stretch%hopeless .or. dilatation%hopeless
+      shared = .not. (stretch%hopeless .or. dilatation%hopeless)
       if (allocated(box)) call weigh_box(materials, bounds(least:positive), box, work)
     end if
     do
-      ! where there is no weight of 0.05, one of 0 is rare
+      ! where there are none above 0.05, there hardly are above 0
       call own_weights(body, family, materials, of_stretch, of_dilatation, uneven, &
         & bounds(least:max(least, positive - 1)), weights, stretch, dilatation, error, work, &
         & model, box)
       if (.not. allocated(error)) return
       if (any(face > 0.0_wp)) then
-        changed = area
-        call weights_and_areas(body, family, materials, face, bounds(:positive), changed, &
+        new_area = area
+        call weights_and_areas(body, family, materials, face, bounds(:positive), new_area, &
           & weights, stretch, dilatation, error, work, model, box)
-        if (.not. allocated(error)) then
-          body%surface_area = changed
+        changed = .not. allocated(error)
+        if (changed) then
+          area = new_area
           return
         end if
       end if
-      if (.not. (uneven .or. hopeless)) then
+      if (shared) then
         call shared_weights(body, family, materials, of_stretch, of_dilatation, &
           & bounds(positive + 1:), huge(0), weights, stretch, dilatation, error, work, model)
         if (.not. allocated(error)) return
@@ -147,9 +185,10 @@ contains
       call own_weights(body, family, materials, of_stretch, of_dilatation, uneven, &
         & bounds(positive + 1:), weights, stretch, dilatation, error, work, model, box)
       if (.not. (allocated(error) .and. allocated(box))) return
+      ! once more, with all bonds unknown
       deallocate (box)
     end do
-  end subroutine consistent_weights
+  end subroutine weights_by_turns
 
   !> Weights together with surface areas: Gb, Gd and areas are unknowns of one set of conditions. An
   !> outline knows the areas of a cloud roughly only, and with its areas there may be no Gb above 0,
@@ -184,7 +223,8 @@ contains
     call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, model)
     call join_conditions(of_stretch, of_dilatation, mu(1), a(1), part_of_face*face(groups%first), &
       & conditions)
-    call solve(conditions, bounds, 'stretch and the dilatation', G, stretch, error, work)
+    call solve(conditions, bounds, most_iterations, 'stretch and the dilatation', G, stretch, &
+      & error, work)
     if (allocated(error)) return
     do c = 1, groups%n_classes
       associate (k => groups%first(c))
@@ -250,7 +290,8 @@ contains
     type(material_type), intent(in) :: materials(:)
     real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
     real(wp), intent(in) :: bounds(:)
-    integer, intent(in) :: most_classes   ! with more, none are looked for
+    integer, intent(in) :: most_classes   ! with more, none are looked for; huge: there is no other
+                                          ! way, so that iterations go on longer
     type(bond_weights_type), intent(out) :: weights
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
@@ -275,7 +316,8 @@ contains
         return
       end if
       call weights_of_groups(body, family, materials, of_stretch, of_dilatation, groups, bounds, &
-        & bounds_of_dilatation, Gb, Gd, stretch, dilatation, error, work, model)
+        & bounds_of_dilatation, merge(few_iterations, most_iterations, most_classes < huge(0)), &
+        & Gb, Gd, stretch, dilatation, error, work, model)
       if (.not. allocated(error)) then
         call give_weights(body, groups, Gb, Gd, weights, stretch, dilatation)
         return
@@ -307,13 +349,15 @@ contains
     call own_groups(body, family, of_stretch, groups, error, box)
     if (allocated(error)) return
     first = 1
-    ! near missing cells there are none above -0.1
-    if (present(box)) first = 2
-    ! the bounds on Gd would take ten times as long, or the iterations would not end
-    if (uneven .or. (body%dim == 3 .and. groups%n_classes > most_bounded)) &
-      & first = size(bounds_of_dilatation)
+    if (present(box)) then
+      first = 2  ! near missing cells there are none above -0.1
+    else if (uneven .or. (body%dim == 3 .and. groups%n_classes > most_bounded)) then
+      ! the bounds on Gd would take ten times as long, or the iterations would not end
+      first = size(bounds_of_dilatation)
+    end if
     call weights_of_groups(body, family, materials, of_stretch, of_dilatation, groups, bounds, &
-      & bounds_of_dilatation(first:), Gb, Gd, stretch, dilatation, error, work, model)
+      & bounds_of_dilatation(first:), most_iterations, Gb, Gd, stretch, dilatation, error, work, &
+      & model)
     if (allocated(error)) return
     call give_weights(body, groups, Gb, Gd, weights, stretch, dilatation, box)
   end subroutine own_weights
@@ -374,13 +418,14 @@ contains
 
   !> Gb and Gd of groups. An error is set if none fulfil the conditions.
   subroutine weights_of_groups(body, family, materials, of_stretch, of_dilatation, groups, &
-    & bounds, bounds_of_Gd, Gb, Gd, stretch, dilatation, error, work, model)
+    & bounds, bounds_of_Gd, most_shared, Gb, Gd, stretch, dilatation, error, work, model)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)
     real(wp), intent(in) :: of_stretch(:, :), of_dilatation(:, :)
     type(groups_type), intent(in) :: groups
     real(wp), intent(in) :: bounds(:), bounds_of_Gd(:)
+    integer, intent(in) :: most_shared    ! iterations, as in `least_change`
     real(wp), allocatable, intent(out) :: Gb(:), Gd(:)
     type(solution_type), intent(out) :: stretch, dilatation
     type(error_type), allocatable, intent(out) :: error
@@ -389,17 +434,18 @@ contains
     type(conditions_type) :: conditions
 
     call stretch_conditions(body, family, materials, groups, of_stretch, conditions, model)
-    call solve(conditions, bounds, 'stretch', Gb, stretch, error, work)
+    call solve(conditions, bounds, most_shared, 'stretch', Gb, stretch, error, work)
     if (allocated(error)) return
     call dilatation_conditions(body, family, materials, a_of(materials), groups, of_dilatation, &
       & conditions, model)
-    call solve(conditions, bounds_of_Gd, 'dilatation', Gd, dilatation, error, work)
+    call solve(conditions, bounds_of_Gd, most_shared, 'dilatation', Gd, dilatation, error, work)
   end subroutine weights_of_groups
 
   !> The least change within the first of some bounds that allow one.
-  subroutine solve(conditions, bounds, what, G, solution, error, work)
+  subroutine solve(conditions, bounds, most_shared, what, G, solution, error, work)
     type(conditions_type), intent(in) :: conditions
     real(wp), intent(in) :: bounds(:)
+    integer, intent(in) :: most_shared
     character(*), intent(in) :: what
     real(wp), allocatable, intent(out) :: G(:)
     type(solution_type), intent(out) :: solution
@@ -414,8 +460,8 @@ contains
     solution%unknowns = conditions%unknowns
     do b = 1, size(bounds)
       solution%bound = bounds(b)
-      call least_change(conditions, bounds(b), G, solution%residual, iterations, found, &
-        & solution%hopeless, work)
+      call least_change(conditions, bounds(b), most_shared, G, solution%residual, iterations, &
+        & found, solution%hopeless, work)
       solution%iterations = solution%iterations + iterations
       if (found .or. solution%hopeless) exit
     end do
