@@ -34,7 +34,7 @@ module pd_set_up_consistent_least_change
   integer, parameter :: most_bounded = 400          !! of a step with such weights
   integer, parameter :: most_of_bound = 2500        !! of all steps with a bound
   integer, parameter :: across = 40                 !! points across that these are enough for
-  real(wp), parameter :: part_of_step = 1.0e-6_wp   !! of the error that a step with grids leaves
+  real(wp), parameter :: part_of_step = 1.0e-4_wp   !! of the error that a step with grids leaves
   !> The most of it while the weights at the bound change from step to step.
   real(wp), parameter :: most_of_step = 1.0e-2_wp
 
@@ -309,12 +309,16 @@ contains
     n = size(r, 1)
     !$omp parallel do schedule(static) default(none) shared(factor, r, w, n) private(c, i)
     do c = 1, size(r, 2)
-      do i = 1, n
-        w(i, c) = (r(i, c) - dot_product(factor(i, :i - 1, c), w(:i - 1, c)))/factor(i, i, c)
-      end do
-      do i = n, 1, -1
-        w(i, c) = (w(i, c) - dot_product(factor(i + 1:, i, c), w(i + 1:, c)))/factor(i, i, c)
-      end do
+      associate (f => factor(:, :, c), x => w(:, c))
+        x = r(:, c)
+        do i = 1, n
+          x(i) = x(i)/f(i, i)
+          x(i + 1:) = x(i + 1:) - x(i)*f(i + 1:, i)
+        end do
+        do i = n, 1, -1
+          x(i) = (x(i) - dot_product(f(i + 1:, i), x(i + 1:)))/f(i, i)
+        end do
+      end associate
     end do
   end subroutine precondition
 

@@ -199,10 +199,10 @@ contains
     stands_for_others = modulo(u*golden, 1.0_wp) <= part
   end function stands_for_others
 
-  !> The parts of the unknowns of each kind that so many of a kind are; all areas.
+  !> Which part of the unknowns of each kind makes so many of them; of areas all.
   pure function parts_of(conditions, needed) result(parts)
     type(conditions_type), intent(in) :: conditions
-    real(wp), intent(in) :: needed
+    real(wp), intent(in) :: needed  ! unknowns of a kind
     real(wp) :: parts(of_stretches:of_area)
 
     parts(of_stretches) = min(1.0_wp, needed/max(1, conditions%stretches))
@@ -262,6 +262,7 @@ contains
     integer, allocatable :: at(:), chosen(:), order(:), direction(:)
     integer(i8), allocatable :: cells(:)
     integer :: met(128), n, i, u, m, z, low, high, which
+    logical :: summed, last_one
 
     z = level%of_z
     allocate (level%factor)
@@ -269,22 +270,29 @@ contains
     call new_envelope(place, lowest, last, 1, of_direction)
     allocate (at(size(place)), source=0)
     parts = parts_of(conditions, real(bonds_of_row, wp)*level%components*size(place))
-    associate (bonds => conditions%stretches + conditions%dilatations)
-      chosen = pack([(u, u=1, bonds)], stands_for_others([(u, u=1, bonds)], &
-        & merge(parts(of_stretches), parts(of_dilatation), [(u, u=1, bonds)] &
-        & <= conditions%stretches)))
-      do u = bonds + 1, conditions%unknowns
-        call pattern_of(conditions, z, u, pattern)
-        call reach_of(conditions, level, u, met, n, share, at)
-        do m = 1, n
-          vector(:z, m) = share(1, m)*pattern(:z)
-          vector(z + 1:, m) = share(2, m)*pattern(z + 1:)
-        end do
-        call add_product(met(:n), vector(:, :n), 1, level%components, level%factor)
+    allocate (chosen(conditions%unknowns))
+    i = 0
+    do u = 1, conditions%unknowns
+      associate (kind => kind_of(conditions, u))
+        if (kind /= of_area) then
+          if (.not. stands_for_others(u, parts(kind))) cycle
+          i = i + 1
+          chosen(i) = u
+          cycle
+        end if
+      end associate
+      call pattern_of(conditions, z, u, pattern)
+      call reach_of(conditions, level, u, met, n, share, at)
+      do m = 1, n
+        vector(:z, m) = share(1, m)*pattern(:z)
+        vector(z + 1:, m) = share(2, m)*pattern(z + 1:)
       end do
-    end associate
+      call add_product(met(:n), vector(:, :n), 1, level%components, level%factor)
+    end do
+    chosen = chosen(:i)
     call sort_by_direction(conditions, level, chosen, order, direction, cells)
     block = 0.0_wp
+    summed = .false.
     do i = 1, size(order)
       u = chosen(order(i))
       which = merge(1, 2, kind_of(conditions, u) == of_stretches)
@@ -300,12 +308,19 @@ contains
       pattern = pattern/sqrt(parts(kind_of(conditions, u)))
       low = merge(1, z + 1, which == 1)
       high = merge(z, level%components, which == 1)
-      call add_block(met(:n), block(:n, :n), [1.0_wp], 1, 1, of_direction)
-      block(:n, :n) = 0.0_wp
-      if (i < size(order)) then
-        if (direction(order(i)) == direction(order(i + 1))) cycle
+      last_one = i == size(order)
+      if (.not. last_one) last_one = direction(order(i)) /= direction(order(i + 1))
+      if (last_one .and. .not. summed) then
+        ! no other cells have bonds of this direction
+        call add_block(met(:n), block(:n, :n), pattern, low, high, level%factor)
+      else
+        call add_block(met(:n), block(:n, :n), [1.0_wp], 1, 1, of_direction)
+        summed = .true.
       end if
+      block(:n, :n) = 0.0_wp
+      if (.not. (last_one .and. summed)) cycle
       call move_to(of_direction, pattern, low, high, level%factor)
+      summed = .false.
     end do
     call factorize_envelope(level%factor)
   end subroutine factorize
