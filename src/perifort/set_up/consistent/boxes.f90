@@ -31,8 +31,9 @@ module pd_set_up_consistent_boxes
     type(bond_weights_type) :: weights     !! of the box
   end type box_type
 
-  !> Bonds from a missing cell, one after another, within which points are near it. With 2, weights
-  !> around a hole with a radius of 30 points need a Gb below 0.
+  !> Bonds from a missing cell, one after another, within which points are near it. With 2 the
+  !> largest possible bound on Gb is 0 around a hole with a radius of 30 points, and -0.3 in a plate
+  !> of 12 points' thickness.
   integer, parameter :: near_bonds = 4
 
 contains
