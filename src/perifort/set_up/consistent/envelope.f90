@@ -69,26 +69,18 @@ contains
   end function work_of_envelope
 
   !> Add the product of a vector with its transpose.
-  subroutine add_product(nodes, vector, low, high, envelope)
+  subroutine add_product(nodes, vector, envelope)
     integer, intent(in) :: nodes(:)       !! nodes where the vector is not zero
     real(wp), intent(in) :: vector(:, :)  !! (components, same)
-    integer, intent(in) :: low, high      !! first and last component that is not zero
     type(envelope_type), intent(inout) :: envelope  !! not yet factorized
-    integer :: a, b, c, last, row, column
+    integer :: a, b
 
     do a = 1, size(nodes)
       do b = 1, size(nodes)
-        if (envelope%place(nodes(b)) > envelope%place(nodes(a))) cycle
-        column = envelope%components*(envelope%place(nodes(b)) - 1)
-        do c = low, high
-          row = envelope%components*(envelope%place(nodes(a)) - 1) + c
-          if (column + 1 < envelope%first(row)) call internal_fault(outside)
-          last = merge(c, high, a == b)
-          associate (at => envelope%before(row) + column)
-            envelope%element(at + low:at + last) = envelope%element(at + low:at + last) &
-              & + vector(c, a)*vector(low:last, b)
-          end associate
-        end do
+        associate (p => envelope%place(nodes(a)), q => envelope%place(nodes(b)))
+          if (q <= p) call add_elements(p, q, 1.0_wp, vector(:, a), vector(:, b), 1, &
+            & envelope%components, envelope)
+        end associate
       end do
     end do
   end subroutine add_product
@@ -105,7 +97,8 @@ contains
     do a = 1, size(nodes)
       do b = 1, size(nodes)
         associate (p => envelope%place(nodes(a)), q => envelope%place(nodes(b)))
-          if (q <= p) call add_patterns(p, q, block(b, a), pattern, low, high, envelope)
+          if (q <= p) call add_elements(p, q, block(b, a), pattern, pattern, low, &
+            & high, envelope)
         end associate
       end do
     end do
@@ -123,18 +116,19 @@ contains
       do q = of_nodes%first(p), p
         associate (value => of_nodes%element(of_nodes%before(p) + q))
           if (.not. abs(value) > 0.0_wp) cycle
-          call add_patterns(p, q, value, pattern, low, high, envelope)
+          call add_elements(p, q, value, pattern, pattern, low, high, envelope)
           value = 0.0_wp
         end associate
       end do
     end do
   end subroutine move_to
 
-  !> Add to the elements of two places.
-  subroutine add_patterns(p, q, value, pattern, low, high, envelope)
-    integer, intent(in) :: p, q            ! places, the second not above the first
-    real(wp), intent(in) :: value, pattern(:)
-    integer, intent(in) :: low, high
+  !> Add a value times the product of two vectors to the elements of two places.
+  subroutine add_elements(p, q, value, one, other, low, high, envelope)
+    integer, intent(in) :: p, q                   ! places, the second not above the first
+    real(wp), intent(in) :: value
+    real(wp), intent(in) :: one(:), other(:)      ! (components) of either place
+    integer, intent(in) :: low, high              ! first and last component that is not zero
     type(envelope_type), intent(inout) :: envelope
     integer :: c, last, row
 
@@ -143,13 +137,13 @@ contains
       last = merge(c, high, p == q)
       associate (column => envelope%components*(q - 1))
         if (column + 1 < envelope%first(row)) call internal_fault(outside)
-        associate (at => envelope%before(row) + column, part => value*pattern(c))
+        associate (at => envelope%before(row) + column, part => value*one(c))
           envelope%element(at + low:at + last) = envelope%element(at + low:at + last) &
-            & + part*pattern(low:last)
+            & + part*other(low:last)
         end associate
       end associate
     end do
-  end subroutine add_patterns
+  end subroutine add_elements
 
   !> Replace the matrix by its factor.
   subroutine factorize_envelope(envelope)

@@ -287,7 +287,7 @@ contains
         vector(:z, m) = share(1, m)*pattern(:z)
         vector(z + 1:, m) = share(2, m)*pattern(z + 1:)
       end do
-      call add_product(met(:n), vector(:, :n), 1, level%components, level%factor)
+      call add_product(met(:n), vector(:, :n), level%factor)
     end do
     chosen = chosen(:i)
     call sort_by_direction(conditions, level, chosen, order, direction, cells)
