@@ -136,6 +136,7 @@ program main
   use test_softening_cracks, only: collect_softening_cracks
   use test_study_bench_bench, only: collect_study_bench_bench
   use test_set_up_consistent_envelope, only: collect_set_up_consistent_envelope
+  use test_set_up_consistent_symmetries, only: collect_set_up_consistent_symmetries
   use test_set_up_consistent_weights, only: collect_set_up_consistent_weights
   use test_set_up_ranks, only: collect_set_up_ranks
   use test_set_up_horizons, only: collect_set_up_horizons
@@ -281,6 +282,7 @@ program main
   call register('softening_cracks', collect_softening_cracks)
   call register('study_bench_bench', collect_study_bench_bench)
   call register('set_up_consistent_envelope', collect_set_up_consistent_envelope)
+  call register('set_up_consistent_symmetries', collect_set_up_consistent_symmetries)
   call register('set_up_consistent_weights', collect_set_up_consistent_weights)
   call register('set_up_terms', collect_set_up_terms)
   call register('set_up_horizons', collect_set_up_horizons)

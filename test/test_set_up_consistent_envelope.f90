@@ -63,10 +63,10 @@ contains
           if (.not. definite) vector(:, 2) = -vector(:, 1)
           met = [s, s + ahead]
           if (ahead == 0) then
-            call add_product(met(:1), vector(:, :1), envelope)
+            call add_product(met(:1), vector(:, :1), 1, size(vector, 1), envelope)
             vector(:, 2) = 0.0_wp
           else
-            call add_product(met, vector, envelope)
+            call add_product(met, vector, 1, size(vector, 1), envelope)
           end if
           do c = 1, 2
             do d = 1, 2

@@ -9,17 +9,18 @@ module pd_set_up_consistent_boxes
   use pd_base_error, only: error_type, internal_fault
   use pd_base_kinds, only: wp, i2, i4, i8
   use pd_body_body, only: allocate_points, body_type
-  use pd_body_lattices, only: coordinate
   use pd_family_areas, only: area_vectors
   use pd_family_bond_weights, only: bond_weights_type
   use pd_family_family, only: family_type
   use pd_family_lattice, only: cells_between, lattice_family_type, new_lattice_family
   use pd_family_volume, only: volume_rule_type
-  use pd_set_up_consistent_groups, only: groups_type
+  use pd_set_up_consistent_groups, only: groups_type, spread_weights
   use pd_set_up_consistent_patterns, only: find_patterns, patterns_type
+  use pd_set_up_consistent_symmetries, only: find_symmetries, known_type, &
+    & symmetries_of_box, symmetries_type
   implicit none (type, external)
   private
-  public :: box_type, fill_box, take_from_box, join_weights
+  public :: box_type, fill_box, find_alike, symmetries_within, take_from_box, join_weights
 
   type :: box_type
     type(body_type) :: body                !! a point in each cell of the box, in the slots of those
@@ -29,16 +30,18 @@ module pd_set_up_consistent_boxes
     real(wp), allocatable :: area(:, :)    !! (n_slots, dim) outward surface areas [m2]
     logical, allocatable :: near(:)        !! (n_slots) points of the body near missing cells
     type(bond_weights_type) :: weights     !! of the box
+    type(symmetries_type), allocatable :: alike  !! points of the body that are, if many are
   end type box_type
 
   !> Bonds from a missing cell, one after another, within which points are near it. With 2 the
   !> largest possible bound on Gb is 0 around a hole with a radius of 30 points, and -0.3 in a plate
   !> of 12 points' thickness.
   integer, parameter :: near_bonds = 4
+  integer, parameter :: most_cells = 100  !! of a box, for each point of the body
 
 contains
 
-  !> The box around a body, if that is one lattice with missing cells.
+  !> The box around a body, if that is one lattice.
   subroutine fill_box(body, family, area, box)
     type(body_type), intent(in) :: body               !! arranged in the family's slots
     class(family_type), intent(in) :: family          !! whole
@@ -59,7 +62,7 @@ contains
     end select
     allocate (box)
     call fill_cells(body, box%body)
-    found = box%body%n_points > body%n_points
+    found = box%body%n_points <= most_cells*body%n_points
     if (found) then
       call new_lattice_family(box%body, rule, .false., .false., box%family, error)
       found = .not. allocated(error)
@@ -87,35 +90,31 @@ contains
     end if
   end subroutine fill_box
 
-  !> A point in each cell of the box around a lattice.
+  !> A point in each cell of the box around a lattice along the axes.
   subroutine fill_cells(body, filled)
     type(body_type), intent(in) :: body      ! one lattice
     type(body_type), intent(out) :: filled   ! in point order
-    real(wp) :: along(body%n_slots), low(body%dim), x(body%dim)
+    real(wp) :: low(body%dim)
     integer :: cells(3), place(3), c, n, first
 
     first = findloc(body%point > 0, .true., dim=1)
-    associate (grid => body%grids(body%grid(first)), spacing => body%spacing(first), &
-      & dim => body%dim)
+    associate (spacing => body%spacing(first), dim => body%dim)
       cells = 1
       do c = 1, dim
-        along = coordinate(grid, body%x, c)
-        low(c) = minval(along, mask=body%point > 0)
-        cells(c) = cells_between(low(c), maxval(along, mask=body%point > 0), spacing)
+        low(c) = minval(body%x(:, c), mask=body%point > 0)
+        cells(c) = cells_between(low(c), maxval(body%x(:, c), mask=body%point > 0), spacing)
       end do
       call allocate_points(filled, dim, product(cells))
       do n = 1, filled%n_points
         place = [mod(n - 1, cells(1)), mod((n - 1)/cells(1), cells(2)), (n - 1)/product(cells(:2))]
-        x = low + place(:dim)*spacing
-        if (grid%turned) x = matmul(grid%axes(:dim, :dim), x)
-        filled%x(n, :) = x
+        filled%x(n, :) = low + place(:dim)*spacing
       end do
       filled%volume = body%volume(first)
       filled%spacing = spacing
       filled%body = body%body(first)
       filled%material = body%material(first)
       filled%grid = 1_i2
-      filled%grids = [grid]
+      filled%grids = [body%grids(body%grid(first))]
       filled%delta = body%delta
       filled%order%reproducible = body%order%reproducible
     end associate
@@ -162,6 +161,39 @@ contains
     end do
   end subroutine find_near
 
+  !> The points of the box that are alike, with layers that are from some horizons inside on.
+  subroutine symmetries_within(box, reach, symmetries)
+    type(box_type), intent(in) :: box
+    integer, intent(in) :: reach        !! horizons
+    type(symmetries_type), allocatable, intent(out) :: symmetries   !! not allocated if not found
+    type(known_type) :: known
+
+    known%patterns = box%patterns
+    known%area = box%area
+    call symmetries_of_box(box%body, box%family%rule%delta, reach, known, symmetries)
+  end subroutine symmetries_within
+
+  !> Find the points near missing cells that are alike.
+  subroutine find_alike(body, family, area, face, box)
+    type(body_type), intent(in) :: body
+    class(family_type), intent(in) :: family   !! whole
+    real(wp), intent(in) :: area(:, :)         !! (n_slots, dim) outward surface areas [m2]
+    real(wp), intent(in) :: face(:)            !! (n_slots) of points whose areas may change;
+                                               !! 0: fixed [m2]
+    type(box_type), intent(inout) :: box       !! gets what is alike
+    type(known_type) :: known
+    type(error_type), allocatable :: error
+
+    call find_patterns(body, family, known%patterns, error)
+    if (allocated(error)) return
+    known%near = box%near
+    known%fixed = any(abs(area) > 0.0_wp, dim=2) .and. .not. face > 0.0_wp
+    known%area = area
+    known%of_box = box%patterns
+    known%weights = box%weights
+    call find_symmetries(box%body, body, family%rule%delta, near_bonds, known, box%alike)
+  end subroutine find_alike
+
   !> Give groups the weights that their bonds have in the box.
   subroutine take_from_box(box, groups)
     type(box_type), intent(in) :: box           !! with its weights
@@ -188,37 +220,18 @@ contains
     end do
   end subroutine take_from_box
 
-  !> The weights of the body: rows of the box, and one for each point near missing cells.
+  !> The weights of the body: rows of the box, and others of points near missing cells.
   subroutine join_weights(box, groups, Gb, Gd, weights)
     type(box_type), intent(in) :: box                  !! with its weights
     type(groups_type), intent(in) :: groups            !! of points near missing cells, with what is
                                                        !! known
     real(wp), intent(in) :: Gb(:), Gd(:)               !! (groups) [-]
     type(bond_weights_type), intent(out) :: weights    !! of the body
-    real(wp), allocatable :: of_bond_b(:), of_bond_d(:)
-    integer(i8) :: e
-    integer :: k, rows
 
-    of_bond_b = groups%known_b
-    of_bond_d = groups%known_d
-    do e = 1, size(groups%group, kind=i8)
-      associate (g => groups%group(e))
-        if (g == 0) cycle
-        of_bond_b(e) = Gb(g)
-        of_bond_d(e) = Gd(g)
-      end associate
-    end do
-    rows = size(box%weights%start)
     ! far from missing cells the bonds of both stand in one order
-    allocate (weights%row, source=box%weights%row)
-    do k = 1, size(weights%row)
-      if (groups%patterns%of(k) == 0) weights%row(k) = 0_i4
-      if (groups%class(k) > 0) weights%row(k) = int(rows + groups%class(k), i4)
-    end do
-    weights%start = [box%weights%start, size(box%weights%Gb, kind=i8) - 1 &
-      & + groups%start(:groups%n_classes)]
-    weights%Gb = [box%weights%Gb, of_bond_b]
-    weights%Gd = [box%weights%Gd, of_bond_d]
+    weights = box%weights
+    where (groups%patterns%of == 0) weights%row = 0_i4
+    call spread_weights(groups, Gb, Gd, weights)
   end subroutine join_weights
 
 end module pd_set_up_consistent_boxes

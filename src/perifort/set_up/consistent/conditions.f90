@@ -8,11 +8,12 @@ module pd_set_up_consistent_conditions
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   use pd_force_model, only: bond_factors_of, model_type
   use pd_law_material, only: material_type
-  use pd_set_up_consistent_groups, only: groups_type
+  use pd_set_up_consistent_groups, only: changeable_axes, groups_type
   implicit none (type, external)
   private
   public :: conditions_type, stretch_conditions, dilatation_conditions, join_conditions, kind_of, &
-    & of_stretches, of_dilatation, of_area, coefficients, most_rows, triple_products, area_products
+    & of_stretches, of_dilatation, of_area, coefficients, most_rows, few, triple_products, &
+    & area_products
 
   !> What an unknown is.
   integer, parameter :: of_stretches = 1   !! a weight Gb
@@ -20,6 +21,9 @@ module pd_set_up_consistent_conditions
   integer, parameter :: of_area = 3        !! a component of an area
 
   integer, parameter :: most_rows = 19  !! of a class
+  integer, parameter :: few = 1000
+    !! classes, or splines, up to which one thread does an iteration's loops: others take longer to
+    !! start
 
   !> sum over bonds of weight x coefficients = `right`. The unknowns are weights Gb, then weights
   !> Gd, then components of areas. The rows of the stretch, n n n of the bonds, come before those
@@ -46,9 +50,13 @@ module pd_set_up_consistent_conditions
     integer(i8), allocatable :: bond(:)     !! bonds of each unknown
     integer(i4), allocatable :: class(:)    !! of each bond
     logical :: alone = .false.              !! whether each unknown is of one bond, or an area's
+    logical :: placed = .false.             !! whether multipliers are smooth fields, as in
+                                            !! `groups_type`
+    real(wp), allocatable :: counts(:)      !! (unknowns) how much a change counts, squared
     real(wp), allocatable :: base(:)        !! (unknowns) weight that a value of 1 stands for; not
                                             !! allocated: 1
     ! what multipliers of smooth fields depend on:
+    real(wp) :: longest = 0.0_wp            !! component of a bond [m]
     real(wp) :: spacing = 0.0_wp            !! mean of the classes' first points [m]
     real(wp), allocatable :: x(:, :)        !! (dim, classes) positions of these points [m]
     real(wp), allocatable :: stiffness(:)   !! (classes) what makes a field multipliers of n n n
@@ -83,6 +91,7 @@ contains
       call family%bonds_of(k, bonds)
       associate (first => conditions%start(c) - 1)
         total = 0.0_wp
+        call note_longest(bonds, conditions)
         do i = 1, bonds%n
           q = materials(body%material(k))%q + materials(body%material(bonds%j(i)))%q
           if (present(model)) then
@@ -130,6 +139,7 @@ contains
       k = int(groups%first(c))
       call family%bonds_of(k, bonds)
       associate (first => conditions%start(c) - 1, t => materials(body%material(k))%t)
+        call note_longest(bonds, conditions)
         do i = 1, bonds%n
           conditions%n(first + i, :) = bonds%xi(i, :)/bonds%length(i)
           conditions%factor(first + i, :) = t*bonds%weight(i)*[1.0_wp, (a(body%material(k)) &
@@ -153,6 +163,16 @@ contains
     call turn(conditions)
     call note_smooth(body, materials, a, groups, conditions)
   end subroutine dilatation_conditions
+
+  pure subroutine note_longest(bonds, conditions)
+    type(bonds_type), intent(in) :: bonds
+    type(conditions_type), intent(inout) :: conditions
+    integer :: d
+
+    do d = 1, conditions%dim
+      conditions%longest = max(conditions%longest, maxval(abs(bonds%xi(:bonds%n, d))))
+    end do
+  end subroutine note_longest
 
   !> Take bonds without a group out of the conditions: what their known weights give goes to the
   !> right side. Others are counted from theirs.
@@ -223,20 +243,24 @@ contains
     conditions%shift = conditions%shift/maxval(conditions%shift)
   end subroutine note_smooth
 
-  !> Conditions on Gb, Gd and surface areas: an unknown of a point with a free area and of an axis
-  !> changes that component by (its value - 1) x `unit`.
-  subroutine join_conditions(stretch, dilatation, mu, a, unit, conditions)
+  !> Conditions on Gb, Gd and surface areas: an unknown of a class with a free area and of one of
+  !> its `changeable_axes` changes that component by (its value - 1) x `unit`.
+  subroutine join_conditions(groups, stretch, dilatation, mu, a, unit, conditions)
+    type(groups_type), intent(in) :: groups
     type(conditions_type), intent(in) :: stretch      !! for the areas as they are
-    type(conditions_type), intent(in) :: dilatation   !! of the same points; each a class
+    type(conditions_type), intent(in) :: dilatation   !! of the same classes
     real(wp), intent(in) :: mu       !! what areas had been multiplied with in `stretch` [N/m2]
     real(wp), intent(in) :: a        !! and in `dilatation` [-]
     real(wp), intent(in) :: unit(:)  !! (classes) of the unknown areas, 0 where they are fixed [m2]
     type(conditions_type), intent(out) :: conditions
     real(wp) :: values(most_rows)
+    integer, allocatable :: axes(:)
     integer(i8) :: n, at, e
     integer :: c, x, low, high
 
     conditions%dim = stretch%dim
+    conditions%placed = stretch%placed
+    conditions%longest = stretch%longest
     conditions%stretches = stretch%stretches
     conditions%dilatations = dilatation%dilatations
     conditions%before = stretch%rows
@@ -250,6 +274,8 @@ contains
     conditions%spacing = dilatation%spacing
     n = size(stretch%unknown, kind=i8) + size(dilatation%unknown, kind=i8) &
       & + conditions%dim*count(unit > 0.0_wp)
+    allocate (conditions%counts(conditions%unknowns + conditions%dim*count(unit > 0.0_wp)))
+    conditions%counts(:conditions%unknowns) = [stretch%counts, dilatation%counts]
     allocate (conditions%start(conditions%classes + 1), source=1_i8)
     allocate (conditions%unknown(n), conditions%n(n, conditions%dim), conditions%factor(n, 2))
     allocate (conditions%right(conditions%rows, conditions%classes))
@@ -260,12 +286,15 @@ contains
       conditions%start(c) = at + 1
       call append(stretch, 0)
       call append(dilatation, stretch%unknowns)
-      do x = 1, merge(conditions%dim, 0, unit(c) > 0.0_wp)
+      if (.not. unit(c) > 0.0_wp) cycle
+      axes = changeable_axes(groups, c, conditions%dim)
+      do x = 1, size(axes)
         at = at + 1
         conditions%unknowns = conditions%unknowns + 1
         conditions%unknown(at) = int(conditions%unknowns, i4)
+        conditions%counts(conditions%unknowns) = real(groups%mirrored(c), wp)
         conditions%n(at, :) = 0.0_wp
-        conditions%n(at, x) = 1.0_wp
+        conditions%n(at, axes(x)) = 1.0_wp
         conditions%factor(at, :) = unit(c)*[mu*stretch%of_area(c), a*dilatation%of_area(c)]
         ! a value of 1 is no change
         call coefficients(conditions, at, values, low, high)
@@ -273,6 +302,10 @@ contains
       end do
     end do
     conditions%start(conditions%classes + 1) = at + 1
+    conditions%counts = conditions%counts(:conditions%unknowns)
+    conditions%unknown = conditions%unknown(:at)
+    conditions%n = conditions%n(:at, :)
+    conditions%factor = conditions%factor(:at, :)
     if (allocated(stretch%base)) conditions%base = [stretch%base, dilatation%base, &
       & spread(1.0_wp, 1, conditions%unknowns - size(stretch%base) - size(dilatation%base))]
     call turn(conditions)
@@ -314,6 +347,8 @@ contains
       conditions%rows = dim*(dim + 1)/2 + dim
     end if
     conditions%classes = groups%n_classes
+    conditions%placed = groups%placed
+    conditions%counts = real(groups%members, wp)
     conditions%start = groups%start
     conditions%unknown = groups%group
     n = size(conditions%unknown, kind=i8)

@@ -24,7 +24,9 @@ module pd_set_up_consistent_envelope
   end type envelope_type
 
   !> A smaller pivot is of a row that follows from those before: a rounding error.
-  real(wp), parameter :: follows = 1.0e-10_wp
+  real(wp), parameter :: follows = 1.0e-7_wp
+  !> Part of a component's largest diagonal that is none: of a spline that hardly reaches any point.
+  real(wp), parameter :: nothing = 1.0e-14_wp
   character(*), parameter :: outside = 'an element outside of an envelope'
 
 contains
@@ -69,17 +71,18 @@ contains
   end function work_of_envelope
 
   !> Add the product of a vector with its transpose.
-  subroutine add_product(nodes, vector, envelope)
+  subroutine add_product(nodes, vector, low, high, envelope)
     integer, intent(in) :: nodes(:)       !! nodes where the vector is not zero
     real(wp), intent(in) :: vector(:, :)  !! (components, same)
+    integer, intent(in) :: low, high      !! first and last component that is not zero
     type(envelope_type), intent(inout) :: envelope  !! not yet factorized
     integer :: a, b
 
     do a = 1, size(nodes)
       do b = 1, size(nodes)
         associate (p => envelope%place(nodes(a)), q => envelope%place(nodes(b)))
-          if (q <= p) call add_elements(p, q, 1.0_wp, vector(:, a), vector(:, b), 1, &
-            & envelope%components, envelope)
+          if (q <= p) call add_elements(p, q, 1.0_wp, vector(:, a), vector(:, b), low, high, &
+            & envelope)
         end associate
       end do
     end do
@@ -150,15 +153,22 @@ contains
     type(envelope_type), intent(inout) :: envelope
     real(wp), parameter :: never = 1.0e30_wp  ! pivot of a row that follows from others
     real(wp), allocatable :: rest(:, :)
-    real(wp) :: pivot
+    real(wp) :: largest(envelope%components), pivot
     integer :: i, j, low
 
     associate (f => envelope%element, before => envelope%before, first => envelope%first, &
       & early => envelope%early)
       allocate (envelope%scale(size(first)), source=0.0_wp)
+      largest = 0.0_wp
+      do i = 1, size(first)
+        associate (of_component => largest(modulo(i - 1, envelope%components) + 1))
+          of_component = max(of_component, f(before(i) + i))
+        end associate
+      end do
       do i = 1, size(first)
         pivot = f(before(i) + i)
-        if (pivot > 0.0_wp) envelope%scale(i) = 1/sqrt(pivot)
+        if (pivot > nothing*largest(modulo(i - 1, envelope%components) + 1)) &
+          & envelope%scale(i) = 1/sqrt(pivot)
         do j = first(i), i
           f(before(i) + j) = envelope%scale(i)*f(before(i) + j)*envelope%scale(j)
         end do

@@ -1,6 +1,6 @@
 !> The least change of weights from 1 that fulfils linear conditions, with bounds on the weights.
 !>
-!> Minimise sum (G - 1)^2 under B G = r and low <= G: G - 1 = max(low - 1, B^T z), and the
+!> Minimise sum c (G - 1)^2 under B G = r and low <= G: G - 1 = max(low - 1, B^T z/c), and the
 !> multipliers z are the zero of r - B G(z), which is the gradient of a concave function of z.
 !> Newton's method finds it: each step solves a system with the weights that are not at the bound,
 !> by conjugate gradients with the blocks of the classes as preconditioner, and grids of splines
@@ -10,7 +10,7 @@ module pd_set_up_consistent_least_change
   use pd_base_kinds, only: wp, i8
   use pd_base_long_work, only: long_work_type
   use pd_base_text, only: to_text
-  use pd_set_up_consistent_conditions, only: conditions_type
+  use pd_set_up_consistent_conditions, only: conditions_type, few
   use pd_set_up_consistent_levels, only: add_levels, level_type, new_levels
   use pd_set_up_consistent_products, only: block_of, spread_over, sums_of
   implicit none (type, external)
@@ -28,7 +28,9 @@ module pd_set_up_consistent_least_change
   integer, parameter :: most_newton = 60
   integer, parameter :: patience = 8  !! steps in which the error must fall to half
   real(wp), parameter :: stays = 0.7_wp  !! part of the error that a step in vain leaves
-  integer, parameter :: in_vain = 2      !! steps in vain after which there is no solution
+  !> Part of a step that is hardly any: with the weights that are at the bound there is no solution.
+  real(wp), parameter :: short = 0.01_wp
+  integer, parameter :: in_vain = 3      !! steps in vain after which there is no solution
   integer, parameter :: idle = 30        !! iterations of a step that do not lower the error
   integer, parameter :: most_iterations = 5000      !! of a step where weights at the bound stay
   integer, parameter :: most_bounded = 400          !! of a step with such weights
@@ -80,7 +82,7 @@ contains
     hopeless = .false.
     linear = 0.0_wp
     vain = 0
-    if (conditions%alone) then
+    if (conditions%placed) then
       call new_levels(conditions, levels)
       allowed = uneven
     else
@@ -104,7 +106,7 @@ contains
       if (low > unbounded) part = max(part, min(most_of_step, residual))
       most = most_iterations
       if (.not. settled) most = nint(most_bounded*wider(conditions))
-      if (.not. conditions%alone .and. newton == 1) most = most_shared
+      if (.not. conditions%placed .and. newton == 1) most = most_shared
       call solve(conditions, levels, free, settled, part, most, r, given, step, iterations, work)
       ! multipliers of long waves are large, and what they give a bond is small: so the changes of
       ! weights are summed, and each step can mend what rounding leaves of the one before
@@ -120,19 +122,21 @@ contains
         if (maxval(abs(r)) <= 0.5_wp*residual) exit
         length = length/2
       end do
-      if (.not. conditions%alone .and. newton == 1) then
+      if (.not. conditions%placed .and. newton == 1) then
         hopeless = iterations >= most_shared .and. maxval(abs(r)) > far
         if (hopeless) return
       end if
-      ! nearly the same weights stay at the bound, and so does the error
-      if (low > unbounded .and. length >= 1 .and. maxval(abs(r)) > max(far, stays*residual) .and. &
+      if (low <= unbounded .or. maxval(abs(r)) <= max(far, stays*residual) .or. &
         & abs(count(t + 1 > lows) - count(tried + 1 > lows)) &
-        & <= part_of_changes*count(t + 1 <= lows)) then
-        vain = vain + 1
-      else
+        & > part_of_changes*count(t + 1 <= lows)) then
         vain = 0
+      else if (length <= short) then
+        ! nearly the same weights stay at the bound, and so does the error
+        vain = vain + 2
+      else if (settled .and. length >= 1) then
+        vain = vain + 1
       end if
-      if (vain == in_vain) exit
+      if (vain >= in_vain) exit
       t = tried
       linear = linear + length*along
       before = value
@@ -172,11 +176,11 @@ contains
     G = max(low, 1 + t)
     call sums_of(conditions, G, r)
     r = conditions%right - r
-    value = sum(merge(t**2/2, (low - 1)*t - (low - 1)**2/2, 1 + t > low))
+    value = sum(conditions%counts*merge(t**2/2, (low - 1)*t - (low - 1)**2/2, 1 + t > low))
   end subroutine weigh
 
-  !> Solve B D B^T step = r, with D = 1 for free unknowns and 0 for others. The matrix is singular,
-  !> and r in its range but for what the bound cuts off.
+  !> Solve B D B^T step = r, with D = 1/c for free unknowns and 0 for others. The matrix is
+  !> singular, and r in its range but for what the bound cuts off.
   subroutine solve(conditions, levels, free, settled, part, most, r, given, step, iterations, work)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: levels(:)
@@ -189,12 +193,12 @@ contains
     real(wp), intent(inout) :: step(:, :)
     integer, intent(inout) :: iterations
     type(long_work_type), intent(inout) :: work
-    real(wp), allocatable :: factor(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
+    real(wp), allocatable :: inverse(:, :, :), rest(:, :), w(:, :), p(:, :), product(:, :), y(:)
     real(wp), allocatable :: best(:, :)
     real(wp) :: rho, rho_before, alpha, beta, curvature, target, error, least
     integer :: c, i, at
 
-    call factorize(conditions, free, factor)
+    call invert_blocks(conditions, free, inverse)
     allocate (rest, source=r)
     allocate (w, p, product, mold=r)
     allocate (y(conditions%unknowns))
@@ -208,12 +212,13 @@ contains
     least = huge(1.0_wp)
     at = 0
     do i = 1, most
-      call precondition(factor, rest, w)
+      call precondition(inverse, rest, w)
       call add_levels(conditions, levels, rest, w)
       rho = product_of(rest, w)
       if (.not. rho > 0.0_wp) exit
       beta = merge(rho/rho_before, 0.0_wp, i > 1)
-      !$omp parallel do schedule(static) default(none) shared(p, w, beta) private(c)
+      !$omp parallel do schedule(static) default(none) shared(p, w, beta) private(c) &
+      !$omp if (size(p, 2) > few)
       do c = 1, size(p, 2)
         p(:, c) = w(:, c) + beta*p(:, c)
       end do
@@ -224,7 +229,7 @@ contains
       alpha = rho/curvature
       error = 0.0_wp
       !$omp parallel do schedule(static) default(none) shared(step, rest, p, product, alpha) &
-      !$omp private(c) reduction(max: error)
+      !$omp private(c) reduction(max: error) if (size(p, 2) > few)
       do c = 1, size(p, 2)
         step(:, c) = step(:, c) + alpha*p(:, c)
         rest(:, c) = rest(:, c) - alpha*product(:, c)
@@ -234,21 +239,17 @@ contains
       iterations = iterations + 1
       if (work%is_due()) call work%tell('iteration '//to_text(iterations)//'  error '// &
         & to_text(error, 2))
+      if (error < least) then
+        least = error
+        best = step
+        at = i
+      end if
       if (error <= target) exit
       if (size(levels) == 0) cycle
       ! what rounding leaves outside of the matrix's range would grow without end
-      if (error/much > least) then
-        step = best
-        exit
-      end if
-      if (error >= least) then
-        if (i - at > idle .and. .not. settled) exit
-        cycle
-      end if
-      least = error
-      best = step
-      at = i
+      if (error/much > least .or. (i - at > idle .and. .not. settled)) exit
     end do
+    if (allocated(best)) step = best
   end subroutine solve
 
   !> The sum of the products of all elements, with the same bits on any number of threads.
@@ -257,68 +258,86 @@ contains
     real(wp) :: of_class(size(one, 2))
     integer :: c
 
-    !$omp parallel do schedule(static) default(none) shared(one, other, of_class) private(c)
+    !$omp parallel do schedule(static) default(none) shared(one, other, of_class) private(c) &
+    !$omp if (size(one, 2) > few)
     do c = 1, size(one, 2)
       of_class(c) = dot_product(one(:, c), other(:, c))
     end do
     total = sum(of_class)
   end function product_of
 
-  !> Cholesky factors of the classes' blocks. Rows that follow from others of the class, as those
-  !> of a family with a centre of symmetry, are left out by a large pivot.
-  subroutine factorize(conditions, free, factor)
+  !> The inverses of the classes' blocks. Rows that follow from others of the class, as those of a
+  !> family with a centre of symmetry, are left out by a large pivot.
+  subroutine invert_blocks(conditions, free, inverse)
     type(conditions_type), intent(in) :: conditions
     logical, intent(in) :: free(:)
-    real(wp), allocatable, intent(out) :: factor(:, :, :)
+    real(wp), allocatable, intent(out) :: inverse(:, :, :)
     real(wp), parameter :: part = 1.0e-9_wp
-    real(wp) :: pivot, largest
-    integer :: c, i, j
+    real(wp) :: largest
+    integer :: c, i
 
-    allocate (factor(conditions%rows, conditions%rows, conditions%classes))
+    allocate (inverse(conditions%rows, conditions%rows, conditions%classes))
     !$omp parallel do schedule(dynamic, 16) default(none) private(c) &
-    !$omp shared(conditions, free, factor)
+    !$omp shared(conditions, free, inverse)
     do c = 1, conditions%classes
-      call block_of(conditions, c, free, factor(:, :, c))
+      call block_of(conditions, c, free, inverse(:, :, c))
     end do
     largest = 0.0_wp
     do i = 1, conditions%rows
-      largest = max(largest, maxval(factor(i, i, :)))
+      largest = max(largest, maxval(inverse(i, i, :)))
     end do
-    !$omp parallel do schedule(static) default(none) shared(conditions, factor, largest) &
-    !$omp private(c, i, j, pivot)
+    !$omp parallel do schedule(static) default(none) shared(conditions, inverse, largest) private(c)
     do c = 1, conditions%classes
-      associate (f => factor(:, :, c))
-        do j = 1, conditions%rows
-          pivot = f(j, j) - sum(f(j, :j - 1)**2)
-          if (pivot <= part*largest) pivot = largest/part
-          f(j, j) = sqrt(pivot)
-          do i = j + 1, conditions%rows
-            f(i, j) = (f(i, j) - dot_product(f(i, :j - 1), f(j, :j - 1)))/f(j, j)
-          end do
-        end do
-      end associate
+      call invert(inverse(:, :, c), part*largest, largest/part)
     end do
-  end subroutine factorize
+  end subroutine invert_blocks
 
-  !> The blocks' inverse times r.
-  subroutine precondition(factor, r, w)
-    real(wp), intent(in) :: factor(:, :, :), r(:, :)
+  !> Replace a symmetric matrix by its inverse, with Cholesky's factor.
+  pure subroutine invert(f, least, instead)
+    real(wp), intent(inout) :: f(:, :)
+    real(wp), intent(in) :: least      ! pivots up to this one
+    real(wp), intent(in) :: instead    ! what they are set to
+    real(wp) :: x(size(f, 1), size(f, 1)), pivot
+    integer :: i, j, n
+
+    n = size(f, 1)
+    do j = 1, n
+      pivot = f(j, j) - sum(f(j, :j - 1)**2)
+      if (pivot <= least) pivot = instead
+      f(j, j) = sqrt(pivot)
+      do i = j + 1, n
+        f(i, j) = (f(i, j) - dot_product(f(i, :j - 1), f(j, :j - 1)))/f(j, j)
+      end do
+    end do
+    ! the factor's inverse, then its transpose times itself
+    x = 0.0_wp
+    do j = 1, n
+      x(j, j) = 1/f(j, j)
+      do i = j + 1, n
+        x(i, j) = -dot_product(f(i, j:i - 1), x(j:i - 1, j))/f(i, i)
+      end do
+    end do
+    do j = 1, n
+      do i = 1, j
+        f(i, j) = dot_product(x(j:, i), x(j:, j))
+        f(j, i) = f(i, j)
+      end do
+    end do
+  end subroutine invert
+
+  !> The blocks' inverses times r.
+  subroutine precondition(inverse, r, w)
+    real(wp), intent(in) :: inverse(:, :, :), r(:, :)
     real(wp), intent(inout) :: w(:, :)
-    integer :: c, i, n
+    integer :: c, i
 
-    n = size(r, 1)
-    !$omp parallel do schedule(static) default(none) shared(factor, r, w, n) private(c, i)
+    !$omp parallel do schedule(static) default(none) shared(inverse, r, w) private(c, i) &
+    !$omp if (size(r, 2) > few)
     do c = 1, size(r, 2)
-      associate (f => factor(:, :, c), x => w(:, c))
-        x = r(:, c)
-        do i = 1, n
-          x(i) = x(i)/f(i, i)
-          x(i + 1:) = x(i + 1:) - x(i)*f(i + 1:, i)
-        end do
-        do i = n, 1, -1
-          x(i) = (x(i) - dot_product(f(i + 1:, i), x(i + 1:)))/f(i, i)
-        end do
-      end associate
+      w(:, c) = inverse(:, 1, c)*r(1, c)
+      do i = 2, size(r, 1)
+        w(:, c) = w(:, c) + inverse(:, i, c)*r(i, c)
+      end do
     end do
   end subroutine precondition
 

@@ -10,11 +10,11 @@
 !> grid that has few enough splines, the widest one, their whole matrix is solved: z and w together,
 !> since areas that change join them.
 module pd_set_up_consistent_levels
-  use pd_base_kinds, only: wp, i4, i8
+  use pd_base_kinds, only: wp, i1, i4, i8
   use pd_base_lookup, only: lookup_type, mix
   use pd_base_order, only: ascending_order
-  use pd_set_up_consistent_conditions, only: area_products, conditions_type, kind_of, of_area, &
-    & of_dilatation, of_stretches, triple_products
+  use pd_set_up_consistent_conditions, only: area_products, conditions_type, few, kind_of, &
+    & of_area, of_dilatation, of_stretches, triple_products
   use pd_set_up_consistent_envelope, only: add_block, add_product, envelope_type, &
     & factorize_envelope, move_to, new_envelope, solve_envelope, work_of_envelope
   use pd_set_up_consistent_splines, only: find_children, forget_points, grid_type, order_splines, &
@@ -30,9 +30,13 @@ module pd_set_up_consistent_levels
   !> point.
   real(wp), parameter :: most_work = 3.0e8_wp, work_of_point = 1.0e5_wp
   integer, parameter :: bonds_of_row = 60      !! that the matrix is made of, for each of its rows
+  integer, parameter :: others_of_row = 15     !! the same of those that are no pairs: they take longer
   integer, parameter :: bonds_of_spline = 200  !! that a diagonal is made of, for each spline
+  integer, parameter :: most_bonds = 64        !! of classes with one unknown
   integer, parameter :: last_of_all(3) = [4, 16, 36]  !! splines that its factor takes last: a few
                                                       !! more than fields without effect need
+  !> How an unknown is counted: hardly any are left out, between places that only look alike.
+  integer(i1), parameter :: left_out = 0_i1, a_pair = 1_i1, any_other = 2_i1
   real(wp), parameter :: golden = 0.6180339887498949_wp
 
   !> A grid of B-splines, and the inverse of its matrix. Components are those of z, then of w, as
@@ -52,13 +56,14 @@ contains
     type(level_type), allocatable, intent(out) :: levels(:)  !! from fine to wide
     type(level_type), allocatable :: more(:)
     integer(i4), allocatable :: numbers(:), finer(:)
+    integer(i1), allocatable :: how(:)
     integer, allocatable :: place(:), lowest(:)
     real(wp) :: low(conditions%dim), edge(conditions%dim), farthest
     integer :: cells(conditions%dim), fine(conditions%dim), last
     logical :: widest
 
     allocate (levels(0))
-    farthest = longest_reach(conditions)
+    call look_at_unknowns(conditions, how, farthest)
     low = minval(conditions%x, dim=2)
     edge = finest*conditions%spacing
     cells = int((maxval(conditions%x, dim=2) - low)/edge) + 1
@@ -78,9 +83,9 @@ contains
         widest = all(cells == 1) .or. work_of_envelope(lowest, level%components) <= most_work &
           & + work_of_point*conditions%classes
         if (widest) then
-          call factorize(conditions, level, place, lowest, last)
+          call factorize(conditions, how, level, place, lowest, last)
         else
-          call find_diagonal(conditions, level)
+          call find_diagonal(conditions, how, level)
         end if
         if (allocated(finer)) then
           call find_children(cells, fine, numbers, finer, level%grid_type)
@@ -95,34 +100,53 @@ contains
     end do
   end subroutine new_levels
 
-  !> The longest component of a bond between points that all differ.
-  pure real(wp) function longest_reach(conditions) result(farthest)
+  !> How the unknowns are counted, and the farthest that classes with one lie from each other along
+  !> an axis.
+  subroutine look_at_unknowns(conditions, how, farthest)
     type(conditions_type), intent(in) :: conditions
-    integer :: u
+    integer(i1), allocatable, intent(out) :: how(:)
+    real(wp), intent(out) :: farthest            ! [m]
+    real(wp), parameter :: opposite = 1.0e-6_wp  ! of directions from the ends of one bond
+    real(wp), parameter :: much = 1.001_wp       ! over the longest bond
+    real(wp) :: apart
+    integer(i8) :: i
+    integer :: u, d
 
+    allocate (how(conditions%unknowns), source=any_other)
     farthest = 0.0_wp
-    do u = 1, conditions%stretches + conditions%dilatations
-      associate (first => conditions%first(u), class => conditions%class, &
-        & bond => conditions%bond)
-        farthest = max(farthest, maxval(abs(conditions%x(:, class(bond(first))) &
-          & - conditions%x(:, class(bond(first + 1))))))
+    do u = 1, conditions%unknowns
+      associate (first => conditions%first(u), last => conditions%first(u + 1) - 1, &
+        & class => conditions%class, bond => conditions%bond)
+        apart = 0.0_wp
+        do d = 1, conditions%dim
+          apart = max(apart, maxval([(conditions%x(d, class(bond(i))), i=first, last)]) &
+            & - minval([(conditions%x(d, class(bond(i))), i=first, last)]))
+        end do
+        if (apart > much*conditions%longest .or. last - first >= most_bonds) then
+          how(u) = left_out
+          cycle
+        end if
+        farthest = max(farthest, apart)
+        if (last /= first + 1 .or. kind_of(conditions, u) == of_area) cycle
+        if (all(abs(conditions%n(bond(first), :) + conditions%n(bond(last), :)) <= opposite)) &
+          & how(u) = a_pair
       end associate
     end do
-  end function longest_reach
+  end subroutine look_at_unknowns
 
-  !> What a spline at point k gives the unknown of bond `e` of k, over `pattern_of` that unknown: as
-  !> a component of z, and of w.
-  pure function shares_of(conditions, k, e, value, gradient) result(share)
+  !> What a spline at point k gives the unknown of bond `e` of k, over `pattern_of` a bond in a
+  !> direction n, which is that of `e` or the opposite one: as a component of z, and of w.
+  pure function shares_of(conditions, k, e, n, value, gradient) result(share)
     type(conditions_type), intent(in) :: conditions
     integer, intent(in) :: k
     integer(i8), intent(in) :: e
+    real(wp), intent(in) :: n(:)
     real(wp), intent(in) :: value, gradient(:)  ! of the spline
     real(wp) :: share(2)
     real(wp) :: along
 
     share = 0.0_wp
-    associate (n => conditions%n(conditions%bond(conditions%first(conditions%unknown(e))), :), &
-      & f => conditions%factor(e, :))
+    associate (f => conditions%factor(e, :))
       ! seen from the other end the direction is the opposite one
       along = sign(1.0_wp, dot_product(n, conditions%n(e, :)))
       select case (kind_of(conditions, int(conditions%unknown(e))))
@@ -138,16 +162,16 @@ contains
     end associate
   end function shares_of
 
-  !> What the shares of an unknown are multiplied with for each component.
-  pure subroutine pattern_of(conditions, of_z, u, pattern)
+  !> What the shares of the unknown of bond `e` are multiplied with for each component.
+  pure subroutine pattern_of(conditions, of_z, e, pattern)
     type(conditions_type), intent(in) :: conditions
     integer, intent(in) :: of_z            ! components of z
-    integer, intent(in) :: u
+    integer(i8), intent(in) :: e
     real(wp), intent(inout) :: pattern(:)  ! (components) set
 
-    associate (n => conditions%n(conditions%bond(conditions%first(u)), :))
+    associate (n => conditions%n(e, :))
       pattern = 0.0_wp
-      select case (kind_of(conditions, u))
+      select case (kind_of(conditions, int(conditions%unknown(e))))
       case (of_stretches)
         call triple_products(n, pattern)
       case (of_dilatation)
@@ -159,14 +183,15 @@ contains
     end associate
   end subroutine pattern_of
 
-  !> What splines give an unknown: those that reach its points, and their shares.
+  !> What splines give the unknown of a pair of bonds: those that reach its points, and their
+  !> shares.
   subroutine reach_of(conditions, level, u, met, n, share, at)
     type(conditions_type), intent(in) :: conditions
     type(level_type), intent(in) :: level   ! with its points
     integer, intent(in) :: u                ! unknown
-    integer, intent(out) :: met(:)          ! (n) splines
+    integer, intent(inout) :: met(:)        ! splines; n are set
     integer, intent(out) :: n
-    real(wp), intent(out) :: share(:, :)    ! (2, n) as components of z, and of w
+    real(wp), intent(inout) :: share(:, :)  ! (2, any) as components of z, and of w; n are set
     integer, intent(inout) :: at(:)         ! (splines) 0, before and after
     real(wp) :: value(64), gradient(64, 3)
     integer(i8) :: i
@@ -184,12 +209,50 @@ contains
           share(:, n) = 0.0_wp
           at(s) = n
         end if
-        share(:, at(s)) = share(:, at(s)) + shares_of(conditions, k, conditions%bond(i), value(m), &
+        share(:, at(s)) = share(:, at(s)) + shares_of(conditions, k, conditions%bond(i), &
+          & conditions%n(conditions%bond(conditions%first(u)), :), value(m), &
           & gradient(m, :level%dim))
       end do
     end do
     at(met(:n)) = 0
   end subroutine reach_of
+
+  !> The same for any unknown, whose bonds need not have one direction: for each component.
+  subroutine vectors_of(conditions, level, u, met, n, vector, at)
+    type(conditions_type), intent(in) :: conditions
+    type(level_type), intent(in) :: level    ! with its points
+    integer, intent(in) :: u                 ! unknown
+    integer, intent(inout) :: met(:)         ! splines; n are set
+    integer, intent(out) :: n
+    real(wp), intent(inout) :: vector(:, :)  ! (components, any) n are set
+    integer, intent(inout) :: at(:)          ! (splines) 0, before and after
+    real(wp) :: value(64), gradient(64, 3), pattern(level%components), share(2)
+    integer(i8) :: i
+    integer :: k, m, s
+
+    n = 0
+    do i = conditions%first(u), conditions%first(u + 1) - 1
+      associate (e => conditions%bond(i), z => level%of_z)
+        k = int(conditions%class(e))
+        call splines_at(level%grid_type, k, value, gradient)
+        call pattern_of(conditions, z, e, pattern)
+        do m = 1, 4**level%dim
+          s = int(level%spline(m, level%cell(k)))
+          if (at(s) == 0) then
+            n = n + 1
+            met(n) = s
+            vector(:, n) = 0.0_wp
+            at(s) = n
+          end if
+          share = shares_of(conditions, k, e, conditions%n(e, :), value(m), &
+            & gradient(m, :level%dim))
+          vector(:z, at(s)) = vector(:z, at(s)) + share(1)*pattern(:z)
+          vector(z + 1:, at(s)) = vector(z + 1:, at(s)) + share(2)*pattern(z + 1:)
+        end do
+      end associate
+    end do
+    at(met(:n)) = 0
+  end subroutine vectors_of
 
   !> Whether an unknown is one of those that stand for all of their kind. Multiples of the golden
   !> section are spread evenly, and with them the directions of bonds.
@@ -211,11 +274,13 @@ contains
   end function parts_of
 
   !> The diagonal of a grid's matrix, from as many bonds as it needs.
-  subroutine find_diagonal(conditions, level)
+  subroutine find_diagonal(conditions, how, level)
     type(conditions_type), intent(in) :: conditions
+    integer(i1), intent(in) :: how(:)         ! the unknowns are counted
     type(level_type), intent(inout) :: level
     real(wp) :: pattern(level%components), parts(of_stretches:of_area), share(2, 128)
-    integer :: met(128), u, n, m, z
+    real(wp) :: vector(level%components, 64*most_bonds)
+    integer :: met(64*most_bonds), u, n, m, z
     integer, allocatable :: at(:)
 
     z = level%of_z
@@ -227,8 +292,20 @@ contains
     do u = 1, conditions%unknowns
       associate (part => parts(kind_of(conditions, u)))
         if (.not. stands_for_others(u, part)) cycle
-        call pattern_of(conditions, z, u, pattern)
-        pattern = pattern**2/part
+        select case (how(u))
+        case (left_out)
+          cycle
+        case (a_pair)
+          call pattern_of(conditions, z, conditions%bond(conditions%first(u)), pattern)
+          pattern = pattern**2/(part*conditions%counts(u))
+        case default  ! any other
+          call vectors_of(conditions, level, u, met, n, vector, at)
+          do m = 1, n
+            level%inverse(:, met(m)) = level%inverse(:, met(m)) &
+              & + vector(:, m)**2/(part*conditions%counts(u))
+          end do
+          cycle
+        end select
       end associate
       call reach_of(conditions, level, u, met, n, share, at)
       do m = 1, n
@@ -252,16 +329,18 @@ contains
 
   !> Cholesky's factor of the matrix of the widest grid, from as many bonds as it needs. Bonds of
   !> one direction have one pattern: what they give splines is summed first, cell by cell.
-  subroutine factorize(conditions, level, place, lowest, last)
+  subroutine factorize(conditions, how, level, place, lowest, last)
     type(conditions_type), intent(in) :: conditions
+    integer(i1), intent(in) :: how(:)         ! the unknowns are counted
     type(level_type), intent(inout) :: level  ! gets its factor
     integer, intent(in) :: place(:), lowest(:), last  ! as in `new_envelope`
     type(envelope_type) :: of_direction
-    real(wp) :: pattern(level%components), parts(of_stretches:of_area), share(2, 128)
-    real(wp) :: block(128, 128), vector(level%components, 128)
+    real(wp) :: pattern(level%components), share(2, 128)
+    real(wp) :: parts(of_stretches:of_area), of_others(of_stretches:of_area)
+    real(wp) :: block(128, 128), vector(level%components, 64*most_bonds), part
     integer, allocatable :: at(:), chosen(:), order(:), direction(:)
     integer(i8), allocatable :: cells(:)
-    integer :: met(128), n, i, u, m, z, low, high, which
+    integer :: met(64*most_bonds), n, i, u, m, z, low, high, which
     logical :: summed, last_one
 
     z = level%of_z
@@ -270,24 +349,24 @@ contains
     call new_envelope(place, lowest, last, 1, of_direction)
     allocate (at(size(place)), source=0)
     parts = parts_of(conditions, real(bonds_of_row, wp)*level%components*size(place))
+    of_others = parts_of(conditions, real(others_of_row, wp)*level%components*size(place))
     allocate (chosen(conditions%unknowns))
     i = 0
     do u = 1, conditions%unknowns
-      associate (kind => kind_of(conditions, u))
-        if (kind /= of_area) then
-          if (.not. stands_for_others(u, parts(kind))) cycle
-          i = i + 1
-          chosen(i) = u
-          cycle
-        end if
-      end associate
-      call pattern_of(conditions, z, u, pattern)
-      call reach_of(conditions, level, u, met, n, share, at)
-      do m = 1, n
-        vector(:z, m) = share(1, m)*pattern(:z)
-        vector(z + 1:, m) = share(2, m)*pattern(z + 1:)
-      end do
-      call add_product(met(:n), vector(:, :n), level%factor)
+      if (how(u) == left_out) cycle
+      part = merge(parts(kind_of(conditions, u)), of_others(kind_of(conditions, u)), &
+        & how(u) == a_pair)
+      if (.not. stands_for_others(u, part)) cycle
+      if (how(u) == a_pair) then
+        i = i + 1
+        chosen(i) = u
+        cycle
+      end if
+      call vectors_of(conditions, level, u, met, n, vector, at)
+      vector(:, :n) = vector(:, :n)/sqrt(part*conditions%counts(u))
+      low = merge(z + 1, 1, kind_of(conditions, u) == of_dilatation)
+      high = merge(z, level%components, kind_of(conditions, u) == of_stretches)
+      call add_product(met(:n), vector(:, :n), low, high, level%factor)
     end do
     chosen = chosen(:i)
     call sort_by_direction(conditions, level, chosen, order, direction, cells)
@@ -298,13 +377,13 @@ contains
       which = merge(1, 2, kind_of(conditions, u) == of_stretches)
       call reach_of(conditions, level, u, met, n, share, at)
       do m = 1, n
-        block(:n, m) = block(:n, m) + share(which, m)*share(which, :n)
+        block(:n, m) = block(:n, m) + share(which, m)*share(which, :n)/conditions%counts(u)
       end do
       if (i < size(order)) then
         if (cells(order(i)) == cells(order(i + 1))) cycle
       end if
       ! the last one of these cells
-      call pattern_of(conditions, z, u, pattern)
+      call pattern_of(conditions, z, conditions%bond(conditions%first(u)), pattern)
       pattern = pattern/sqrt(parts(kind_of(conditions, u)))
       low = merge(1, z + 1, which == 1)
       high = merge(z, level%components, which == 1)
@@ -403,7 +482,8 @@ contains
     integer :: s, m
 
     share = shares(level%dim)
-    !$omp parallel do schedule(static) default(none) shared(level, finer, c, share) private(s, m)
+    !$omp parallel do schedule(static) default(none) shared(level, finer, c, share) private(s, m) &
+    !$omp if (size(c, 2) > few)
     do s = 1, size(c, 2)
       c(:, s) = 0.0_wp
       do m = 1, size(share)
@@ -422,7 +502,8 @@ contains
     integer :: s, i
 
     share = shares(level%dim)
-    !$omp parallel do schedule(static) default(none) shared(level, finer, c, share) private(s, i)
+    !$omp parallel do schedule(static) default(none) shared(level, finer, c, share) private(s, i) &
+    !$omp if (size(finer, 2) > few)
     do s = 1, size(finer, 2)
       do i = level%above(s), level%above(s + 1) - 1
         finer(:, s) = finer(:, s) + share(level%parent(2, i))*c(:, level%parent(1, i))
@@ -465,7 +546,7 @@ contains
     rows = rows_of(dim)
     allocate (of_cell(n, level%components, size(level%start) - 1))
     !$omp parallel default(none) shared(conditions, level, r, c, of_cell, rows, dim, before, n, z) &
-    !$omp private(value, gradient, cell, i, k, x, y, s)
+    !$omp private(value, gradient, cell, i, k, x, y, s) if (conditions%classes > few)
     !$omp do schedule(dynamic, 8)
     do cell = 1, size(of_cell, 3)
       of_cell(:, :, cell) = 0.0_wp
@@ -511,7 +592,7 @@ contains
     rows = rows_of(dim)
     !$omp parallel do schedule(dynamic, 8) default(none) &
     !$omp shared(conditions, level, c, w, rows, dim, before, n, z) &
-    !$omp private(value, gradient, here, cell, i, k, x, y, row)
+    !$omp private(value, gradient, here, cell, i, k, x, y, row) if (conditions%classes > few)
     do cell = 1, size(level%start) - 1
       do i = 1, n
         here(i, :) = c(:, level%spline(i, cell))

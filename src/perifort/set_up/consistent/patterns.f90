@@ -10,7 +10,7 @@ module pd_set_up_consistent_patterns
   use pd_family_family, only: allocate_bonds, bonds_type, family_type
   implicit none (type, external)
   private
-  public :: patterns_type, find_patterns, find_shapes, place_of
+  public :: patterns_type, find_patterns, find_shapes, place_of, xi_of_key
 
   type :: patterns_type
     integer :: n_patterns = 0
@@ -183,6 +183,19 @@ contains
       key = ior(ishft(key, bits), nint(xi(d) + off, i8) + ishft(1_i8, bits - 1))
     end do
   end function bond_key
+
+  !> What a key has been rounded of.
+  pure function xi_of_key(key, dim, delta) result(xi)
+    integer(i8), intent(in) :: key
+    integer, intent(in) :: dim      !! number of dimensions
+    real(wp), intent(in) :: delta   !! horizon [m]
+    real(wp) :: xi(dim)             !! the bond, to 1e-5 horizons [m]
+    integer :: d
+
+    do d = 1, dim
+      xi(d) = (ibits(key, (dim - d)*bits, bits) - 2**(bits - 1) - off)*(delta/parts)
+    end do
+  end function xi_of_key
 
   !> The order of increasing keys.
   pure subroutine sort_keys(key, order)

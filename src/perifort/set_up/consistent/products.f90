@@ -3,7 +3,7 @@
 !> so that a processor takes eight at a time.
 module pd_set_up_consistent_products
   use pd_base_kinds, only: wp, i8
-  use pd_set_up_consistent_conditions, only: coefficients, conditions_type, most_rows
+  use pd_set_up_consistent_conditions, only: coefficients, conditions_type, few, most_rows
   implicit none (type, external)
   private
   public :: sums_of, spread_over, block_of
@@ -22,7 +22,7 @@ contains
     integer :: c, i, low, high
 
     !$omp parallel do schedule(dynamic, 64) default(none) shared(conditions, y, sums) &
-    !$omp private(values, of_bonds, e, last, c, i, low, high)
+    !$omp private(values, of_bonds, e, last, c, i, low, high) if (conditions%classes > few)
     do c = 1, conditions%classes
       sums(:, c) = 0.0_wp
       do e = conditions%start(c), conditions%last(1, c), most_run
@@ -49,7 +49,7 @@ contains
     end do
   end subroutine sums_of
 
-  !> The transposed product: what multipliers of the conditions give each unknown.
+  !> The transposed product over `counts`: what multipliers of the conditions give each unknown.
   subroutine spread_over(conditions, free, multipliers, given, y)
     type(conditions_type), intent(in) :: conditions
     logical, intent(in) :: free(:)             !! (unknowns) others get 0
@@ -63,7 +63,7 @@ contains
     ! where each unknown is of one bond, its two ends follow each other
     pairs = merge(conditions%stretches + conditions%dilatations, 0, conditions%alone)
     !$omp parallel default(none) shared(conditions, free, multipliers, y, given, pairs) &
-    !$omp private(values, sum, e, last, i, c, u, low, high)
+    !$omp private(values, sum, e, last, i, c, u, low, high) if (conditions%classes > few)
     ! what the multipliers of a class give its bonds, class by class; then the sum of each unknown
     !$omp do schedule(dynamic, 64)
     do c = 1, conditions%classes
@@ -85,7 +85,8 @@ contains
     end do
     !$omp do schedule(static)
     do u = 1, pairs
-      y(u) = merge(given(conditions%bond(2*u - 1)) + given(conditions%bond(2*u)), 0.0_wp, free(u))
+      y(u) = merge((given(conditions%bond(2*u - 1)) + given(conditions%bond(2*u))) &
+        & /conditions%counts(u), 0.0_wp, free(u))
     end do
     !$omp do schedule(static)
     do u = pairs + 1, conditions%unknowns
@@ -93,7 +94,7 @@ contains
       do i = conditions%first(u), conditions%first(u + 1) - 1
         sum = sum + given(conditions%bond(i))
       end do
-      y(u) = merge(sum, 0.0_wp, free(u))
+      y(u) = merge(sum/conditions%counts(u), 0.0_wp, free(u))
     end do
     !$omp end parallel
   end subroutine spread_over
@@ -214,8 +215,8 @@ contains
     end do
   end subroutine spread_dilatations
 
-  !> The block (rows, rows) of class `c` in the product of the conditions with their transpose, of
-  !> the unknowns that are `free`.
+  !> The block (rows, rows) of class `c` in the product of the conditions with their transpose over
+  !> `counts`, of the unknowns that are `free`.
   pure subroutine block_of(conditions, c, free, block)
     type(conditions_type), intent(in) :: conditions
     integer, intent(in) :: c              !! class
@@ -241,6 +242,7 @@ contains
         end do
         if (i < conditions%first(u + 1)) cycle
       end associate
+      of_unknown(low:high) = of_unknown(low:high)/sqrt(conditions%counts(conditions%unknown(e)))
       do row = low, high
         block(low:high, row) = block(low:high, row) + of_unknown(row)*of_unknown(low:high)
       end do

@@ -13,11 +13,14 @@ module pd_set_up_consistent_weights
   use pd_family_family, only: family_type
   use pd_force_model, only: model_type
   use pd_law_material, only: material_type, several_stiffnesses
-  use pd_set_up_consistent_boxes, only: box_type, fill_box, join_weights, take_from_box
+  use pd_set_up_consistent_boxes, only: box_type, fill_box, find_alike, join_weights, &
+    & symmetries_within, take_from_box
   use pd_set_up_consistent_conditions, only: conditions_type, dilatation_conditions, &
     & join_conditions, stretch_conditions
-  use pd_set_up_consistent_groups, only: find_groups, groups_type, spread_weights
+  use pd_set_up_consistent_groups, only: changeable_axes, find_groups, groups_type, &
+    & spread_weights
   use pd_set_up_consistent_least_change, only: least_change, most_iterations, unbounded
+  use pd_set_up_consistent_symmetries, only: symmetries_type
   implicit none (type, external)
   private
   public :: consistent_weights, weights_of_areas, solution_type, alone_text
@@ -139,6 +142,7 @@ contains
     type(long_work_type), intent(inout) :: work
     type(model_type), intent(in), optional :: model
     type(box_type), allocatable :: box
+    type(solution_type) :: box_stretch, box_dilatation
     real(wp), allocatable :: of_stretch(:, :), of_dilatation(:, :), new_area(:, :)
     real(wp) :: a(size(materials)), mu(size(materials))
     integer :: positive, most
@@ -154,12 +158,24 @@ contains
     if (shared) then
       most = huge(0)
       call fill_box(body, family, area, box)
-      if (allocated(box)) most = count(box%near)/points_of_class
+      if (allocated(box)) then
+        if (.not. any(box%near)) then
+          call weigh_box(materials, bounds(least:positive), box, stretch, dilatation, work)
+          if (allocated(box)) then
+            weights = box%weights
+            return
+          end if
+        else
+          most = count(box%near)/points_of_class
+        end if
+      end if
       call shared_weights(body, family, materials, of_stretch, of_dilatation, &
         & bounds(least:positive), most, weights, stretch, dilatation, error, work, model)
       if (.not. allocated(error)) return
       shared = .not. (stretch%hopeless .or. dilatation%hopeless)
-      if (allocated(box)) call weigh_box(materials, bounds(least:positive), box, work)
+      if (allocated(box)) call weigh_box(materials, bounds(least:positive), box, &
+        & box_stretch, box_dilatation, work)
+      if (allocated(box)) call find_alike(body, family, area, face, box)
     end if
     do
       ! where there are none above 0.05, there hardly are above 0
@@ -185,8 +201,12 @@ contains
       call own_weights(body, family, materials, of_stretch, of_dilatation, uneven, &
         & bounds(positive + 1:), weights, stretch, dilatation, error, work, model, box)
       if (.not. (allocated(error) .and. allocated(box))) return
-      ! once more, with all bonds unknown
-      deallocate (box)
+      ! once more, first without symmetries, then with all bonds unknown
+      if (allocated(box%alike)) then
+        deallocate (box%alike)
+      else
+        deallocate (box)
+      end if
     end do
   end subroutine weights_by_turns
 
@@ -213,7 +233,9 @@ contains
     type(conditions_type) :: of_stretch, of_dilatation, conditions
     real(wp), allocatable :: G(:)
     real(wp) :: a(size(materials)), mu(size(materials))
-    integer :: c, u
+    real(wp) :: change(body%dim)
+    integer, allocatable :: axes(:)
+    integer :: k, c, u, n
 
     a = a_of(materials)
     mu = mu_of(materials, body%dim)
@@ -221,24 +243,28 @@ contains
     if (allocated(error)) return
     call stretch_conditions(body, family, materials, groups, mu(1)*area, of_stretch, model)
     call dilatation_conditions(body, family, materials, a, groups, a(1)*area, of_dilatation, model)
-    call join_conditions(of_stretch, of_dilatation, mu(1), a(1), part_of_face*face(groups%first), &
-      & conditions)
+    call join_conditions(groups, of_stretch, of_dilatation, mu(1), a(1), &
+      & part_of_face*face(groups%first), conditions)
     call solve(conditions, bounds, most_iterations, 'stretch and the dilatation', G, stretch, &
       & error, work)
     if (allocated(error)) return
-    do c = 1, groups%n_classes
-      associate (k => groups%first(c))
-        if (.not. face(k) > 0.0_wp) cycle
-        u = int(conditions%unknown(conditions%start(c + 1) - body%dim))
-        area(k, :) = area(k, :) + (G(u:u + body%dim - 1) - 1)*part_of_face*face(k)
-      end associate
+    do k = 1, body%n_slots
+      c = int(groups%class(k))
+      if (c == 0 .or. .not. face(k) > 0.0_wp) cycle
+      axes = changeable_axes(groups, c, body%dim)
+      n = size(axes)
+      u = int(conditions%unknown(conditions%start(c + 1) - n))
+      change = 0.0_wp
+      change(axes) = part_of_face*face(k)*(G(u:u + n - 1) - 1)
+      if (allocated(groups%symmetries)) change = change*groups%symmetries%sign(:, &
+        & groups%symmetries%way(k))
+      area(k, :) = area(k, :) + change
     end do
-    associate (n => groups%n_groups)
-      dilatation%residual = stretch%residual
-      stretch%unknowns = n
-      dilatation%unknowns = n
-      call give_weights(body, groups, G(:n), G(n + 1:2*n), weights, stretch, dilatation, box)
-    end associate
+    n = groups%n_groups
+    dilatation%residual = stretch%residual
+    stretch%unknowns = n
+    dilatation%unknowns = n
+    call give_weights(groups, G(:n), G(n + 1:2*n), weights, stretch, dilatation, box)
   end subroutine weights_and_areas
 
   !> Why a point without a second one behind its face is refused.
@@ -284,7 +310,7 @@ contains
   !> Weights of which bonds in like surroundings have one; where that leaves no solution,
   !> surroundings are looked at farther. An error is set if none fulfil the conditions.
   subroutine shared_weights(body, family, materials, of_stretch, of_dilatation, bounds, &
-    & most_classes, weights, stretch, dilatation, error, work, model)
+    & most_classes, weights, stretch, dilatation, error, work, model, box)
     type(body_type), intent(in) :: body
     class(family_type), intent(in) :: family
     type(material_type), intent(in) :: materials(:)
@@ -297,8 +323,10 @@ contains
     type(error_type), allocatable, intent(out) :: error
     type(long_work_type), intent(inout) :: work
     type(model_type), intent(in), optional :: model
+    type(box_type), intent(in), optional :: box   ! that the body is, which has symmetries
     integer, parameter :: farthest = 3
     type(groups_type) :: groups
+    type(symmetries_type), allocatable :: symmetries
     real(wp), allocatable :: Gb(:), Gd(:)
     real(wp) :: scale
     integer :: reach
@@ -307,8 +335,10 @@ contains
     if (.not. scale > 0.0_wp) scale = 1.0_wp
     ! in space a second horizon would give ten times the unknowns for weights hardly nearer to 1
     do reach = merge(1, 2, body%dim == 3), farthest
+      if (present(box)) call symmetries_within(box, reach, symmetries)
       call find_groups(body, family, reshape([of_stretch/maxval(abs(of_stretch)), &
-        & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error)
+        & of_dilatation/scale], [body%n_slots, 2*body%dim]), reach, groups, error, &
+        & symmetries=symmetries)
       if (allocated(error)) return
       if (groups%n_classes > most_classes) then
         stretch%hopeless = .true.
@@ -319,7 +349,7 @@ contains
         & bounds_of_dilatation, merge(few_iterations, most_iterations, most_classes < huge(0)), &
         & Gb, Gd, stretch, dilatation, error, work, model)
       if (.not. allocated(error)) then
-        call give_weights(body, groups, Gb, Gd, weights, stretch, dilatation)
+        call give_weights(groups, Gb, Gd, weights, stretch, dilatation)
         return
       end if
       if (stretch%hopeless .or. dilatation%hopeless) return
@@ -359,7 +389,7 @@ contains
       & bounds_of_dilatation(first:), most_iterations, Gb, Gd, stretch, dilatation, error, work, &
       & model)
     if (allocated(error)) return
-    call give_weights(body, groups, Gb, Gd, weights, stretch, dilatation, box)
+    call give_weights(groups, Gb, Gd, weights, stretch, dilatation, box)
   end subroutine own_weights
 
   !> A group for each bond; with a `box`, for each bond near missing cells.
@@ -372,7 +402,7 @@ contains
     type(box_type), intent(in), optional :: box
 
     if (present(box)) then
-      call find_groups(body, family, area, 0, groups, error, box%near)
+      call find_groups(body, family, area, 0, groups, error, box%near, box%alike)
       if (.not. allocated(error)) call take_from_box(box, groups)
     else
       call find_groups(body, family, area, 0, groups, error)
@@ -380,8 +410,7 @@ contains
   end subroutine own_groups
 
   !> Give the slots the weights of groups, and those of the box, if there is one.
-  subroutine give_weights(body, groups, Gb, Gd, weights, stretch, dilatation, box)
-    type(body_type), intent(in) :: body
+  subroutine give_weights(groups, Gb, Gd, weights, stretch, dilatation, box)
     type(groups_type), intent(in) :: groups
     real(wp), intent(in) :: Gb(:), Gd(:)                       ! (groups)
     type(bond_weights_type), intent(out) :: weights
@@ -391,7 +420,7 @@ contains
     if (present(box)) then
       call join_weights(box, groups, Gb, Gd, weights)
     else
-      call spread_weights(body, groups, Gb, Gd, weights)
+      call spread_weights(groups, Gb, Gd, weights)
     end if
     stretch%least = minval(weights%Gb)
     stretch%greatest = maxval(weights%Gb)
@@ -400,20 +429,25 @@ contains
   end subroutine give_weights
 
   !> Give the box around a lattice its weights, which are shared; without such it is taken away.
-  subroutine weigh_box(materials, bounds, box, work)
+  subroutine weigh_box(materials, bounds, box, stretch, dilatation, work)
     type(material_type), intent(in) :: materials(:)     ! all of one stiffness
     real(wp), intent(in) :: bounds(:)                   ! on Gb
     type(box_type), allocatable, intent(inout) :: box
+    type(solution_type), intent(out) :: stretch, dilatation
     type(long_work_type), intent(inout) :: work
-    type(solution_type) :: stretch, dilatation
+    type(bond_weights_type) :: weights
     type(error_type), allocatable :: error
     real(wp) :: a(size(materials)), mu(size(materials))
 
     a = a_of(materials)
     mu = mu_of(materials, box%body%dim)
     call shared_weights(box%body, box%family, materials, mu(1)*box%area, a(1)*box%area, bounds, &
-      & huge(0), box%weights, stretch, dilatation, error, work)
-    if (allocated(error)) deallocate (box)
+      & huge(0), weights, stretch, dilatation, error, work, box=box)
+    if (allocated(error)) then
+      deallocate (box)
+    else
+      box%weights = weights
+    end if
   end subroutine weigh_box
 
   !> Gb and Gd of groups. An error is set if none fulfil the conditions.
