@@ -26,7 +26,7 @@ module pd_set_up_consistent_envelope
   !> A smaller pivot is of a row that follows from those before: a rounding error.
   real(wp), parameter :: follows = 1.0e-7_wp
   !> Part of a component's largest diagonal that is none: of a spline that hardly reaches any point.
-  real(wp), parameter :: nothing = 1.0e-14_wp
+  real(wp), parameter :: nothing = 1.0e-12_wp
   character(*), parameter :: outside = 'an element outside of an envelope'
 
 contains

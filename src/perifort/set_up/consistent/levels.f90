@@ -30,7 +30,7 @@ module pd_set_up_consistent_levels
   !> point.
   real(wp), parameter :: most_work = 3.0e8_wp, work_of_point = 1.0e5_wp
   integer, parameter :: bonds_of_row = 60      !! that the matrix is made of, for each of its rows
-  integer, parameter :: others_of_row = 15     !! the same of those that are no pairs: they take longer
+  integer, parameter :: others_of_row = 15     !! the same of those that are no pairs
   integer, parameter :: bonds_of_spline = 200  !! that a diagonal is made of, for each spline
   integer, parameter :: most_bonds = 64        !! of classes with one unknown
   integer, parameter :: last_of_all(3) = [4, 16, 36]  !! splines that its factor takes last: a few
