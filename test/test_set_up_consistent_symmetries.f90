@@ -277,19 +277,13 @@ contains
   !> images.
   subroutine test_areas(error)
     type(error_type), allocatable, intent(out) :: error
-    type(scene_type) :: scene
     type(set_up_type) :: set_up
+    type(box_type), allocatable :: box
+    real(wp), allocatable :: area(:, :)
     integer, allocatable :: slot(:, :)
     integer :: x, y
 
-    call box_scene([60, 60], spacing, 0.3_wp, scene)
-    scene%horizon%surface_correction = 'consistent'
-    deallocate (scene%removed)
-    allocate (scene%removed(1))
-    scene%removed(1)%shape = 'cylinder'
-    scene%removed(1)%centre(:2) = 30*spacing
-    scene%removed(1)%radius = 12*spacing
-    call ready(scene, set_up, error)
+    call make([60, 60], reshape([30.0_wp, 30.0_wp], [2, 1]), 12.0_wp, set_up, box, area, error)
     if (allocated(error)) return
     associate (body => set_up%system%body)
       call expect_true(error, allocated(body%surface_area), 'areas that change')

@@ -37,7 +37,7 @@ module pd_set_up_consistent_boxes
   !> largest possible bound on Gb is 0 around a hole with a radius of 30 points, and -0.3 in a plate
   !> of 12 points' thickness.
   integer, parameter :: near_bonds = 4
-  integer, parameter :: most_cells = 100  !! of a box, for each point of the body
+  integer, parameter :: most_cells = 100  !! slots of a box, for each point of the body
 
 contains
 
@@ -56,17 +56,15 @@ contains
     select type (family)
     type is (lattice_family_type)
       if (size(family%grids) /= 1 .or. family%partial .or. family%mixed) return
+      if (body%n_slots/most_cells > body%n_points) return
       rule = family%rule
     class default  ! no lattice
       return
     end select
     allocate (box)
     call fill_cells(body, box%body)
-    found = box%body%n_points <= most_cells*body%n_points
-    if (found) then
-      call new_lattice_family(box%body, rule, .false., .false., box%family, error)
-      found = .not. allocated(error)
-    end if
+    call new_lattice_family(box%body, rule, .false., .false., box%family, error)
+    found = .not. allocated(error)
     if (found) then
       if (box%body%n_slots /= body%n_slots) &
         & call internal_fault('a box has other slots than its body')

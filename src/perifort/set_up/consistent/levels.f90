@@ -203,12 +203,7 @@ contains
       call splines_at(level%grid_type, k, value, gradient)
       do m = 1, 4**level%dim
         s = int(level%spline(m, level%cell(k)))
-        if (at(s) == 0) then
-          n = n + 1
-          met(n) = s
-          share(:, n) = 0.0_wp
-          at(s) = n
-        end if
+        call meet(s, met, n, at, share)
         share(:, at(s)) = share(:, at(s)) + shares_of(conditions, k, conditions%bond(i), &
           & conditions%n(conditions%bond(conditions%first(u)), :), value(m), &
           & gradient(m, :level%dim))
@@ -238,12 +233,7 @@ contains
         call pattern_of(conditions, z, e, pattern)
         do m = 1, 4**level%dim
           s = int(level%spline(m, level%cell(k)))
-          if (at(s) == 0) then
-            n = n + 1
-            met(n) = s
-            vector(:, n) = 0.0_wp
-            at(s) = n
-          end if
+          call meet(s, met, n, at, vector)
           share = shares_of(conditions, k, e, conditions%n(e, :), value(m), &
             & gradient(m, :level%dim))
           vector(:z, at(s)) = vector(:z, at(s)) + share(1)*pattern(:z)
@@ -253,6 +243,20 @@ contains
     end do
     at(met(:n)) = 0
   end subroutine vectors_of
+
+  !> Give a spline that is met for the first time the next number, and zeros.
+  pure subroutine meet(s, met, n, at, values)
+    integer, intent(in) :: s                 ! spline
+    integer, intent(inout) :: met(:), n      ! splines, as in `reach_of`
+    integer, intent(inout) :: at(:)          ! (splines) their numbers, 0: not met
+    real(wp), intent(inout) :: values(:, :)  ! (any, any) of each number
+
+    if (at(s) > 0) return
+    n = n + 1
+    met(n) = s
+    at(s) = n
+    values(:, n) = 0.0_wp
+  end subroutine meet
 
   !> Whether an unknown is one of those that stand for all of their kind. Multiples of the golden
   !> section are spread evenly, and with them the directions of bonds.
