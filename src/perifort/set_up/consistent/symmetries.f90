@@ -16,6 +16,8 @@ module pd_set_up_consistent_symmetries
   use pd_body_body, only: body_type
   use pd_family_bond_weights, only: bond_weights_type
   use pd_set_up_consistent_patterns, only: patterns_type, place_of, xi_of_key
+  use pd_set_up_consistent_pieces, only: both, find_codes, find_layers, find_pieces, join_layers, &
+    & layer_of, mirrored_place, mirrors, piece_type
   implicit none (type, external)
   private
   public :: symmetries_type, known_type, symmetries_of_box, find_symmetries, mirrored_key
@@ -42,17 +44,6 @@ module pd_set_up_consistent_symmetries
     type(patterns_type) :: of_box              !! of those of the box around it
     type(bond_weights_type) :: weights         !! of the box; without rows: not known yet
   end type known_type
-
-  !> A piece of points that hang together.
-  type :: piece_type
-    integer, allocatable :: list(:)            ! slots, by their places
-    integer :: low(3) = 0, high(3) = 0         ! places
-    integer(i8) :: least = 0_i8                ! the least of the codes that it has in all ways
-    logical, allocatable :: same(:)            ! (ways) with this code
-    integer, allocatable :: layer(:, :)        ! (places, dim) place of the layer that stands for
-                                               ! that at a place along an axis
-    logical :: alone = .false.                 ! it has no symmetries, and no other piece is alike
-  end type piece_type
 
   !> Classes over points above which the points have weights of their own: with symmetries each
   !> iteration takes longer.
@@ -120,7 +111,7 @@ contains
         wide = within*int(delta/spacing)
       end associate
       call place_points(cells, body, place, slot_at)
-      call find_pieces(known, place, slot_at, piece, pieces)
+      call find_pieces(known%near, known%patterns, place, slot_at, piece, pieces)
       do p = 1, size(pieces)
         allocate (pieces(p)%same(2**body%dim))
         call find_codes(known%fixed, place, pieces(p))
@@ -157,18 +148,6 @@ contains
     end do
     mirrored = symmetries%mirrored(way, low)
   end function mirrored_key
-
-  !> Whether a way mirrors an axis: bit by bit what is set in its number, less 1.
-  elemental logical function mirrors(way, axis)
-    integer, intent(in) :: way, axis
-    mirrors = btest(way - 1, axis - 1)
-  end function mirrors
-
-  !> The way to mirror that is one after another, in either order.
-  elemental integer function both(one, other) result(way)
-    integer, intent(in) :: one, other
-    way = 1 + ieor(one - 1, other - 1)
-  end function both
 
   !> What each bond becomes. `found`: each has one place in the lattice.
   subroutine mirror_keys(body, patterns, delta, symmetries, found)
@@ -241,148 +220,6 @@ contains
       if (body%point(k) > 0) slot_at(place(1, k), place(2, k), place(3, k)) = k
     end do
   end subroutine place_points
-
-  !> Pieces of points that bonds with unknown weights join, by the place of the first point.
-  subroutine find_pieces(known, place, slot_at, piece, pieces)
-    type(known_type), intent(in) :: known
-    integer, intent(in) :: place(:, :), slot_at(:, :, :)
-    integer, allocatable, intent(out) :: piece(:)            ! (n_slots) of each point; 0: none
-    type(piece_type), allocatable, intent(out) :: pieces(:)
-    integer, allocatable :: order(:), reached(:), next(:)
-    integer :: i, j, k, n, p, count_of
-    integer(i8) :: e
-
-    ! by places, x fastest
-    order = pack(slot_at, slot_at > 0)
-    order = pack(order, known%near(order))
-    allocate (piece(size(known%near)), source=0)
-    allocate (reached(size(order)))
-    p = 0
-    do i = 1, size(order)
-      if (piece(order(i)) > 0) cycle
-      p = p + 1
-      piece(order(i)) = p
-      reached(1) = order(i)
-      n = 1
-      count_of = 0
-      do while (count_of < n)
-        count_of = count_of + 1
-        k = reached(count_of)
-        associate (of => known%patterns%of(k), start => known%patterns%start)
-          do e = start(of), start(of + 1) - 1
-            j = k + int(known%patterns%ahead(e))
-            if (piece(j) > 0 .or. .not. known%near(j)) cycle
-            piece(j) = p
-            n = n + 1
-            reached(n) = j
-          end do
-        end associate
-      end do
-    end do
-    allocate (pieces(p), next(p))
-    next = 0
-    do i = 1, size(order)
-      next(piece(order(i))) = next(piece(order(i))) + 1
-    end do
-    do p = 1, size(pieces)
-      allocate (pieces(p)%list(next(p)))
-    end do
-    next = 0
-    do i = 1, size(order)
-      associate (of => pieces(piece(order(i))), n => next(piece(order(i))))
-        n = n + 1
-        of%list(n) = order(i)
-      end associate
-    end do
-    do p = 1, size(pieces)
-      pieces(p)%low = minval(place(:, pieces(p)%list), dim=2)
-      pieces(p)%high = maxval(place(:, pieces(p)%list), dim=2)
-    end do
-  end subroutine find_pieces
-
-  !> Places in a piece, mirrored in it.
-  pure function mirrored_place(piece, way, place) result(at)
-    type(piece_type), intent(in) :: piece
-    integer, intent(in) :: way, place(3)
-    integer :: at(3)
-    integer :: d
-
-    at = merge(piece%low + piece%high - place, place, [(mirrors(way, d), d=1, 3)])
-  end function mirrored_place
-
-  !> The least of a piece's codes in all ways to see it.
-  subroutine find_codes(fixed, place, piece)
-    logical, intent(in) :: fixed(:)
-    integer, intent(in) :: place(:, :)
-    type(piece_type), intent(inout) :: piece
-    integer(i8), allocatable :: code(:)
-    integer(i8) :: of_point
-    integer :: at(3), w, i, d
-
-    allocate (code(size(piece%same)), source=0_i8)
-    !$omp parallel do schedule(static) default(none) private(w, i, d, at, of_point) &
-    !$omp shared(fixed, place, piece, code)
-    do w = 1, size(code)
-      do i = 1, size(piece%list)
-        at = mirrored_place(piece, w, place(:, piece%list(i))) - piece%low
-        of_point = merge(1_i8, 0_i8, fixed(piece%list(i)))
-        do d = 1, size(at)
-          of_point = mix(of_point, int(at(d), i8))
-        end do
-        code(w) = ieor(code(w), mix(1_i8, of_point))
-      end do
-    end do
-    piece%least = minval(code)
-    piece%same = code == piece%least
-  end subroutine find_codes
-
-  !> Layers of a piece across an axis that follow each other and are all alike: but for those near
-  !> the first and the last one, one of them stands for all.
-  subroutine find_layers(fixed, place, wide, piece)
-    logical, intent(in) :: fixed(:)
-    integer, intent(in) :: place(:, :)
-    integer, intent(in) :: wide              ! layers at either end that are not like others
-    type(piece_type), intent(inout) :: piece
-    integer(i8), allocatable :: code(:)
-    integer(i8) :: of_point
-    integer :: d, c, i, first, last
-
-    allocate (piece%layer(maxval(piece%high), 3))
-    do d = 1, 3
-      piece%layer(:, d) = [(i, i=1, size(piece%layer, 1))]
-      if (piece%high(d) - piece%low(d) <= 2*wide) cycle
-      if (allocated(code)) deallocate (code)
-      allocate (code(piece%low(d):piece%high(d)), source=0_i8)
-      do i = 1, size(piece%list)
-        associate (at => place(:, piece%list(i)))
-          of_point = merge(1_i8, 0_i8, fixed(piece%list(i)))
-          do c = 1, 3
-            if (c /= d) of_point = mix(of_point, int(at(c), i8))
-          end do
-          code(at(d)) = ieor(code(at(d)), mix(1_i8, of_point))
-        end associate
-      end do
-      first = piece%low(d)
-      do while (first <= piece%high(d))
-        last = first
-        do while (last < piece%high(d))
-          if (code(last + 1) /= code(first)) exit
-          last = last + 1
-        end do
-        call join_layers(first, last, wide, piece%layer(:, d))
-        first = last + 1
-      end do
-    end do
-  end subroutine find_layers
-
-  !> Let one layer stand for all between a first and a last one that are far from these.
-  pure subroutine join_layers(first, last, wide, layer)
-    integer, intent(in) :: first, last
-    integer, intent(in) :: wide            ! layers at either end that stand for themselves
-    integer, intent(inout) :: layer(:)     ! that stands for each
-
-    if (last - first > 2*wide) layer(first + wide:last - wide) = first + wide
-  end subroutine join_layers
 
   !> Classes of points, as the pieces that have symmetries or are alike make them.
   subroutine find_classes(place, slot_at, pieces, symmetries)
@@ -487,19 +324,6 @@ contains
     end function slot_of
 
   end subroutine find_classes
-
-  !> The place in the layers that stand for those of a place.
-  pure function layer_of(piece, place) result(at)
-    type(piece_type), intent(in) :: piece
-    integer, intent(in) :: place(:)
-    integer :: at(3)
-    integer :: d
-
-    at = 1
-    do d = 1, size(place)
-      at(d) = piece%layer(place(d), d)
-    end do
-  end function layer_of
 
   !> Whether points of one class are alike in all that is known of them; pieces with others stand
   !> alone from now on.
